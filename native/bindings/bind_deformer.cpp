@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <optional>
+
+#include "arrays.h"
+#include "module.h"
+#include "sinew/deform/deformer.h"
+
+namespace sinew::bindings {
+namespace {
+
+static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and written in place");
+
+std::span<const Vec3<float>> as_points(const py::array_t<float>& points) {
+    return {reinterpret_cast<const Vec3<float>*>(points.data()), static_cast<std::size_t>(points.shape(0))};
+}
+
+template <class T>
+std::span<const T> as_span(const py::array_t<T>& array) {
+    return {array.data(), static_cast<std::size_t>(array.size())};
+}
+
+Method checked_method(const std::string& name) {
+    const std::optional<Method> method = find_method(name);
+    if (method) return *method;
+    std::string names;
+    for (const Method& row : kMethods) names += (names.empty() ? "" : ", ") + std::string(row.name);
+    fail("method", "one of " + names, "'" + name + "'");
+}
+
+Deformer make_deformer(const py::object& rest_points, const py::object& influence_offsets,
+                       const py::object& influence_bones, const py::object& influence_weights,
+                       const std::string& method, const py::object& rest_bones) {
+    const Method row = checked_method(method);
+    const auto points = checked_points(rest_points, "rest_points");
+    const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]");
+    const auto bones = checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]");
+    const auto weights = checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]");
+    std::vector<Affine<float>> axes;
+    if (!rest_bones.is_none()) axes = checked_affines(rest_bones, "rest_bones");
+    return Deformer(row.id, {as_points(points), as_span(offsets), as_span(bones), as_span(weights), axes});
+}
+
+// An array to write into: never a silent copy, or the caller's array would keep its old points.
+py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) {
+    const auto rows = static_cast<py::ssize_t>(vertex_count);
+    if (out.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
+    const std::string wanted = "writable C-contiguous float32 [" + std::to_string(vertex_count) + ", 3]";
+    if (!py::isinstance<py::array_t<float, py::array::c_style>>(out)) fail("out", wanted, describe(out));
+    auto array = py::reinterpret_borrow<py::array_t<float>>(out);
+    if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3) fail("out", wanted, describe(out));
+    if (!array.writeable()) fail("out", wanted, "a read-only array");
+    return array;
+}
+
+py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
+                          const std::optional<py::ssize_t>& threads, const py::object& bones_from_model) {
+    const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
+    if (bones.size() < deformer.bone_count()) {
+        fail("bone_transforms", "at least " + std::to_string(deformer.bone_count()) + " bones",
+             std::to_string(bones.size()));
+    }
+    if (threads && *threads < 1) fail("threads", "None or 1 or more", std::to_string(*threads));
+    DeformOptions options;
+    options.threads = static_cast<std::size_t>(threads.value_or(0));
+    if (!bones_from_model.is_none()) {
+        options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
+        if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
+            fail("bones_from_model", "an invertible transform", "one of determinant 0");
+        }
+    }
+    py::array_t<float> points = checked_out(out, deformer.vertex_count());
+    const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
+                                        deformer.vertex_count());
+    {
+        const py::gil_scoped_release release;
+        deformer.deform(bones, options, target);
+    }
+    return points;
+}
+
+}  // namespace
+
+void bind_deformer(py::module_& m) {
+    py::class_<Deformer>(m, "Deformer", "A mesh bound to bones, ready to be deformed at any pose.")
+        .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
+             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
+             py::arg("rest_bones") = py::none(),
+             "rest_points: float32 [vertices, 3], model space.\n"
+             "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
+             "influence_bones: int32 [influences].\n"
+             "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
+             "method: the name of one of sinew.methods().\n"
+             "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space\n"
+             "    of the bone transforms; read where a bone is scaled and the method is rigid. None: identity.\n\n"
+             "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
+        .def_property_readonly("method", [](const Deformer& deformer) {
+            for (const Method& row : kMethods) {
+                if (row.id == deformer.method()) return std::string(row.name);
+            }
+            return std::string();
+        })
+        .def_property_readonly("vertex_count", &Deformer::vertex_count)
+        .def_property_readonly("influence_count", &Deformer::influence_count,
+                               "Influences of positive weight.")
+        .def_property_readonly("bone_count", &Deformer::bone_count,
+                               "One more than the highest bone that an influence names.")
+        .def(
+            "set_rest_points",
+            [](Deformer& deformer, const py::object& rest_points) {
+                deformer.set_rest_points(as_points(checked_points(rest_points, "rest_points")));
+            },
+            py::arg("rest_points"), "New rest points, float32 [vertices, 3], as when shape keys change.")
+        .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
+             py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
+             "The deformed points, float32 [vertices, 3], model space.\n\n"
+             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.\n"
+             "out: written and returned where given: float32 [vertices, 3], C-contiguous.\n"
+             "threads: how many at most; None: as many as help. The result is the same bit for bit.\n"
+             "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
+             "    transforms, where the blending happens; the result is taken back. None: the same space.\n\n"
+             "A vertex without influences stays. The GIL is released. Raises ValueError that names the\n"
+             "argument, what was wanted and what came.");
+}
+
+}  // namespace sinew::bindings

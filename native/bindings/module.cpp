@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "module.h"
+
+PYBIND11_MODULE(_native, m) {
+    m.doc() = "Sinew's C++ library. Use it through the package `sinew`.";
+    m.attr("__version__") = SINEW_VERSION;
+    sinew::bindings::bind_methods(m);
+    sinew::bindings::bind_skeleton(m);
+    sinew::bindings::bind_deformer(m);
+}

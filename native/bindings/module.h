@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace sinew::bindings {
+
+void bind_methods(pybind11::module_& m);
+void bind_skeleton(pybind11::module_& m);
+void bind_deformer(pybind11::module_& m);
+
+}  // namespace sinew::bindings

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cassert>
+#include <span>
+
+#include "sinew/skeleton/skeleton.h"
+
+namespace sinew {
+
+/// Each bone's transform relative to the root: its parent's, times its own (Smith 2013, algorithm 1).
+///
+/// root_from_parentless  placed before every bone without a parent
+/// parent_from_bone      [bones] each bone relative to its parent
+/// root_from_bone        [bones] the result; may be the same memory as parent_from_bone
+///
+/// Transform is Affine, QuatVec or DualQuat of any scalar.
+template <class Transform>
+void root_relative(const Skeleton& skeleton, const Transform& root_from_parentless,
+                   std::span<const Transform> parent_from_bone,
+                   std::span<Transform> root_from_bone) noexcept {
+    assert(parent_from_bone.size() == skeleton.bone_count());
+    assert(root_from_bone.size() == skeleton.bone_count());
+    const std::span<const std::int32_t> parents = skeleton.parents();
+    for (std::size_t bone = 0; bone < parents.size(); ++bone) {
+        const std::int32_t parent = parents[bone];
+        const Transform& before =
+            parent < 0 ? root_from_parentless : root_from_bone[static_cast<std::size_t>(parent)];
+        root_from_bone[bone] = before * parent_from_bone[bone];
+    }
+}
+
+}  // namespace sinew

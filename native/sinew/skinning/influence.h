@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+
+namespace sinew {
+
+/// One bone's share of one vertex.
+template <class T>
+struct Influence {
+    std::int32_t bone;
+    T weight;
+};
+
+/// The influence of largest weight, the first of equals. Requires at least one.
+template <class T>
+[[nodiscard]] const Influence<T>& heaviest(std::span<const Influence<T>> influences) noexcept {
+    return *std::max_element(influences.begin(), influences.end(),
+                             [](const auto& a, const auto& b) { return a.weight < b.weight; });
+}
+
+}  // namespace sinew

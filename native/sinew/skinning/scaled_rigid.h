@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/transform/convert.h"
+#include "sinew/transform/split_scale.h"
+
+namespace sinew {
+
+/// A bone's motion as the rigid methods need it: `rigid` after a scale about the bone's head.
+///
+/// The scale rule of all rigid methods: each bone's term of the blend is the rigid motion that maps this
+/// vertex exactly where that bone alone, scale included, would put it (Blender's rule since 4.0).
+template <class Rigid, class T>
+struct ScaledRigid {
+    Rigid rigid;
+    Affine<T> scale;
+    bool has_scale = false;
+
+    /// How far the scale moves `rest` before the rigid motion applies.
+    [[nodiscard]] Vec3<T> scale_displacement(const Vec3<T>& rest) const noexcept {
+        return transform_point(scale, rest) - rest;
+    }
+};
+
+/// The same motion in another scalar type.
+template <class To, template <class> class Rigid, class From>
+[[nodiscard]] ScaledRigid<Rigid<To>, To> cast(const ScaledRigid<Rigid<From>, From>& bone) noexcept {
+    return {cast<To>(bone.rigid), cast<To>(bone.scale), bone.has_scale};
+}
+
+}  // namespace sinew

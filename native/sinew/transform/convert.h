@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/transform/affine.h"
+#include "sinew/transform/dual_quat.h"
+#include "sinew/transform/quat_vec.h"
+
+namespace sinew {
+
+// From an Affine: its linear part must be a rotation; split_scale() makes it one.
+
+template <class T>
+[[nodiscard]] QuatVec<T> to_quat_vec(const Affine<T>& a) noexcept {
+    return {to_quat(a.linear), a.translation};
+}
+
+template <class T>
+[[nodiscard]] QuatVec<T> to_quat_vec(const DualQuat<T>& a) noexcept {
+    return {a.real, translation(a)};
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> to_dual_quat(const QuatVec<T>& a) noexcept {
+    return {a.rotation, T(0.5) * (pure(a.translation) * a.rotation)};
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> to_dual_quat(const Affine<T>& a) noexcept {
+    return to_dual_quat(to_quat_vec(a));
+}
+
+template <class T>
+[[nodiscard]] Affine<T> to_affine(const QuatVec<T>& a) noexcept {
+    return {to_mat3(a.rotation), a.translation};
+}
+
+template <class T>
+[[nodiscard]] Affine<T> to_affine(const DualQuat<T>& a) noexcept {
+    return {to_mat3(a.real), translation(a)};
+}
+
+/// The same transform in another scalar type.
+template <class To, class From>
+[[nodiscard]] Affine<To> cast(const Affine<From>& a) noexcept {
+    return {Mat3<To>(a.linear), Vec3<To>(a.translation)};
+}
+
+template <class To, class From>
+[[nodiscard]] QuatVec<To> cast(const QuatVec<From>& a) noexcept {
+    return {Quat<To>(a.rotation), Vec3<To>(a.translation)};
+}
+
+template <class To, class From>
+[[nodiscard]] DualQuat<To> cast(const DualQuat<From>& a) noexcept {
+    return {Quat<To>(a.real), Quat<To>(a.dual)};
+}
+
+}  // namespace sinew

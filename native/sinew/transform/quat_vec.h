@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/transform/quat.h"
+
+namespace sinew {
+
+/// Quaternion-vector pair (QV): x -> rotation x rotation* + translation (Smith 2013, section 2.2.1).
+/// The rotation is of unit length. The default is the identity.
+template <class T>
+struct QuatVec {
+    Quat<T> rotation{T(1), T(0), T(0), T(0)};
+    Vec3<T> translation{T(0)};
+};
+
+/// First `b`, then `a`.
+template <class T>
+[[nodiscard]] QuatVec<T> operator*(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
+    return {a.rotation * b.rotation, rotate(a.rotation, b.translation) + a.translation};
+}
+
+/// The transform that undoes `a`.
+template <class T>
+[[nodiscard]] QuatVec<T> inverse(const QuatVec<T>& a) noexcept {
+    const Quat<T> rotation = glm::conjugate(a.rotation);
+    return {rotation, -rotate(rotation, a.translation)};
+}
+
+template <class T>
+[[nodiscard]] Vec3<T> transform_point(const QuatVec<T>& a, const Vec3<T>& point) noexcept {
+    return rotate(a.rotation, point) + a.translation;
+}
+
+template <class T>
+[[nodiscard]] Vec3<T> transform_vector(const QuatVec<T>& a, const Vec3<T>& vector) noexcept {
+    return rotate(a.rotation, vector);
+}
+
+}  // namespace sinew
