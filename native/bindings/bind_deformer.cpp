@@ -32,7 +32,8 @@ Deformer make_deformer(const py::object& rest_points, const py::object& influenc
                        const std::string& method, const py::object& rest_bones) {
     const Method row = checked_method(method);
     const auto points = checked_points(rest_points, "rest_points");
-    const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]");
+    const auto offsets =
+        checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]");
     const auto bones = checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]");
     const auto weights = checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]");
     std::vector<Affine<float>> axes;
@@ -47,21 +48,29 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
     const std::string wanted = "writable C-contiguous float32 [" + std::to_string(vertex_count) + ", 3]";
     if (!py::isinstance<py::array_t<float, py::array::c_style>>(out)) fail("out", wanted, describe(out));
     auto array = py::reinterpret_borrow<py::array_t<float>>(out);
-    if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3) fail("out", wanted, describe(out));
+    if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3)
+        fail("out", wanted, describe(out));
     if (!array.writeable()) fail("out", wanted, "a read-only array");
     return array;
 }
 
+std::size_t checked_threads(const py::object& threads) {
+    if (threads.is_none()) return 0;
+    if (!py::isinstance<py::int_>(threads)) fail("threads", "None or 1 or more", describe(threads));
+    const auto count = threads.cast<py::ssize_t>();
+    if (count < 1) fail("threads", "None or 1 or more", std::to_string(count));
+    return static_cast<std::size_t>(count);
+}
+
 py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
-                          const std::optional<py::ssize_t>& threads, const py::object& bones_from_model) {
+                          const py::object& threads, const py::object& bones_from_model) {
     const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
     if (bones.size() < deformer.bone_count()) {
         fail("bone_transforms", "at least " + std::to_string(deformer.bone_count()) + " bones",
              std::to_string(bones.size()));
     }
-    if (threads && *threads < 1) fail("threads", "None or 1 or more", std::to_string(*threads));
     DeformOptions options;
-    options.threads = static_cast<std::size_t>(threads.value_or(0));
+    options.threads = checked_threads(threads);
     if (!bones_from_model.is_none()) {
         options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
         if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
@@ -90,15 +99,18 @@ void bind_deformer(py::module_& m) {
              "influence_bones: int32 [influences].\n"
              "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
              "method: the name of one of sinew.methods().\n"
-             "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space\n"
-             "    of the bone transforms; read where a bone is scaled and the method is rigid. None: identity.\n\n"
+             "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the "
+             "space\n"
+             "    of the bone transforms; read where a bone is scaled and the method is rigid. None: "
+             "identity.\n\n"
              "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
-        .def_property_readonly("method", [](const Deformer& deformer) {
-            for (const Method& row : kMethods) {
-                if (row.id == deformer.method()) return std::string(row.name);
-            }
-            return std::string();
-        })
+        .def_property_readonly("method",
+                               [](const Deformer& deformer) {
+                                   for (const Method& row : kMethods) {
+                                       if (row.id == deformer.method()) return std::string(row.name);
+                                   }
+                                   return std::string();
+                               })
         .def_property_readonly("vertex_count", &Deformer::vertex_count)
         .def_property_readonly("influence_count", &Deformer::influence_count,
                                "Influences of positive weight.")
@@ -113,7 +125,8 @@ void bind_deformer(py::module_& m) {
         .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
              py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
              "The deformed points, float32 [vertices, 3], model space.\n\n"
-             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not read.\n"
+             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
+             "read.\n"
              "out: written and returned where given: float32 [vertices, 3], C-contiguous.\n"
              "threads: how many at most; None: as many as help. The result is the same bit for bit.\n"
              "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"

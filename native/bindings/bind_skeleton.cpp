@@ -24,12 +24,14 @@ void bind_skeleton(py::module_& m) {
                          std::to_string(bones.size()));
                 }
                 root_relative<Affine<float>>(skeleton, {}, bones, bones);
-                py::array_t<float> result({static_cast<py::ssize_t>(bones.size()), py::ssize_t{4}, py::ssize_t{4}});
+                py::array_t<float> result(
+                    {static_cast<py::ssize_t>(bones.size()), py::ssize_t{4}, py::ssize_t{4}});
                 auto out = result.mutable_unchecked<3>();
                 for (py::ssize_t bone = 0; bone < out.shape(0); ++bone) {
                     const Affine<float>& a = bones[static_cast<std::size_t>(bone)];
                     for (int row = 0; row < 3; ++row) {
-                        for (int column = 0; column < 3; ++column) out(bone, row, column) = a.linear[column][row];
+                        for (int column = 0; column < 3; ++column)
+                            out(bone, row, column) = a.linear[column][row];
                         out(bone, row, 3) = a.translation[row];
                         out(bone, 3, row) = 0.0f;
                     }

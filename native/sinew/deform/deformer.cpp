@@ -17,8 +17,7 @@ namespace {
 // Below this, waking a second thread costs more than it saves.
 constexpr std::size_t kVerticesWorthAThread = 8192;
 
-[[noreturn]] void fail(const std::string& argument, const std::string& wanted,
-                       const std::string& got) {
+[[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got) {
     throw std::invalid_argument(argument + ": expected " + wanted + ", got " + got);
 }
 
@@ -39,7 +38,8 @@ void check(const BindData& data) {
         fail("influence_bones", "fewer than 2^31 influences", std::to_string(influence_count));
     }
     if (data.influence_weights.size() != influence_count) {
-        fail("influence_weights", "one for each of the " + std::to_string(influence_count) + " influence_bones",
+        fail("influence_weights",
+             "one for each of the " + std::to_string(influence_count) + " influence_bones",
              std::to_string(data.influence_weights.size()));
     }
     if (data.influence_offsets.size() != vertex_count + 1) {
@@ -99,8 +99,8 @@ Deformer::Deformer(MethodId method, const BindData& data) : method_(method) {
         for (std::size_t i = begin; i < end; ++i) {
             const float weight = data.influence_weights[i];
             if (weight > 0.0f) {
-                influences_.push_back({data.influence_bones[i],
-                                       static_cast<float>(static_cast<double>(weight) / sum)});
+                influences_.push_back(
+                    {data.influence_bones[i], static_cast<float>(static_cast<double>(weight) / sum)});
             }
         }
         offsets_.push_back(static_cast<std::uint32_t>(influences_.size()));
@@ -109,7 +109,8 @@ Deformer::Deformer(MethodId method, const BindData& data) : method_(method) {
 
 void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
     if (rest_points.size() != rest_points_.size()) {
-        fail("rest_points", std::to_string(rest_points_.size()) + " points", std::to_string(rest_points.size()));
+        fail("rest_points", std::to_string(rest_points_.size()) + " points",
+             std::to_string(rest_points.size()));
     }
     check_points(rest_points);
     std::copy(rest_points.begin(), rest_points.end(), rest_points_.begin());
@@ -121,11 +122,10 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     assert(points.size() == rest_points_.size());
     const MeshView mesh{rest_points_, offsets_, influences_};
     const std::size_t threads =
-        options.threads > 0
-            ? options.threads
-            : std::min(hardware_threads(), 1 + rest_points_.size() / kVerticesWorthAThread);
-    deform_mesh(method_, mesh, posed_from_rest.first(bone_count_), rest_bones_,
-                options.bones_from_model, threads, points);
+        options.threads > 0 ? options.threads
+                            : std::min(hardware_threads(), 1 + rest_points_.size() / kVerticesWorthAThread);
+    deform_mesh(method_, mesh, posed_from_rest.first(bone_count_), rest_bones_, options.bones_from_model,
+                threads, points);
 }
 
 }  // namespace sinew

@@ -15,12 +15,14 @@ namespace sinew {
 
 /// What a Deformer is made of. Nothing is kept by reference.
 struct BindData {
-    std::span<const Vec3<float>> rest_points;        // [vertices] model space
-    std::span<const std::int32_t> influence_offsets; // [vertices + 1] first influence of each vertex, then the end
-    std::span<const std::int32_t> influence_bones;   // [influences] bone of each
-    std::span<const float> influence_weights;        // [influences] >= 0; any sum, normalised inside
-    std::span<const Affine<float>> rest_bones{};     // [bones] orthonormal, Y along the bone; empty: all identity.
-                                                     // Read where a bone is scaled and the method is rigid
+    std::span<const Vec3<float>> rest_points;  // [vertices] model space
+    std::span<const std::int32_t>
+        influence_offsets;  // [vertices + 1] first influence of each vertex, then the end
+    std::span<const std::int32_t> influence_bones;  // [influences] bone of each
+    std::span<const float> influence_weights;       // [influences] >= 0; any sum, normalised inside
+    std::span<const Affine<float>>
+        rest_bones{};  // [bones] orthonormal, Y along the bone; empty: all identity.
+                       // Read where a bone is scaled and the method is rigid
 };
 
 /// How one frame is deformed.

@@ -23,8 +23,8 @@ void deform_with(const MeshView& mesh, std::span<const Affine<float>> posed_from
     using Bone = typename Method::template Bone<float>;
     std::vector<Bone> bones(posed_from_rest.size());
     for (std::size_t bone = 0; bone < bones.size(); ++bone) {
-        bones[bone] = cast<float>(
-            Method::prepare(cast<double>(posed_from_rest[bone]), cast<double>(rest_bones[bone])));
+        bones[bone] =
+            cast<float>(Method::prepare(cast<double>(posed_from_rest[bone]), cast<double>(rest_bones[bone])));
     }
     const std::span<const Bone> palette(bones);
     const bool same_space = is_identity(bones_from_model);
@@ -32,8 +32,8 @@ void deform_with(const MeshView& mesh, std::span<const Affine<float>> posed_from
     parallel_for(points.size(), threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t vertex = begin; vertex < end; ++vertex) {
             const Vec3<float>& rest = mesh.rest_points[vertex];
-            const auto influences = mesh.influences.subspan(
-                mesh.offsets[vertex], mesh.offsets[vertex + 1] - mesh.offsets[vertex]);
+            const auto influences = mesh.influences.subspan(mesh.offsets[vertex],
+                                                            mesh.offsets[vertex + 1] - mesh.offsets[vertex]);
             if (influences.empty()) {
                 points[vertex] = rest;
             } else if (same_space) {

@@ -12,9 +12,9 @@ namespace sinew {
 
 /// A valid bound mesh: every influence has a positive weight and those of a vertex sum to 1.
 struct MeshView {
-    std::span<const Vec3<float>> rest_points;       // [vertices]
-    std::span<const std::uint32_t> offsets;         // [vertices + 1]
-    std::span<const Influence<float>> influences;   // [offsets.back()]
+    std::span<const Vec3<float>> rest_points;      // [vertices]
+    std::span<const std::uint32_t> offsets;        // [vertices + 1]
+    std::span<const Influence<float>> influences;  // [offsets.back()]
 };
 
 /// Deforms the whole mesh with one method; the seam at which kernels are made fast. What the method means

@@ -6,14 +6,12 @@
 
 namespace sinew {
 
-Skeleton::Skeleton(std::span<const std::int32_t> parents)
-    : parents_(parents.begin(), parents.end()) {
+Skeleton::Skeleton(std::span<const std::int32_t> parents) : parents_(parents.begin(), parents.end()) {
     for (std::size_t bone = 0; bone < parents_.size(); ++bone) {
         const std::int32_t parent = parents_[bone];
         if (parent < -1 || (parent >= 0 && static_cast<std::size_t>(parent) >= bone)) {
-            throw std::invalid_argument(
-                "parents: expected -1 or the index of an earlier bone, got " +
-                std::to_string(parent) + " for bone " + std::to_string(bone));
+            throw std::invalid_argument("parents: expected -1 or the index of an earlier bone, got " +
+                                        std::to_string(parent) + " for bone " + std::to_string(bone));
         }
     }
 }

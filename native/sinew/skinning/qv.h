@@ -48,8 +48,7 @@ struct Qv {
         }
         const T length = glm::length(rotation);
         if (length < T(kDegenerateBlend)) {
-            rotation =
-                bones[static_cast<std::size_t>(heaviest(influences).bone)].rigid.rotation;
+            rotation = bones[static_cast<std::size_t>(heaviest(influences).bone)].rigid.rotation;
         } else {
             rotation = rotation * (T(1) / length);
         }

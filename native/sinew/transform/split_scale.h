@@ -59,16 +59,15 @@ template <class T>
                       std::abs(glm::dot(c[i], c[(i + 1) % 3])) < T(1e-5);
     }
     const Affine<T> posed_bone = posed_from_rest * rest_bone;
-    const Vec3<T> stretch(glm::length(posed_bone.linear[0]) - T(1),
-                          glm::length(posed_bone.linear[1]) - T(1),
+    const Vec3<T> stretch(glm::length(posed_bone.linear[0]) - T(1), glm::length(posed_bone.linear[1]) - T(1),
                           glm::length(posed_bone.linear[2]) - T(1));
     if (orthonormal && glm::determinant(c) >= T(0) && glm::dot(stretch, stretch) <= T(1e-8)) {
         return {posed_from_rest, {}, false};
     }
     const Affine<T> rigid_bone{rotation_keeping_y(posed_bone.linear), posed_bone.translation};
     const Affine<T> rest_from_model = inverse(rest_bone);
-    return {rigid_bone * rest_from_model,
-            rest_bone * (inverse(rigid_bone) * posed_bone) * rest_from_model, true};
+    return {rigid_bone * rest_from_model, rest_bone * (inverse(rigid_bone) * posed_bone) * rest_from_model,
+            true};
 }
 
 }  // namespace sinew
