@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Final points and triangles of evaluated meshes, and the method they are deformed with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from ..core.errors import SinewError
+from . import drive, handlers, mesh_io, properties
+
+# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
+BLENDER = "blender"
+
+
+def method_names() -> list[str]:
+    return [*properties.METHODS, BLENDER]
+
+
+def method_label(name: str) -> str:
+    return "Armature modifier" if name == BLENDER else properties.METHODS[name].label
+
+
+def check_methods(names: Iterable[str]) -> None:
+    for name in names:
+        if name not in method_names():
+            raise SinewError(f"method: expected one of {', '.join(method_names())}, got {name!r}")
+
+
+def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy.types.Object]:
+    """The scene's meshes that an armature deforms, all or the one called `name`; visible from now on, for
+    Blender does not evaluate what is hidden. Raises SinewError where there are none."""
+    meshes = drive.deformed_meshes(list(scene.objects))
+    if name is not None:
+        meshes = [obj for obj in meshes if obj.name == name]
+    if not meshes:
+        what = f"no mesh called {name!r} that an armature deforms" if name else "no mesh is deformed by an armature"
+        raise SinewError(what)
+    _show_layers(bpy.context.view_layer.layer_collection)
+    for obj in meshes:
+        obj.hide_viewport = False
+        obj.hide_render = False
+        if obj.name in bpy.context.view_layer.objects:
+            obj.hide_set(False)
+    return meshes
+
+
+def use_method(obj: bpy.types.Object, method: str) -> None:
+    """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not drive it."""
+    if method == BLENDER:
+        if properties.is_driven(obj):
+            properties.of(obj).enabled = False
+        return
+    drive.add(obj, method)
+    if not properties.of(obj).enabled:
+        properties.of(obj).enabled = True
+    handlers.refresh(bpy.context)
+    if properties.of(obj).error:
+        raise SinewError(properties.of(obj).error)
+
+
+def set_frame(scene: bpy.types.Scene, frame: float) -> None:
+    whole = int(np.floor(frame))
+    scene.frame_set(whole, subframe=float(frame - whole))
+
+
+def final_points(obj: bpy.types.Object) -> np.ndarray:
+    """Vertices of the final evaluated mesh, object space, float32 [vertices, 3]."""
+    return mesh_io.read_points(_evaluated_mesh(obj).vertices)
+
+
+def final_triangles(obj: bpy.types.Object) -> np.ndarray:
+    """int32 [triangles, 3]: corners of the final evaluated mesh's triangles."""
+    mesh = _evaluated_mesh(obj)
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return triangles
+
+
+def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def _show_layers(layer: bpy.types.LayerCollection) -> None:
+    layer.exclude = False
+    layer.hide_viewport = False
+    layer.collection.hide_viewport = False
+    layer.collection.hide_render = False
+    for child in layer.children:
+        _show_layers(child)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rest points, shape keys and weights from a mesh; deformed points into an attribute of it."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..core.errors import SinewError
+from ..core.influences import GroupWeights
+from ..core.shape_keys import ShapeKeys
+
+
+def read_points(vertices: bpy.types.bpy_prop_collection) -> np.ndarray:
+    """Vertex positions in object space, float32 [vertices, 3]; a copy."""
+    points = np.empty((len(vertices), 3), dtype=np.float32)
+    vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
+    """All entries of all vertices, in stored order; about 1 microsecond an entry."""
+    counts = np.empty(len(mesh.vertices), dtype=np.int32)
+    groups: list[int] = []
+    weights: list[float] = []
+    for index, vertex in enumerate(mesh.vertices):
+        entries = vertex.groups
+        counts[index] = len(entries)
+        for entry in entries:
+            groups.append(entry.group)
+            weights.append(entry.weight)
+    return GroupWeights(
+        counts, np.array(groups, dtype=np.int32), np.array(weights, dtype=np.float32)
+    )
+
+
+def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys | None:
+    """The relative shape keys of a mesh object, None where it has none.
+
+    Raises SinewError for absolute keys.
+    """
+    keys = obj.data.shape_keys
+    if keys is None:
+        return None
+    if not keys.use_relative:
+        raise SinewError(
+            f"{obj.name}: its shape keys are absolute, which Sinew does not mix; switch them to Relative"
+        )
+    points = {block.name: read_points(block.points) for block in keys.key_blocks}
+    basis = keys.reference_key
+    moves: list[np.ndarray | None] = []
+    for block in keys.key_blocks:
+        if block == basis:
+            moves.append(None)
+            continue
+        move = points[block.name] - points[block.relative_key.name]
+        if block.vertex_group:
+            group = obj.vertex_groups.get(block.vertex_group)
+            if group is not None:
+                move *= weights.of_group(group.index)[:, None]
+        moves.append(move)
+    return ShapeKeys(points[basis.name], moves)
+
+
+def read_key_values(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """float32 [keys]: the value of each shape key at this evaluation; 0 where it is muted."""
+    blocks = obj.data.shape_keys.evaluated_get(depsgraph).key_blocks
+    values = np.empty(len(blocks), dtype=np.float32)
+    muted = np.empty(len(blocks), dtype=bool)
+    blocks.foreach_get("value", values)
+    blocks.foreach_get("mute", muted)
+    values[muted] = 0.0
+    if obj.show_only_shape_key:
+        values[:] = 0.0
+        if obj.active_shape_key_index < len(values):
+            values[obj.active_shape_key_index] = 1.0
+    return values
+
+
+def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
+    """Stores float32 [vertices, 3] in the point attribute `name`, made where it is missing."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        if attribute is not None:
+            mesh.attributes.remove(attribute)
+        # A new attribute can push the others' memory elsewhere and become the active one; both are
+        # Blender's own business except the active index, which the artist chose.
+        active = mesh.attributes.active_index
+        attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+        mesh.attributes.active_index = active
+    attribute.data.foreach_set("vector", points.ravel())
+    mesh.update_tag()
+
+
+def remove_points(mesh: bpy.types.Mesh, name: str) -> None:
+    attribute = mesh.attributes.get(name)
+    if attribute is not None:
+        active = mesh.attributes.active_index
+        mesh.attributes.remove(attribute)
+        mesh.attributes.active_index = active

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel's buttons: poll, gather, one call, report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from ..core.errors import SinewError
+from . import drive, handlers, properties
+
+
+def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The meshes meant: those active or selected, and all that a selected or active armature deforms."""
+    chosen = list(context.selected_objects)
+    active = context.active_object
+    if active is not None and active not in chosen:
+        chosen.append(active)
+    armatures = {o for o in chosen if o.type == "ARMATURE"}
+    meshes = [
+        o
+        for o in drive.deformed_meshes(list(context.scene.objects))
+        if o in chosen or drive.armature_of(o) in armatures
+    ]
+    # The active one first: the panel shows its details.
+    return sorted(meshes, key=lambda o: o != active)
+
+
+def _for_each(
+    operator: bpy.types.Operator,
+    objects: list[bpy.types.Object],
+    action: Callable[[bpy.types.Object], None],
+    done: str,
+) -> set[str]:
+    count = 0
+    for obj in objects:
+        try:
+            action(obj)
+            count += 1
+        except SinewError as error:
+            operator.report({"ERROR"}, str(error))
+    if count == 0:
+        return {"CANCELLED"}
+    operator.report({"INFO"}, f"{done} {count} mesh{'es' if count > 1 else ''}")
+    return {"FINISHED"}
+
+
+class SINEW_OT_add(bpy.types.Operator):
+    bl_idname = "sinew.add"
+    bl_label = "Add Sinew"
+    bl_description = (
+        "Deform with Sinew in the place of the Armature modifier, which stays in the stack, switched off"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if any(not properties.is_driven(obj) for obj in targets(context)):
+            return True
+        cls.poll_message_set("Select a mesh with an Armature modifier, or an armature that deforms one")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = [obj for obj in targets(context) if not properties.is_driven(obj)]
+        result = _for_each(self, objects, drive.add, "Sinew deforms")
+        handlers.session.forget()
+        handlers.refresh(context)
+        return result
+
+
+class _OnDriven:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if any(properties.is_driven(obj) for obj in targets(context)):
+            return True
+        cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
+        return False
+
+
+class SINEW_OT_rebind(_OnDriven, bpy.types.Operator):
+    bl_idname = "sinew.rebind"
+    bl_label = "Rebind"
+    bl_description = "Read mesh, weights and bones anew, and switch on again after an error"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = [obj for obj in targets(context) if properties.is_driven(obj)]
+        result = _for_each(self, objects, lambda obj: handlers.rebind(obj, context), "Rebound")
+        failed = [properties.of(obj).error for obj in objects if properties.of(obj).error]
+        if failed:
+            self.report({"ERROR"}, failed[0])
+            return {"CANCELLED"}
+        return result
+
+
+class SINEW_OT_remove(_OnDriven, bpy.types.Operator):
+    bl_idname = "sinew.remove"
+    bl_label = "Remove"
+    bl_description = "Take Sinew off and give the Armature modifier back as it was"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = [obj for obj in targets(context) if properties.is_driven(obj)]
+        result = _for_each(self, objects, drive.remove, "Removed Sinew from")
+        handlers.session.forget()
+        return result
+
+
+CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab "Sinew" of the 3D view."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from . import handlers, native, operators, properties
+
+# Characters of the interface font that fit a pixel of sidebar at scale 1; a label is not wrapped by Blender.
+CHARACTERS_PER_PIXEL = 0.14
+
+
+class _Sidebar:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Sinew"
+
+
+class SINEW_PT_unavailable(_Sidebar, bpy.types.Panel):
+    """Stands in for everything where the native library does not load."""
+
+    bl_label = "Sinew"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_text(self.layout, context, native.load_error() or "Restart Blender to use Sinew", icon="ERROR")
+
+
+class SINEW_PT_main(_Sidebar, bpy.types.Panel):
+    bl_label = "Sinew"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        meshes = operators.targets(context)
+        if not meshes:
+            _draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
+            return
+        driven = [obj for obj in meshes if properties.is_driven(obj)]
+        if len(driven) < len(meshes):
+            count = len(meshes) - len(driven)
+            label = "Add Sinew" if count == 1 else f"Add Sinew to {count} Meshes"
+            layout.operator("sinew.add", text=label, icon="MOD_ARMATURE")
+        for obj in driven:
+            box = layout.box()
+            _draw_settings(box, context, obj)
+            _draw_facts(box, context, obj)
+        if driven:
+            row = layout.row(align=True)
+            row.operator("sinew.rebind", icon="FILE_REFRESH")
+            row.operator("sinew.remove", icon="X")
+            if not context.scene.render.use_lock_interface:
+                _draw_text(layout, context, "Before rendering in this window, lock the interface:", icon="INFO")
+                layout.prop(context.scene.render, "use_lock_interface")
+
+
+def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    settings = properties.of(obj)
+    row = layout.row(align=True)
+    row.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
+    if settings.error:
+        _draw_text(layout, context, settings.error, icon="ERROR", alert=True)
+    layout.prop(settings, "method", text="")
+    _draw_text(layout, context, properties.METHODS[settings.method].description)
+
+
+def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    armature = properties.of(obj).armature
+    state = handlers.state_of(obj)
+    rows = [("Armature", armature.name if armature else "none")]
+    if state is not None:
+        facts = state.facts
+        rows += [
+            ("Vertices", f"{facts.vertices:,}"),
+            ("Bones", f"{facts.bones}, {facts.weighted_bones} with weights"),
+            ("Influences", f"{facts.mean_influences:.2f} a vertex, at most {facts.most_influences}"),
+            ("Last frame", f"{state.milliseconds:.2f} ms"),
+        ]
+    column = layout.column(align=True)
+    for name, value in rows:
+        split = column.split(factor=0.4)
+        split.label(text=name)
+        split.label(text=value)
+    if state is not None:
+        for warning in state.facts.warnings:
+            _draw_text(layout, context, warning, icon="ERROR")
+
+
+def _draw_text(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    text: str,
+    icon: str = "NONE",
+    alert: bool = False,
+) -> None:
+    """Text broken into as many labels as the sidebar's width asks for."""
+    scale = context.preferences.system.ui_scale
+    width = max(20, int(context.region.width / scale * CHARACTERS_PER_PIXEL))
+    column = layout.column(align=True)
+    column.alert = alert
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, width)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
+
+
+CLASSES = (SINEW_PT_main,)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Registers Sinew with Blender, and takes all of it out again."""
+
+from __future__ import annotations
+
+import atexit
+
+import bpy
+
+from . import native
+
+_registered: list[type] = []
+_commands: list[object] = []
+
+
+def is_registered() -> bool:
+    return bool(_registered)
+
+
+def register() -> None:
+    if native.load_error() is not None:
+        # Properties would need the table of methods: without the library only the reason is shown, and what
+        # a file holds of Sinew stays in it untouched.
+        from . import panels
+
+        _register_classes((panels.SINEW_PT_unavailable,))
+        return
+    from . import handlers, operators, panels, properties
+
+    _register_classes((properties.SinewSettings, *operators.CLASSES, *panels.CLASSES))
+    bpy.types.Object.sinew = bpy.props.PointerProperty(type=properties.SinewSettings)
+    handlers.register()
+    _register_command()
+    # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
+    # handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5.
+    atexit.register(unregister)
+
+
+def unregister() -> None:
+    if hasattr(bpy.types.Object, "sinew"):
+        from . import drive, handlers, properties
+
+        atexit.unregister(unregister)
+        handlers.unregister()
+        # As in a saved file: the Armature modifiers point to their armatures again.
+        for obj in bpy.data.objects:
+            if properties.is_driven(obj):
+                drive.give_back(obj)
+        del bpy.types.Object.sinew
+    while _commands:
+        bpy.utils.unregister_cli_command(_commands.pop())
+    while _registered:
+        bpy.utils.unregister_class(_registered.pop())
+
+
+def _register_classes(classes: tuple[type, ...]) -> None:
+    for cls in classes:
+        bpy.utils.register_class(cls)
+        _registered.append(cls)
+
+
+def _register_command() -> None:
+    from .. import cli
+
+    _commands.append(bpy.utils.register_cli_command("sinew", cli.main))

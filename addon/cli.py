@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command `sinew`, in plain Python with bpy as a module and as `blender --command sinew`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from .core.errors import SinewError
+
+
+def main(argv: list[str]) -> int:
+    """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
+    from .commands import console, info, methods, points, reskin
+
+    modules = {"methods": methods, "info": info, "points": points, "reskin": reskin}
+    parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")
+    parser.add_argument("--verbose", action="store_true", help="show what Blender prints")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for module in modules.values():
+        module.add_parser(subparsers)
+    try:
+        args = parser.parse_args(argv)
+    except SystemExit as stop:
+        # Inside Blender an exit would skip its own ending.
+        return stop.code if isinstance(stop.code, int) else 2
+    output = console.keep_output() if args.verbose else console.take_over_output()
+    try:
+        if args.command != "methods":
+            _prepare_blender()
+        return modules[args.command].run(args, output)
+    except SinewError as error:
+        output.complain(error)
+        return 1
+    except KeyboardInterrupt:
+        output.complain("stopped")
+        return 130
+    finally:
+        output.out.flush()
+        output.err.flush()
+
+
+def run() -> None:
+    """Entry point of the program in plain Python."""
+    sys.exit(main(sys.argv[1:]))
+
+
+def _prepare_blender() -> None:
+    try:
+        import bpy
+    except ImportError as error:
+        raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
+    from .blender import native, registration
+
+    reason = native.load_error()
+    if reason is not None:
+        raise SinewError(reason)
+    if not hasattr(bpy.types.Object, "sinew"):
+        registration.register()

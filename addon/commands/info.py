@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew info`: what is known of each armature-deformed mesh."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from ..core.errors import SinewError
+from .console import Console
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser("info", help="list the armature-deformed meshes of files")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    failed = False
+    reports = []
+    for path in args.files:
+        try:
+            report = {"file": str(path), "meshes": describe_file(path)}
+        except SinewError as error:
+            failed = True
+            report = {"file": str(path), "error": str(error)}
+            console.complain(error)
+        reports.append(report)
+    if args.json:
+        console.say(json.dumps(reports, indent=2, ensure_ascii=False))
+    else:
+        for report in reports:
+            if "meshes" in report:
+                _show(report, console)
+    return 1 if failed else 0
+
+
+def describe_file(path: Path) -> list[dict[str, object]]:
+    """A dictionary for each mesh that an armature deforms, in any scene of the file."""
+    import bpy
+
+    from ..blender import drive, files, survey
+
+    files.open_file(path)
+    meshes = []
+    for obj in drive.deformed_meshes(list(bpy.data.objects)):
+        facts = survey.describe(obj)
+        meshes.append(
+            {
+                "object": obj.name,
+                "armature": drive.armature_of(obj).name,
+                "vertices": facts.vertices,
+                "bones": facts.bones,
+                "bones_with_weights": facts.weighted_bones,
+                "influences_mean": round(facts.mean_influences, 4),
+                "influences_most": facts.most_influences,
+                "warnings": [*facts.warnings, *survey.obstacles(obj)],
+            }
+        )
+    return meshes
+
+
+def _show(report: dict, console: Console) -> None:
+    meshes = report["meshes"]
+    console.say(f"{report['file']}: {len(meshes) or 'no'} armature-deformed mesh{'' if len(meshes) == 1 else 'es'}")
+    if not meshes:
+        return
+    console.table(
+        ("mesh", "armature", "vertices", "bones", "influences", "warnings"),
+        [
+            (
+                str(mesh["object"]),
+                str(mesh["armature"]),
+                f"{mesh['vertices']:,}",
+                f"{mesh['bones']} ({mesh['bones_with_weights']} with weights)",
+                f"mean {mesh['influences_mean']:.2f}, most {mesh['influences_most']}",
+                "; ".join(mesh["warnings"]) or "none",
+            )
+            for mesh in meshes
+        ],
+    )

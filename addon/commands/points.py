@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew points`: the deformed vertices of chosen frames, as numpy arrays."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..core.errors import SinewError
+from ..core.frames import parse_frames
+from .console import Console
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "points",
+        help="write the deformed vertices of chosen frames",
+        description="Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, 3], "
+        "its key the object's name, the vertices of the final evaluated mesh in object space; and an array "
+        "`frames`.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    parser.add_argument(
+        "--method", required=True, help="a method of `sinew methods`, or blender for the Armature modifier"
+    )
+    parser.add_argument("--frames", required=True, help="such as 1,12,40-48")
+    parser.add_argument("--object", metavar="NAME", help="only this mesh")
+    parser.add_argument("--out", required=True, type=Path, metavar="POINTS.npz")
+    return parser
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    import bpy
+
+    from ..blender import evaluate, files
+
+    frames = parse_frames(args.frames)
+    evaluate.check_methods([args.method])
+    files.open_file(args.file)
+    try:
+        meshes = evaluate.deformed_meshes(bpy.context.scene, args.object)
+    except SinewError as error:
+        raise SinewError(f"{args.file}: {error}") from None
+
+    failed = False
+    taken = []
+    for obj in meshes:
+        try:
+            evaluate.use_method(obj, args.method)
+            taken.append(obj)
+        except SinewError as error:
+            failed = True
+            console.complain(f"{args.file}: left out: {error}")
+    if not taken:
+        raise SinewError(f"{args.file}: no mesh that Sinew can drive")
+
+    points: dict[str, list[np.ndarray]] = {obj.name: [] for obj in taken}
+    for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
+        evaluate.set_frame(bpy.context.scene, frame)
+        for obj in taken:
+            if args.method != evaluate.BLENDER and not obj.sinew.enabled:
+                raise SinewError(f"{args.file}: frame {frame}: {obj.sinew.error}")
+            points[obj.name].append(evaluate.final_points(obj))
+    arrays = {name: _stack(name, per_frame, frames) for name, per_frame in points.items()}
+    _write(args.out, {**arrays, "frames": np.array(frames)})
+    for name, array in arrays.items():
+        console.note(f"{name}: {array.shape[1]:,} vertices")
+    console.say(str(args.out))
+    return 1 if failed else 0
+
+
+def _stack(name: str, per_frame: list[np.ndarray], frames: list[float]) -> np.ndarray:
+    for frame, points in zip(frames, per_frame, strict=True):
+        if points.shape != per_frame[0].shape:
+            raise SinewError(
+                f"{name}: {len(points)} vertices at frame {frame} but {len(per_frame[0])} at frame {frames[0]}; "
+                "a modifier changes the topology, ask for these frames one by one"
+            )
+    return np.stack(per_frame)
+
+
+def _write(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with unfinished.open("wb") as file:
+            np.savez(file, **arrays)
+        os.replace(unfinished, path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise SinewError(f"{path}: can not be written: {error.strerror}") from None

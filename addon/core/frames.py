@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frame lists as people type them."""
+
+from __future__ import annotations
+
+from .errors import SinewError
+
+
+def parse_frames(text: str) -> list[float]:
+    """The frames of "1,12,40-48": single frames, which may be fractions, and ranges, in the order typed.
+
+    Whole frames come back as int. Raises SinewError for anything else.
+    """
+    frames: list[float] = []
+    for part in text.split(","):
+        part = part.strip()
+        try:
+            # The first character can be a sign, so a range's dash is looked for behind it.
+            dash = part.find("-", 1)
+            if dash > 0:
+                first, last = int(part[:dash]), int(part[dash + 1 :])
+                if last < first:
+                    raise SinewError(f"frames: {part!r} runs backwards; write {last}-{first}")
+                frames.extend(range(first, last + 1))
+            else:
+                number = float(part)
+                frames.append(int(number) if number.is_integer() else number)
+        except (ValueError, OverflowError):
+            raise SinewError(f"frames: expected frames such as 1,12,40-48, got {text!r}") from None
+    return frames

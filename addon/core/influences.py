@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From vertex groups, as stored, to the influences that a deformer is bound to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# A vertex whose weights sum to no more than this is not deformed (Blender's Armature modifier).
+SMALLEST_WEIGHT_SUM = np.float32(1e-4)
+
+
+@dataclass(frozen=True)
+class GroupWeights:
+    """The vertex groups of a mesh as Blender stores them.
+
+    counts   int32 [vertices], entries of each vertex
+    groups   int32 [entries], the group's index; entries of a vertex in stored order
+    weights  float32 [entries]
+    """
+
+    counts: np.ndarray
+    groups: np.ndarray
+    weights: np.ndarray
+
+    def equals(self, other: GroupWeights) -> bool:
+        return (
+            np.array_equal(self.counts, other.counts)
+            and np.array_equal(self.groups, other.groups)
+            and np.array_equal(self.weights, other.weights)
+        )
+
+    def of_group(self, group: int) -> np.ndarray:
+        """float32 [vertices]: each vertex's weight in one group, 0 where it is not in it."""
+        vertices = np.repeat(np.arange(len(self.counts)), self.counts)
+        chosen = self.groups == group
+        result = np.zeros(len(self.counts), dtype=np.float32)
+        result[vertices[chosen]] = self.weights[chosen]
+        return result
+
+
+@dataclass(frozen=True)
+class Influences:
+    """Which bones move each vertex, and how much.
+
+    offsets  int32 [vertices + 1], the first influence of each vertex, then the end
+    bones    int32 [influences]
+    weights  float32 [influences], > 0, any sum
+    """
+
+    offsets: np.ndarray
+    bones: np.ndarray
+    weights: np.ndarray
+
+    @property
+    def counts(self) -> np.ndarray:
+        """int [vertices]: influences of each vertex."""
+        return np.diff(self.offsets)
+
+
+def build_influences(groups: GroupWeights, bone_of_group: np.ndarray) -> Influences:
+    """The influences that `groups` give, as Blender's Armature modifier reads them.
+
+    bone_of_group  int32 [groups], the bone that each group moves with, -1 for none
+
+    Entries without a bone and of weight zero are left out, and so are all of a vertex whose weights sum to
+    SMALLEST_WEIGHT_SUM or less. Stored order is kept: dual quaternions depend on it.
+    """
+    vertex_count = len(groups.counts)
+    vertices = np.repeat(np.arange(vertex_count), groups.counts)
+    table = np.append(bone_of_group.astype(np.int32), np.int32(-1))
+    # A group index past the last group can stay behind in a mesh whose groups were deleted.
+    bones = table[np.minimum(groups.groups, len(table) - 1)]
+    weights = np.where(bones >= 0, groups.weights, np.float32(0.0))
+    sums = np.bincount(vertices, weights=weights, minlength=vertex_count)
+    kept = (weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
+    offsets = np.zeros(vertex_count + 1, dtype=np.int32)
+    np.cumsum(np.bincount(vertices[kept], minlength=vertex_count), out=offsets[1:])
+    return Influences(offsets, bones[kept], weights[kept].astype(np.float32))

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One driven mesh between frames: its bound deformer, what it was last deformed with, and the result."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import sinew
+
+from .influences import Influences
+from .rig import Bones
+
+
+@dataclass
+class Frame:
+    """What decides the shape of one frame.
+
+    method            name of a method
+    pose              float32 [bones, 4, 4], armature space, as Blender gives it
+    bones_from_model  float64 [4, 4], takes the mesh's object space to armature space
+    rest_points       float32 [vertices, 3], object space, shape keys applied
+    """
+
+    method: str
+    pose: np.ndarray
+    bones_from_model: np.ndarray
+    rest_points: np.ndarray
+
+
+class Binding:
+    """A mesh bound to bones. Deforms when a frame differs from the last, and says how long it took."""
+
+    def __init__(self, bones: Bones, influences: Influences) -> None:
+        self.bones = bones
+        self.influences = influences
+        self._rest_from_armature = np.linalg.inv(bones.rest.astype(np.float64))
+        self._deformer: sinew.Deformer | None = None
+        self._last: Frame | None = None
+        self._points = np.empty((len(influences.offsets) - 1, 3), dtype=np.float32)
+        self.milliseconds = 0.0
+
+    def forget_frame(self) -> None:
+        """The next frame is deformed even if it equals the last, as after undo."""
+        self._last = None
+
+    def deform(self, frame: Frame) -> np.ndarray | None:
+        """Deformed points float32 [vertices, 3] in object space, valid until the next call; None where the
+        frame equals the last one."""
+        last = self._last
+        if last is not None and _same(last, frame):
+            return None
+        started = time.perf_counter()
+        deformer = self._bound(frame)
+        # In double: a bone far from the origin would lose digits in the product of two float matrices.
+        posed_from_rest = frame.pose.astype(np.float64) @ self._rest_from_armature
+        same_space = np.array_equal(frame.bones_from_model, np.identity(4))
+        deformer.deform(
+            posed_from_rest.astype(np.float32),
+            out=self._points,
+            bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
+        )
+        self._last = frame
+        self.milliseconds = 1000.0 * (time.perf_counter() - started)
+        return self._points
+
+    def _bound(self, frame: Frame) -> sinew.Deformer:
+        if self._deformer is None or self._deformer.method != frame.method:
+            self._deformer = sinew.Deformer(
+                frame.rest_points,
+                self.influences.offsets,
+                self.influences.bones,
+                self.influences.weights,
+                frame.method,
+                rest_bones=self.bones.rest,
+            )
+        elif self._last is None or frame.rest_points is not self._last.rest_points:
+            self._deformer.set_rest_points(frame.rest_points)
+        return self._deformer
+
+
+def _same(a: Frame, b: Frame) -> bool:
+    return (
+        a.method == b.method
+        and (a.rest_points is b.rest_points or np.array_equal(a.rest_points, b.rest_points))
+        and np.array_equal(a.pose, b.pose)
+        and np.array_equal(a.bones_from_model, b.bones_from_model)
+    )

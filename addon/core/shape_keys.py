@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mix of relative shape keys, as Blender applies it ahead of all modifiers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ShapeKeys:
+    """The relative shape keys of a mesh.
+
+    basis  float32 [vertices, 3]
+    moves  one for each key: None for the basis, else float32 [vertices, 3], what value 1 adds
+    """
+
+    basis: np.ndarray
+    moves: Sequence[np.ndarray | None]
+
+    def mix(self, values: np.ndarray) -> np.ndarray:
+        """float32 [vertices, 3] with each key at its value; a muted key's value is 0."""
+        points = self.basis.copy()
+        for move, value in zip(self.moves, values, strict=True):
+            if move is not None and value != 0.0:
+                points += np.float32(value) * move
+        return points
