@@ -71,13 +71,26 @@ def final_points(obj: bpy.types.Object) -> np.ndarray:
     return mesh_io.read_points(_evaluated_mesh(obj).vertices)
 
 
-def final_triangles(obj: bpy.types.Object) -> np.ndarray:
-    """int32 [triangles, 3]: corners of the final evaluated mesh's triangles."""
-    mesh = _evaluated_mesh(obj)
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return triangles
+def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
+    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]."""
+    parts = []
+    for obj in objects:
+        matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+        parts.append(final_points(obj) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(parts)
+
+
+def joined_triangles(objects: list[bpy.types.Object]) -> np.ndarray:
+    """int32 [triangles, 3]: corners of the triangles of several meshes, into world_points(objects)."""
+    parts, first = [], 0
+    for obj in objects:
+        mesh = _evaluated_mesh(obj)
+        mesh.calc_loop_triangles()
+        triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+        parts.append(triangles + first)
+        first += len(mesh.vertices)
+    return np.concatenate(parts)
 
 
 def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:

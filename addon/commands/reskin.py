@@ -43,12 +43,10 @@ class Outcome:
 def run(args: argparse.Namespace, console: Console) -> int:
     import sinew
 
-    from ..blender import files
-
     names = [method.name for method in sinew.methods()]
     if args.method not in names:
         raise SinewError(f"method: expected one of {', '.join(names)}, got {args.method!r}")
-    jobs = plan_jobs(args.inputs, args.out, files.READABLE)
+    jobs = plan_jobs(args.inputs, args.out)
     outcomes = []
     for job in console.progress(jobs, len(jobs), "Re-skinning"):
         outcome = _reskin(job, args.method, args.overwrite)

@@ -17,11 +17,11 @@ class Job:
     target: Path
 
 
-def plan_jobs(inputs: list[Path], out: Path, readable: tuple[str, ...]) -> list[Job]:
+def plan_jobs(inputs: list[Path], out: Path) -> list[Job]:
     """A job for each file, and for each .blend file below each folder; a folder's tree is kept below `out`.
 
     Raises SinewError, before anything is done, where a folder has no .blend file, a copy would be written
-    over an input, or two would have one name. A file that is missing is left for its own job to report.
+    over an input, or two would have one name. A file that can not be read is left for its own job to report.
     """
     jobs = []
     for given in inputs:
@@ -31,10 +31,8 @@ def plan_jobs(inputs: list[Path], out: Path, readable: tuple[str, ...]) -> list[
             if not found:
                 raise SinewError(f"{given}: no .blend files in this folder")
             jobs += [Job(path, out / path.relative_to(given)) for path in found]
-        elif given.suffix.lower() in readable or not given.exists():
-            jobs.append(Job(given, out / given.with_suffix(".blend").name))
         else:
-            raise SinewError(f"{given}: expected a folder or a file ending in {', '.join(readable)}")
+            jobs.append(Job(given, out / given.with_suffix(".blend").name))
     sources = {job.source.resolve() for job in jobs}
     targets: dict[Path, Path] = {}
     for job in jobs:
