@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from . import mesh_io, node_group, properties
+from . import mesh_io, node_group, pose_driver, properties
 
 # Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
 HARMLESS_IN_FRONT = {
@@ -150,7 +150,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         if modifier is not None:
             modifier.show_viewport = False
             modifier.show_render = False
-        take_pointer(obj)
+        clear_pointer(obj)
     elif modifier is not None:
         give_back(obj)
         modifier.show_viewport = settings.show_viewport
@@ -160,22 +160,21 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         nodes.show_render = on and settings.show_render
 
 
-def take_pointer(obj: bpy.types.Object) -> bool:
-    """Clears the Armature modifier's pointer, keeping it in the settings; another armature chosen there by
-    the artist is taken over. True where that changed anything."""
+def clear_pointer(obj: bpy.types.Object) -> None:
+    """Clears the Armature modifier's pointer, which the settings keep. An armature that the artist chose in
+    the modifier meanwhile is taken over."""
     modifier = armature_modifier(obj)
-    if modifier is None or modifier.object is None or not properties.of(obj).enabled:
-        return False
-    properties.of(obj).armature = modifier.object
-    modifier.object = None
-    return True
+    if modifier is not None and modifier.object is not None and properties.of(obj).enabled:
+        properties.of(obj).armature = modifier.object
+        modifier.object = None
 
 
 def give_back(obj: bpy.types.Object) -> None:
-    """The Armature modifier points to its armature again."""
+    """The Armature modifier points to its armature again, and nothing else of ours does."""
     modifier = armature_modifier(obj)
     if modifier is not None and modifier.object is None:
         modifier.object = properties.of(obj).armature
+    pose_driver.remove(obj)
 
 
 def separate_attributes(objects: list[bpy.types.Object]) -> None:
@@ -228,8 +227,7 @@ def _remove_animation(obj: bpy.types.Object) -> None:
         if removed and not any(len(curves) for curves in _curve_lists(animation)) and action.users == 1:
             animation.action = None
             bpy.data.actions.remove(action)
-    if animation.action is None and not animation.drivers and not animation.nla_tracks:
-        obj.animation_data_clear()
+    pose_driver.remove_empty_animation(obj)
 
 
 def _curve_lists(animation: bpy.types.AnimData) -> list[bpy.types.bpy_prop_collection]:

@@ -16,7 +16,7 @@ from ..core.influences import GroupWeights, build_influences
 from ..core.rig import RigFacts, describe_rig
 from ..core.session import Binding, Frame
 from ..core.shape_keys import ShapeKeys
-from . import armature_io, drive, mesh_io, properties
+from . import armature_io, drive, mesh_io, pose_driver, properties
 
 log = logging.getLogger("sinew")
 
@@ -25,6 +25,7 @@ log = logging.getLogger("sinew")
 class Driven:
     """What is known of one driven object between events; made again whenever it may be out of date."""
 
+    armature: int  # its session_uid
     binding: Binding
     facts: RigFacts
     group_names: list[str]
@@ -83,7 +84,8 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 class _Changes:
     """What Blender says changed in this update, by session_uid."""
 
-    geometry: set[int] = field(default_factory=set)
+    objects: set[int] = field(default_factory=set)
+    meshes: set[int] = field(default_factory=set)
     keys: set[int] = field(default_factory=set)
     armatures: set[int] = field(default_factory=set)
     structure: bool = False
@@ -95,10 +97,10 @@ class _Changes:
             what = update.id
             if isinstance(what, bpy.types.Object):
                 if update.is_updated_geometry:
-                    changes.geometry.add(what.original.session_uid)
+                    changes.objects.add(what.original.session_uid)
             elif isinstance(what, bpy.types.Mesh):
                 if update.is_updated_geometry:
-                    changes.geometry.add(what.original.session_uid)
+                    changes.meshes.add(what.original.session_uid)
             elif isinstance(what, bpy.types.Key):
                 changes.keys.add(what.original.session_uid)
             elif isinstance(what, bpy.types.Armature):
@@ -127,8 +129,8 @@ def _driven_objects(changes: _Changes) -> list[bpy.types.Object]:
         session.object_count = len(bpy.data.objects)
         drive.separate_attributes(session.objects)
         for obj in session.objects:
-            drive.take_pointer(obj)
             _check_armature(obj)
+            drive.clear_pointer(obj)
         known = {obj.session_uid for obj in session.objects}
         session.driven = {uid: driven for uid, driven in session.driven.items() if uid in known}
     return session.objects
@@ -161,8 +163,8 @@ def _update_object(
     changes: _Changes,
 ) -> None:
     started = time.perf_counter()
-    if drive.take_pointer(obj):
-        session.driven.pop(obj.session_uid, None)
+    if obj.session_uid in changes.objects:
+        drive.clear_pointer(obj)
     armature = settings.armature
     if armature is None:
         raise SinewError(
@@ -189,7 +191,7 @@ def _update_object(
 def _current(obj: bpy.types.Object, armature: bpy.types.Object, changes: _Changes) -> Driven:
     """The object's state, bound anew where its mesh, weights or bones changed."""
     driven = session.driven.get(obj.session_uid)
-    if driven is None:
+    if driven is None or driven.armature != armature.session_uid:
         return _bind(obj, armature)
     mesh = obj.data
     keys = mesh.shape_keys
@@ -198,10 +200,13 @@ def _current(obj: bpy.types.Object, armature: bpy.types.Object, changes: _Change
         bones = armature_io.read_bones(armature)
         _follow_renamed_bones(obj, driven.binding.bones.names, bones.names)
         bones_changed = not bones.equals(driven.binding.bones)
-    touched = obj.session_uid in changes.geometry or mesh.session_uid in changes.geometry
+    regrouped = (
+        obj.session_uid in changes.objects and [g.name for g in obj.vertex_groups] != driven.group_names
+    )
     # A moved shape key slider dirties the mesh on every step; weights do not change by it.
     by_keys = keys is not None and keys.session_uid in changes.keys
-    if bones_changed or len(mesh.vertices) != len(driven.rest_points) or (touched and not by_keys):
+    touched = mesh.session_uid in changes.meshes and not by_keys
+    if bones_changed or regrouped or touched or len(mesh.vertices) != len(driven.rest_points):
         return _bind(obj, armature, driven)
     return driven
 
@@ -225,8 +230,9 @@ def _bind(obj: bpy.types.Object, armature: bpy.types.Object, old: Driven | None 
         return old
     influences = build_influences(weights, bones.of_groups(names))
     facts = describe_rig(influences, bones, names)
-    driven = Driven(Binding(bones, influences), facts, names, weights, points, keys)
+    driven = Driven(armature.session_uid, Binding(bones, influences), facts, names, weights, points, keys)
     session.driven[obj.session_uid] = driven
+    pose_driver.ensure(obj, armature, driven.binding.moving_bones)
     return driven
 
 
@@ -285,8 +291,11 @@ def on_save(*_args: object) -> None:
 @persistent
 def on_saved(*_args: object) -> None:
     for obj in bpy.data.objects:
-        if properties.is_driven(obj):
-            drive.take_pointer(obj)
+        if properties.is_driven(obj) and properties.of(obj).enabled:
+            drive.clear_pointer(obj)
+            state = state_of(obj)
+            if state is not None:
+                pose_driver.ensure(obj, properties.of(obj).armature, state.binding.moving_bones)
 
 
 _HANDLERS = {

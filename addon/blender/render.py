@@ -26,10 +26,10 @@ _PROBE = (
 
 def has_opengl() -> bool:
     """Whether Workbench can render here. Tried in a process of its own: without OpenGL, Blender aborts."""
-    if bpy.app.module:
-        command = [sys.executable, "-c", _PROBE]
-    else:
+    if bpy.app.binary_path:
         command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-expr", _PROBE]
+    else:  # bpy as a module
+        command = [sys.executable, "-c", _PROBE]
     try:
         probe = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired):

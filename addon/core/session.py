@@ -41,6 +41,11 @@ class Binding:
         self._points = np.empty((len(influences.offsets) - 1, 3), dtype=np.float32)
         self.milliseconds = 0.0
 
+    @property
+    def moving_bones(self) -> list[str]:
+        """Names of the bones that move at least one vertex."""
+        return [self.bones.names[bone] for bone in np.unique(self.influences.bones)]
+
     def forget_frame(self) -> None:
         """The next frame is deformed even if it equals the last, as after undo."""
         self._last = None

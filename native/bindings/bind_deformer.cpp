@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <limits>
 #include <optional>
 
 #include "arrays.h"
@@ -46,10 +47,11 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
     const auto rows = static_cast<py::ssize_t>(vertex_count);
     if (out.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
     const std::string wanted = "writable C-contiguous float32 [" + std::to_string(vertex_count) + ", 3]";
-    if (!py::isinstance<py::array_t<float, py::array::c_style>>(out)) fail("out", wanted, describe(out));
+    if (!py::isinstance<py::array_t<float>>(out)) fail("out", wanted, describe(out));
     auto array = py::reinterpret_borrow<py::array_t<float>>(out);
     if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3)
         fail("out", wanted, describe(out));
+    if ((array.flags() & py::array::c_style) == 0) fail("out", wanted, "one that is not C-contiguous");
     if (!array.writeable()) fail("out", wanted, "a read-only array");
     return array;
 }
@@ -57,9 +59,12 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
 std::size_t checked_threads(const py::object& threads) {
     if (threads.is_none()) return 0;
     if (!py::isinstance<py::int_>(threads)) fail("threads", "None or 1 or more", describe(threads));
-    const auto count = threads.cast<py::ssize_t>();
-    if (count < 1) fail("threads", "None or 1 or more", std::to_string(count));
-    return static_cast<std::size_t>(count);
+    int overflow = 0;
+    const long long count = PyLong_AsLongLongAndOverflow(threads.ptr(), &overflow);
+    if (overflow < 0 || (overflow == 0 && count < 1)) {
+        fail("threads", "None or 1 or more", py::str(threads).cast<std::string>());
+    }
+    return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
 py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,

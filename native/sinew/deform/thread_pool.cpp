@@ -24,8 +24,8 @@ constexpr std::size_t kPiece = 4096;
 class Pool {
 public:
     void run(std::size_t count, std::size_t threads, const Work& work) {
-        const std::unique_lock<std::mutex> turn(turn_, std::try_to_lock);
-        if (!turn.owns_lock()) {
+        // A flag, not a mutex: a nested call asks on the thread that has the turn, which std::mutex forbids.
+        if (busy_.exchange(true, std::memory_order_acquire)) {
             work(0, count);
             return;
         }
@@ -47,6 +47,8 @@ public:
         seats_ = 0;
         done_.wait(lock, [this] { return running_ == 0; });
         work_ = nullptr;
+        lock.unlock();
+        busy_.store(false, std::memory_order_release);
     }
 
 private:
@@ -87,7 +89,7 @@ private:
         }
     }
 
-    std::mutex turn_;
+    std::atomic<bool> busy_{false};
     std::mutex mutex_;
     std::condition_variable wake_;
     std::condition_variable done_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "sinew/transform/affine.h"
@@ -16,29 +17,40 @@ struct ScaleSplit {
 };
 
 /// The right-handed rotation that keeps the direction of the Y column of `linear` and makes the others
-/// square to it. A mirror in `linear` is not in the rotation; a zero column gives some square axis.
+/// square to it. A mirror in `linear` is not in the rotation.
+///
+/// Columns below 1e-6 of the longest, or as near to parallel, give no direction: those left decide, and
+/// after them the columns of the rotation `otherwise`.
 template <class T>
-[[nodiscard]] Mat3<T> rotation_keeping_y(const Mat3<T>& linear) noexcept {
-    const auto unit = [](const Vec3<T>& v, const Vec3<T>& otherwise) {
-        const T length = glm::length(v);
-        return length > T(0) ? v / length : otherwise;
-    };
-    const Vec3<T> y = unit(linear[1], Vec3<T>(0, 1, 0));
-    Vec3<T> x = linear[0];
-    Vec3<T> z = linear[2];
+[[nodiscard]] Mat3<T> rotation_keeping_y(const Mat3<T>& linear, const Mat3<T>& otherwise) noexcept {
+    // Bones come as float32: what is shorter than this is their rounding.
+    constexpr T kNoDirection = T(1e-6);
+    const T size = std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
+    if (!(size > T(0))) return otherwise;
+    const Mat3<T> c = linear * (T(1) / size);
+
+    Vec3<T> y = c[1];
+    if (glm::length(y) <= kNoDirection) y = glm::cross(c[2], c[0]);
+    if (glm::length(y) <= kNoDirection) y = otherwise[1];
+    y = glm::normalize(y);
+
     // The odd tests against 1 with x and z not normalised are Blender's: under extreme shear and scale
     // they pick another axis, and so must we.
-    if (glm::dot(y, x) < T(1)) {
-        z = unit(glm::cross(x, y), Vec3<T>(0, 0, 1));
-        x = glm::cross(y, z);
-    } else if (glm::dot(y, z) < T(1)) {
-        x = unit(glm::cross(y, z), Vec3<T>(1, 0, 0));
-        z = glm::cross(x, y);
+    Vec3<T> x;
+    if (glm::dot(y, linear[0]) < T(1)) {
+        x = c[0] - y * glm::dot(y, c[0]);
+    } else if (glm::dot(y, linear[2]) < T(1)) {
+        x = glm::cross(y, c[2]);
     } else {
-        x = unit(glm::cross(y, Vec3<T>(y.y, y.z, y.x)), Vec3<T>(1, 0, 0));
-        z = glm::cross(x, y);
+        x = glm::cross(y, Vec3<T>(y.y, y.z, y.x));
     }
-    return Mat3<T>(x, y, z);
+    for (const Vec3<T>& z : {c[2], otherwise[2], otherwise[1]}) {
+        if (glm::length(x) <= kNoDirection) x = glm::cross(y, z);
+    }
+    // Twice, because a short difference of long vectors is not square to y.
+    x = glm::normalize(x);
+    x = glm::normalize(x - y * glm::dot(y, x));
+    return Mat3<T>(x, y, glm::cross(x, y));
 }
 
 /// Splits a bone's motion into a rigid motion and a scale about the bone's head along its rest axes.
@@ -47,7 +59,7 @@ template <class T>
 /// rest_bone        the bone's rest axes (Y along the bone) and head in the same space, orthonormal
 ///
 /// A motion within 1e-5 of orthonormal, unmirrored and within 1e-4 of unit size counts as rigid.
-/// A zero axis keeps the rest axis. Source: the rule that Blender's Armature modifier has for
+/// Where axes vanish or are parallel those left decide, and after them the rest axes. Source: the rule that Blender's Armature modifier has for
 /// Preserve Volume.
 template <class T>
 [[nodiscard]] ScaleSplit<T> split_scale(const Affine<T>& posed_from_rest,
@@ -64,7 +76,8 @@ template <class T>
     if (orthonormal && glm::determinant(c) >= T(0) && glm::dot(stretch, stretch) <= T(1e-8)) {
         return {posed_from_rest, {}, false};
     }
-    const Affine<T> rigid_bone{rotation_keeping_y(posed_bone.linear), posed_bone.translation};
+    const Affine<T> rigid_bone{rotation_keeping_y(posed_bone.linear, rest_bone.linear),
+                               posed_bone.translation};
     const Affine<T> rest_from_model = inverse(rest_bone);
     return {rigid_bone * rest_from_model, rest_bone * (inverse(rigid_bone) * posed_bone) * rest_from_model,
             true};

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every test starts in an empty file of a real Blender with Sinew registered."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+import pytest
+import sinew_addon
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
+REAL_RIGS = ("human.blend", "CesiumMan.glb", "Fox.glb")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def registered():
+    sinew_addon.register()
+    yield
+    # Handlers still registered at the end of the process crash Blender 4.2 and hang 4.5.
+    sinew_addon.unregister()
+
+
+@pytest.fixture(autouse=True)
+def empty_file():
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture
+def real_rig():
+    """real_rig(name): the path of a rig in SINEW_RIGS; skips the test where it is not there."""
+
+    def find(name: str) -> Path:
+        folder = os.environ.get("SINEW_RIGS")
+        if not folder:
+            pytest.skip("SINEW_RIGS is not set: real rigs are not tested")
+        path = Path(folder) / name
+        if not path.exists():
+            pytest.skip(f"SINEW_RIGS has no {name}")
+        return path
+
+    return find

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small rigs and the questions that tests ask of them."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from mathutils import Quaternion, Vector
+from sinew_addon.blender import drive, handlers
+
+# Stated tolerance against the Armature modifier, as a part of the bounding box's diagonal.
+TOLERANCE = 1e-5
+
+
+def make_arm(
+    bones: int = 2, sides: int = 12, rings: int = 21, weights: str = "smooth", name: str = "Arm"
+) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """A tube along X, 1 unit a bone, bent and twisted by `bones` bones; keyed at frames 1 and 11.
+
+    Returns the mesh object and the armature object.
+    """
+    length = float(bones)
+    armature = bpy.data.objects.new(f"{name} Rig", bpy.data.armatures.new(f"{name} Rig"))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for index in range(bones):
+        bone = armature.data.edit_bones.new(f"bone.{index}")
+        bone.head, bone.tail = (index, 0.0, 0.0), (index + 1.0, 0.0, 0.0)
+        bone.parent, bone.use_connect = parent, parent is not None
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+    points, faces = [], []
+    for ring in range(rings):
+        x = length * ring / (rings - 1)
+        for side in range(sides):
+            angle = 2 * math.pi * side / sides
+            points.append((x, 0.25 * math.cos(angle), 0.25 * math.sin(angle)))
+    for ring in range(rings - 1):
+        for side in range(sides):
+            here, beside = ring * sides + side, ring * sides + (side + 1) % sides
+            faces.append((here, beside, beside + sides, here + sides))
+    faces += [tuple(range(sides))[::-1], tuple(range((rings - 1) * sides, rings * sides))]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points, [], faces)
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    for index in range(bones):
+        group = obj.vertex_groups.new(name=f"bone.{index}")
+        for vertex, point in enumerate(points):
+            distance = abs(point[0] - (index + 0.5))
+            weight = max(0.0, 1.0 - distance) if weights == "smooth" else float(distance <= 0.5)
+            if weight > 0.0:
+                group.add([vertex], weight, "REPLACE")
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    key_pose(armature)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 11
+    bpy.context.scene.frame_set(1)
+    return obj, armature
+
+
+def key_pose(armature: bpy.types.Object, degrees: float = 100.0) -> None:
+    """Rest at frame 1; at frame 11 every bone but the first bent and twisted."""
+    for index, bone in enumerate(armature.pose.bones):
+        bone.rotation_mode = "QUATERNION"
+        bone.keyframe_insert("rotation_quaternion", frame=1)
+        if index:
+            turn = math.radians(degrees)
+            bone.rotation_quaternion = Quaternion((1, 0, 0), turn) @ Quaternion((0, 1, 0), 0.8 * turn)
+        bone.location = (0.0, 0.1 * index, 0.0)
+        bone.keyframe_insert("rotation_quaternion", frame=11)
+
+
+def final_points(obj: bpy.types.Object) -> np.ndarray:
+    """float32 [vertices, 3]: the final evaluated mesh, object space."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def rest_points(obj: bpy.types.Object) -> np.ndarray:
+    points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+    obj.data.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def diagonal(obj: bpy.types.Object) -> float:
+    return float(np.linalg.norm(np.ptp(rest_points(obj), axis=0)))
+
+
+def shapes(obj: bpy.types.Object, frames: list[float]) -> np.ndarray:
+    """float32 [frames, vertices, 3]."""
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(math.floor(frame), subframe=frame - math.floor(frame))
+        result.append(final_points(obj))
+    return np.stack(result)
+
+
+def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume: bool) -> np.ndarray:
+    """What Blender's own Armature modifier makes of an object that Sinew does not drive."""
+    modifier = drive.armature_modifier(obj)
+    before = modifier.use_deform_preserve_volume
+    modifier.use_deform_preserve_volume = preserve_volume
+    result = shapes(obj, frames)
+    modifier.use_deform_preserve_volume = before
+    return result
+
+
+def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
+    drive.add(obj, method)
+    handlers.refresh(bpy.context)
+
+
+def worst(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a.astype(np.float64) - b).max())
+
+
+def bend(armature: bpy.types.Object, degrees: float, bone: int = 1) -> None:
+    """Poses live, without keys."""
+    pose_bone = armature.pose.bones[bone]
+    pose_bone.rotation_mode = "QUATERNION"
+    pose_bone.rotation_quaternion = Quaternion(Vector((1.0, 0.3, 0.2)).normalized(), math.radians(degrees))
+
+
+def forget_keys(armature: bpy.types.Object) -> None:
+    armature.animation_data_clear()

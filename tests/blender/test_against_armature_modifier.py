@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's Armature modifier is the oracle: linear for lbs, Preserve Volume for dq."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from conftest import BLEND_FILES, REAL_RIGS
+from sinew_addon.blender import drive, files, properties
+
+ORACLES = [("lbs", False), ("dq", True)]
+
+
+def assert_equal_to_modifier(obj: bpy.types.Object, frames: list[float]) -> None:
+    expected = {method: scenes.modifier_shapes(obj, frames, volume) for method, volume in ORACLES}
+    scenes.add_sinew(obj)
+    for method, _volume in ORACLES:
+        properties.of(obj).method = method
+        got = scenes.shapes(obj, frames)
+        assert properties.of(obj).enabled, properties.of(obj).error
+        assert scenes.worst(got, expected[method]) <= scenes.TOLERANCE * scenes.diagonal(obj), method
+
+
+@pytest.mark.parametrize("path", BLEND_FILES, ids=lambda path: path.stem)
+def test_own_rigs_at_every_frame(path):
+    files.open_file(path)
+    assert_every_mesh_equal()
+
+
+@pytest.mark.parametrize("name", REAL_RIGS)
+def test_real_rigs_at_every_frame(real_rig, name):
+    files.open_file(real_rig(name))
+    assert_every_mesh_equal()
+
+
+def assert_every_mesh_equal():
+    scene = bpy.context.scene
+    meshes = drive.deformed_meshes(list(scene.objects))
+    assert meshes
+    for obj in meshes:
+        assert_equal_to_modifier(obj, list(range(scene.frame_start, scene.frame_end + 1)))
+
+
+def test_subframes():
+    obj, _armature = scenes.make_arm()
+    assert_equal_to_modifier(obj, [1, 2.25, 5.5, 9.75])
+
+
+def test_every_object_transform():
+    obj, armature = scenes.make_arm(bones=3)
+    obj.location, obj.rotation_euler, obj.scale = (1.0, -2.0, 0.5), (0.3, 1.0, -0.4), (1.5, 0.7, 1.2)
+    armature.location, armature.rotation_euler = (-3.0, 0.4, 2.0), (1.0, 0.2, 0.1)
+    armature.scale = (0.8, 1.1, 1.3)
+    bpy.context.view_layer.update()
+    assert_equal_to_modifier(obj, [1, 4, 8, 11])
+
+
+def test_moving_armature_object():
+    obj, armature = scenes.make_arm()
+    armature.keyframe_insert("location", frame=1)
+    armature.location = (2.0, 1.0, -1.0)
+    armature.keyframe_insert("location", frame=11)
+    assert_equal_to_modifier(obj, [1, 3, 6, 11])
+
+
+def test_mesh_parented_to_its_armature():
+    obj, armature = scenes.make_arm()
+    obj.parent = armature
+    armature.location = (5.0, 0.0, 0.0)
+    armature.keyframe_insert("location", frame=11)
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+@pytest.mark.parametrize(
+    "scale", [(1.3, 1.3, 1.3), (1.5, 0.6, 1.1), (-1.0, 1.0, 1.0), (1.0, -0.8, 1.4), (0.5, 2.0, -1.5)]
+)
+def test_scaled_and_mirrored_bones(scale):
+    obj, armature = scenes.make_arm(bones=3)
+    armature.pose.bones[1].scale = scale
+    assert_equal_to_modifier(obj, [1, 4, 8, 11])
+
+
+def test_sheared_bones():
+    """A turned child of an unevenly scaled parent is sheared."""
+    obj, armature = scenes.make_arm(bones=4)
+    armature.pose.bones[0].scale = (1.0, 2.0, 0.5)
+    assert_equal_to_modifier(obj, [3, 7, 11])
+
+
+def test_unnormalised_zero_and_missing_weights():
+    obj, _armature = scenes.make_arm()
+    everywhere = list(range(len(obj.data.vertices)))
+    obj.vertex_groups[0].add(everywhere[:40], 0.2, "REPLACE")
+    obj.vertex_groups[1].add(everywhere[20:60], 0.9, "REPLACE")
+    for group in obj.vertex_groups:
+        group.add(everywhere[60:70], 0.0, "REPLACE")
+        group.add(everywhere[70:80], 2e-5, "REPLACE")
+        group.remove(everywhere[80:90])
+    extra = obj.vertex_groups.new(name="no such bone")
+    extra.add(everywhere, 1.0, "REPLACE")
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_bones_that_do_not_deform():
+    obj, armature = scenes.make_arm(bones=3)
+    armature.data.bones[1].use_deform = False
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_far_from_the_origin():
+    obj, armature = scenes.make_arm()
+    obj.location = armature.location = (300.0, -200.0, 100.0)
+    bpy.context.view_layer.update()
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_shape_keys_with_values_groups_mutes_and_relative_keys():
+    obj, _armature = scenes.make_arm()
+    obj.shape_key_add(name="Basis")
+    generator = np.random.default_rng(7)
+    for name in ("a", "b", "c", "d"):
+        key = obj.shape_key_add(name=name)
+        moved = scenes.rest_points(obj) + generator.normal(0.0, 0.05, (len(obj.data.vertices), 3))
+        key.data.foreach_set("co", moved.astype(np.float32).ravel())
+    keys = obj.data.shape_keys.key_blocks
+    keys["a"].value = 0.7
+    keys["b"].value, keys["b"].vertex_group = 1.0, "bone.1"
+    keys["c"].value, keys["c"].mute = 1.0, True
+    keys["d"].value, keys["d"].relative_key = 0.4, keys["a"]
+    keys["a"].keyframe_insert("value", frame=1)
+    keys["a"].value = -0.0
+    keys["a"].keyframe_insert("value", frame=11)
+    assert_equal_to_modifier(obj, [1, 4.5, 11])
+
+
+def test_modifiers_behind_see_the_deformed_mesh():
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    cast = obj.modifiers.new("Cast", "CAST")
+    cast.factor = 0.2
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_posing_live():
+    obj, armature = scenes.make_arm()
+    scenes.forget_keys(armature)
+    expected = {}
+    for degrees in (20.0, 90.0, 140.0):
+        scenes.bend(armature, degrees)
+        bpy.context.view_layer.update()
+        expected[degrees] = scenes.final_points(obj)
+    scenes.add_sinew(obj)
+    for degrees, points in expected.items():
+        scenes.bend(armature, degrees)
+        bpy.context.view_layer.update()
+        assert scenes.worst(scenes.final_points(obj), points) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_armature_in_rest_position():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    armature.data.pose_position = "REST"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
+
+
+def test_hidden_armature_still_moves_the_mesh():
+    obj, armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, [11], preserve_volume=False)
+    scenes.add_sinew(obj)
+    armature.hide_set(True)
+    armature.hide_viewport = armature.hide_render = True
+    assert scenes.worst(scenes.shapes(obj, [5, 11])[1:], expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
+def test_every_method_follows_rigid_motion(method):
+    """A whole armature turned as one by its root bone turns the mesh as one."""
+    obj, armature = scenes.make_arm(bones=3)
+    scenes.forget_keys(armature)
+    scenes.add_sinew(obj, method)
+    root = armature.pose.bones[0]
+    root.rotation_mode = "XYZ"
+    root.rotation_euler = (0.4, math.pi / 3, -1.0)
+    root.location = (0.3, 0.2, 0.1)
+    bpy.context.view_layer.update()
+    motion = np.array(root.matrix @ root.bone.matrix_local.inverted())
+    expected = scenes.rest_points(obj) @ motion[:3, :3].T + motion[:3, 3]
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The program `sinew`, run as a user does."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import sinew
+from conftest import REPOSITORY
+from sinew_addon.blender import files, properties
+
+METHODS = [method.name for method in sinew.methods()]
+
+
+def run_sinew(*args: object, status: int = 0) -> subprocess.CompletedProcess:
+    result = subprocess.run(
+        [sys.executable, "-c", "from sinew_addon.cli import run; run()", *map(str, args)],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
+        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
+    )
+    assert result.returncode == status, result.stdout + result.stderr
+    assert "Traceback" not in result.stderr, result.stderr
+    return result
+
+
+@pytest.fixture
+def arm_file(tmp_path):
+    """A saved arm of linear weights: file, and the modifier's shapes [2, vertices, 3] at frames 6 and 11."""
+    obj, _armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, [6, 11], preserve_volume=True)
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path, expected
+
+
+def test_help_everywhere():
+    assert "reskin" in run_sinew("--help").stdout
+    for command in ("methods", "info", "points", "reskin", "compare"):
+        assert "usage: sinew" in run_sinew(command, "--help").stdout
+
+
+def test_wrong_use_has_status_2():
+    run_sinew(status=2)
+    run_sinew("points", status=2)
+
+
+def test_methods_is_the_table():
+    rows = json.loads(run_sinew("methods", "--json").stdout)
+    assert [row["name"] for row in rows] == METHODS
+    text = run_sinew("methods").stdout
+    for method in sinew.methods():
+        assert method.label in text
+
+
+def test_info(arm_file):
+    path, _expected = arm_file
+    report = json.loads(run_sinew("info", path, "--json").stdout)
+    assert report == [
+        {
+            "file": str(path),
+            "meshes": [
+                {
+                    "object": "Arm",
+                    "armature": "Arm Rig",
+                    "vertices": 252,
+                    "bones": 2,
+                    "bones_with_weights": 2,
+                    "influences_mean": pytest.approx(1.4286, abs=1e-4),
+                    "influences_most": 2,
+                    "warnings": [],
+                }
+            ],
+        }
+    ]
+    assert "252" in run_sinew("info", path).stdout
+
+
+def test_info_warns(tmp_path):
+    obj, _armature = scenes.make_arm()
+    obj.vertex_groups.new(name="nobody")
+    for group in obj.vertex_groups:
+        group.remove([0, 1, 2])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "faulty.blend"))
+    report = json.loads(run_sinew("info", tmp_path / "faulty.blend", "--json").stdout)
+    warnings = " ".join(report[0]["meshes"][0]["warnings"])
+    assert "3 of 252 vertices have no weights" in warnings
+    assert "nobody" in warnings
+
+
+def test_points(arm_file, tmp_path):
+    path, expected = arm_file
+    out = tmp_path / "deep" / "points.npz"
+    run_sinew("points", path, "--method", "dq", "--frames", "6,11", "--out", out)
+    with np.load(out) as points:
+        assert set(points.files) == {"Arm", "frames"}
+        assert points["Arm"].dtype == np.float32
+        assert points["frames"].tolist() == [6, 11]
+        assert scenes.worst(points["Arm"], expected) <= 1e-5
+    run_sinew("points", path, "--method", "lbs", "--frames", "1,3-5,6.5", "--object", "Arm", "--out", out)
+    with np.load(out) as points:
+        assert points["frames"].tolist() == [1, 3, 4, 5, 6.5]
+
+
+def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):
+    path, expected = arm_file
+    before = path.read_bytes()
+    result = run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out")
+    assert "1 of 1 files" in result.stdout
+    assert path.read_bytes() == before
+    files.open_file(tmp_path / "out" / "arm.blend")
+    obj = bpy.data.objects["Arm"]
+    assert properties.of(obj).method == "dq"
+    assert scenes.worst(scenes.shapes(obj, [6, 11]), expected) <= 1e-5
+    # A second run says so instead of writing over the first one's copies.
+    assert "--overwrite" in run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out", status=1).stderr
+    run_sinew("reskin", path, "--method", "qv", "--out", tmp_path / "out", "--overwrite")
+
+
+def test_reskin_never_writes_to_the_input_folder(arm_file):
+    path, _expected = arm_file
+    before = path.read_bytes()
+    assert "input" in run_sinew("reskin", path, "--method", "dq", "--out", path.parent, status=1).stderr
+    assert path.read_bytes() == before
+
+
+def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
+    path, _expected = arm_file
+    folder = tmp_path / "studio"
+    (folder / "sub").mkdir(parents=True)
+    shutil.copy(path, folder / "a good one.blend")
+    shutil.copy(path, folder / "sub" / "名前.blend")
+    (folder / "empty.blend").touch()
+    (folder / "text.blend").write_text("not a blend file")
+    (folder / "truncated.blend").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    result = run_sinew("reskin", folder, "--method", "dq", "--out", tmp_path / "out", status=1)
+    assert "2 of 5 files" in result.stdout
+    written = sorted(str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*") if p.is_file())
+    assert written == ["a good one.blend", "sub/名前.blend"]
+    for name in ("empty.blend", "text.blend", "truncated.blend"):
+        assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
+
+
+def test_bad_input_is_one_sentence(arm_file, tmp_path):
+    path, _expected = arm_file
+    (tmp_path / "empty.blend").touch()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "nothing.blend"))
+    out = tmp_path / "points.npz"
+    cases = [
+        (["points", tmp_path / "no.blend", "--method", "dq", "--frames", "1", "--out", out], "no such file"),
+        (["points", tmp_path / "empty.blend", "--method", "dq", "--frames", "1", "--out", out], "is empty"),
+        (["points", tmp_path, "--method", "dq", "--frames", "1", "--out", out], "is a folder"),
+        (["points", tmp_path / "nothing.blend", "--method", "dq", "--frames", "1", "--out", out], "no mesh is deformed"),
+        (["points", path, "--method", "best", "--frames", "1", "--out", out], "expected one of"),
+        (["points", path, "--method", "dq", "--frames", "9-3", "--out", out], "backwards"),
+        (["points", path, "--method", "dq", "--frames", "one", "--out", out], "expected frames"),
+        (["points", path, "--method", "dq", "--frames", "1", "--object", "Leg", "--out", out], "no mesh called 'Leg'"),
+        (["compare", path, "--methods", "lbs,x", "--frame", "1", "--out", tmp_path / "a.png"], "expected one of"),
+        (["compare", path, "--frame", "1,2", "--out", tmp_path / "a.png"], "expected one frame"),
+        (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
+        (["info", tmp_path / "no.blend"], "no such file"),
+    ]
+    for arguments, sentence in cases:
+        result = run_sinew(*arguments, status=1)
+        complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
+        assert len(complaints) == 1, result.stderr
+        assert sentence in complaints[0]
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("engine", ["auto", "cycles"])
+def test_compare_draws_a_sheet(tmp_path, engine):
+    from PIL import Image
+
+    out = tmp_path / "sheet.png"
+    rig = REPOSITORY / "blend_files" / "wrist.blend"
+    run_sinew(
+        "compare", rig, "--methods", "blender,lbs,dq", "--frame", 24, "--size", 128, "--engine", engine, "--out", out
+    )
+    with Image.open(out) as image:
+        pixels = np.asarray(image.convert("L"), dtype=np.float64)
+    assert pixels.shape[1] > 3 * 128
+    cell = 128 + 16
+    columns = [pixels[-128 - 16 : -16, 16 + i * cell : 16 + i * cell + 128] for i in range(3)]
+    for column in columns:
+        assert column.std() > 5, "an empty picture"
+    assert np.abs(columns[0] - columns[1]).mean() < 1.0, "lbs is not the Armature modifier"
+    assert np.abs(columns[1] - columns[2]).mean() > 3.0, "the methods look the same"
+
+
+def test_glb_files_are_read(real_rig, tmp_path):
+    path = real_rig("Fox.glb")
+    report = json.loads(run_sinew("info", path, "--json").stdout)
+    assert [mesh["object"] for mesh in report[0]["meshes"]] == ["fox"]
+    run_sinew("reskin", path, "--method", "lbs", "--out", tmp_path)
+    assert (tmp_path / "Fox.blend").exists()

@@ -1,0 +1,407 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What artists do to a driven character, and that it keeps following its armature."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import snapshot
+from sinew_addon.blender import drive, handlers, mesh_io, properties
+
+
+def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)) -> None:
+    """The object's Sinew shape is the linear modifier's: compared with its own Off."""
+    settings = properties.of(obj)
+    assert settings.enabled, settings.error
+    settings.method = "lbs"
+    got = scenes.shapes(obj, list(frames))
+    settings.enabled = False
+    expected = scenes.shapes(obj, list(frames))
+    settings.enabled = True
+    assert not settings.error
+    assert scenes.worst(expected[0], expected[-1]) > 0.05, "the pose moves nothing: nothing is tested"
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_add_starts_with_the_method_of_the_modifier():
+    for preserve_volume, method in ((False, "lbs"), (True, "dq")):
+        obj, _armature = scenes.make_arm()
+        obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
+        bpy.ops.sinew.add()
+        assert properties.of(obj).method == method
+
+
+def test_add_on_the_armature_takes_all_its_meshes():
+    first, armature = scenes.make_arm(name="First")
+    second = first.copy()
+    second.data = first.data.copy()
+    bpy.context.scene.collection.objects.link(second)
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj == armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.sinew.add()
+    assert properties.is_driven(first)
+    assert properties.is_driven(second)
+    assert_follows(first)
+    assert_follows(second)
+
+
+def test_the_rest_mesh_is_never_written():
+    obj, _armature = scenes.make_arm()
+    before = scenes.rest_points(obj)
+    scenes.add_sinew(obj, "dq")
+    scenes.shapes(obj, [1, 6, 11])
+    assert np.array_equal(scenes.rest_points(obj), before)
+
+
+@pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
+def test_remove_restores_all(method):
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Subdivision", "SUBSURF")
+    obj.modifiers.active = obj.modifiers["Armature"]
+    obj["mine"] = 1
+    bpy.context.view_layer.update()
+    before = snapshot.of_file()
+    bpy.ops.sinew.add()
+    properties.of(obj).method = method
+    scenes.shapes(obj, [1, 6, 11])
+    bpy.context.scene.frame_set(1)
+    assert snapshot.of_file() != before
+    bpy.ops.sinew.remove()
+    assert snapshot.of_file() == before
+
+
+def test_remove_takes_keys_of_the_method_along():
+    obj, _armature = scenes.make_arm()
+    before = snapshot.of_file()
+    scenes.add_sinew(obj)
+    obj.keyframe_insert("sinew.method", frame=1)
+    drive.remove(obj)
+    assert snapshot.of_file() == before
+
+
+def test_remove_keeps_other_keys():
+    obj, _armature = scenes.make_arm()
+    obj.keyframe_insert("location", frame=1)
+    before = snapshot.of_file()
+    scenes.add_sinew(obj)
+    obj.keyframe_insert("sinew.method", frame=1)
+    drive.remove(obj)
+    assert snapshot.of_file() == before
+
+
+def test_off_is_the_armature_modifier_and_on_is_sinew():
+    obj, _armature = scenes.make_arm()
+    linear = scenes.modifier_shapes(obj, [11], preserve_volume=False)[0]
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    dual = scenes.final_points(obj)
+    assert scenes.worst(dual, linear) > 0.01
+    properties.of(obj).enabled = False
+    assert np.array_equal(scenes.final_points(obj), linear)
+    properties.of(obj).enabled = True
+    assert np.array_equal(scenes.final_points(obj), dual)
+
+
+def test_the_method_can_be_keyed():
+    obj, _armature = scenes.make_arm()
+    expected = {m: scenes.modifier_shapes(obj, [9, 10], v) for m, v in (("lbs", False), ("dq", True))}
+    scenes.add_sinew(obj)
+    for frame, method in ((1, "lbs"), (10, "dq")):
+        properties.of(obj).method = method
+        obj.keyframe_insert("sinew.method", frame=frame)
+    got = scenes.shapes(obj, [9, 10])
+    assert scenes.worst(got[0], expected["lbs"][0]) <= 1e-5
+    assert scenes.worst(got[1], expected["dq"][1]) <= 1e-5
+
+
+def test_undo_and_redo():
+    obj, armature = scenes.make_arm()
+    bpy.ops.ed.undo_push(message="start")
+    bpy.ops.sinew.add()
+    properties.of(obj).method = "dq"
+    bpy.ops.ed.undo_push(message="method")
+    bpy.context.scene.frame_set(11)
+    bpy.ops.ed.undo_push(message="frame")
+    name = obj.name
+    expected = scenes.final_points(obj)
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    obj = bpy.data.objects[name]
+    assert not properties.is_driven(obj)
+    assert obj.modifiers["Armature"].object is not None
+    bpy.ops.ed.redo()
+    bpy.ops.ed.redo()
+    obj = bpy.data.objects[name]
+    assert properties.of(obj).method == "dq"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
+    assert_follows(obj)
+
+
+def test_undo_of_a_pose_shows_the_old_pose():
+    obj, armature = scenes.make_arm()
+    scenes.forget_keys(armature)
+    scenes.add_sinew(obj, "dq")
+    name, rig = obj.name, armature.name
+    bpy.ops.ed.undo_push(message="straight")
+    straight = scenes.final_points(obj)
+    scenes.bend(armature, 90.0)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="bent")
+    bent = scenes.final_points(obj)
+    assert scenes.worst(bent, straight) > 0.1
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(bpy.data.objects[name]), straight) <= 1e-6
+    bpy.ops.ed.redo()
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(bpy.data.objects[name]), bent) <= 1e-6
+    scenes.bend(bpy.data.objects[rig], 40.0)
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(bpy.data.objects[name]), bent) > 0.05
+
+
+def test_save_and_reload(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    expected, name = scenes.final_points(obj), obj.name
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    assert obj.modifiers["Armature"].object is None, "saving gave the pointer back for good"
+    bpy.context.scene.frame_set(3)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = bpy.data.objects[name]
+    assert np.array_equal(scenes.final_points(obj), expected)
+    assert obj.modifiers["Armature"].object is None
+    assert_follows(obj)
+
+
+def test_linked_duplicate_has_a_pose_of_its_own():
+    first, armature = scenes.make_arm()
+    scenes.add_sinew(first)
+    other_rig = armature.copy()
+    bpy.context.scene.collection.objects.link(other_rig)
+    other_rig.animation_data_clear()
+    scenes.bend(other_rig, 60.0)
+    second = first.copy()
+    bpy.context.scene.collection.objects.link(second)
+    properties.of(second).armature = other_rig
+    assert second.data == first.data
+    for frame in (1, 6, 11):
+        bpy.context.scene.frame_set(frame)
+        points = {obj: scenes.final_points(obj) for obj in (first, second)}
+        for obj in (first, second):
+            properties.of(obj).enabled = False
+            assert scenes.worst(scenes.final_points(obj), points[obj]) <= 1e-5
+            properties.of(obj).enabled = True
+    assert scenes.worst(points[first], points[second]) > 0.05
+
+
+def test_duplicate_rename_and_delete_the_original():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    copy.name, armature.name = "Ünï 名前", "renamed rig"
+    bpy.context.scene.frame_set(4)
+    bpy.data.objects.remove(obj)
+    assert_follows(copy)
+
+
+def test_renamed_modifiers_are_still_known():
+    obj, _armature = scenes.make_arm()
+    before = [m.name for m in obj.modifiers]
+    scenes.add_sinew(obj)
+    obj.modifiers["Sinew"].name = "deform"
+    obj.modifiers["Armature"].name = "old"
+    assert_follows(obj)
+    drive.remove(obj)
+    assert [m.name for m in obj.modifiers] == ["old"] != before
+    assert obj.modifiers["old"].object is not None
+
+
+def test_append_from_a_saved_file(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    name = obj.name
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path) as (_source, target):
+        target.objects = [name]
+    appended = bpy.data.objects[name]
+    bpy.context.scene.collection.objects.link(appended)
+    bpy.context.scene.collection.objects.link(properties.of(appended).armature)
+    bpy.context.scene.frame_set(2)
+    assert_follows(appended)
+
+
+def test_deleted_armature_turns_the_mesh_off_with_a_sentence():
+    obj, armature = scenes.make_arm()
+    other, _rig = scenes.make_arm(name="Other")
+    scenes.add_sinew(obj)
+    scenes.add_sinew(other)
+    bpy.data.objects.remove(armature)
+    bpy.context.scene.frame_set(6)
+    assert not properties.of(obj).enabled
+    assert "armature was deleted" in properties.of(obj).error
+    assert_follows(other)
+    drive.remove(obj)
+
+
+def test_armature_deleted_as_in_the_window_is_let_go():
+    """Deleting in the window unlinks it from all scenes; our pointer alone must not keep it."""
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.collection.objects.unlink(armature)
+    bpy.context.scene.frame_set(6)
+    assert properties.of(obj).armature is None
+    assert "armature was deleted" in properties.of(obj).error
+
+
+def test_deleted_mesh_is_forgotten():
+    obj, _armature = scenes.make_arm()
+    other, _rig = scenes.make_arm(name="Other")
+    scenes.add_sinew(obj)
+    scenes.add_sinew(other)
+    bpy.data.objects.remove(obj)
+    assert_follows(other)
+
+
+def test_topology_change_rebinds():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    scenes.shapes(obj, [1, 6])
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide(number_cuts=1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_follows(obj)
+
+
+def test_moved_vertices_rebind():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    scenes.shapes(obj, [1, 6])
+    obj.data.vertices[5].co.z += 0.3
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+
+
+def test_changed_weights_rebind():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(11)
+    before = scenes.final_points(obj)
+    obj.vertex_groups[0].add(list(range(100, 140)), 1.0, "REPLACE")
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), before) > 0.01, "the stroke does not show"
+    assert_follows(obj)
+    obj.vertex_groups[1].add(list(range(120, 160)), 0.3, "REPLACE")
+    assert_follows(obj)
+
+
+def test_renamed_bone_takes_its_group_along():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    armature.data.bones["bone.1"].name = "forearm"
+    bpy.context.view_layer.update()
+    assert "forearm" in obj.vertex_groups
+    assert "bone.1" not in obj.vertex_groups
+    assert_follows(obj)
+
+
+def test_edited_rest_bones_rebind():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones["bone.1"].tail.z += 0.3
+    extra = armature.data.edit_bones.new("extra")
+    extra.head, extra.tail = (0, 0, 1), (0, 0, 2)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_follows(obj)
+
+
+def test_another_armature_chosen_in_the_modifier_is_taken_over():
+    obj, _armature = scenes.make_arm()
+    _unused, other = scenes.make_arm(name="Other")
+    scenes.forget_keys(other)
+    scenes.bend(other, 70.0)
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(11)
+    obj.modifiers["Armature"].object = other
+    bpy.context.view_layer.update()
+    assert properties.of(obj).armature == other
+    got = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    assert scenes.worst(got, scenes.final_points(obj)) <= 1e-5
+
+
+def test_an_error_turns_one_object_off_once_and_no_other(monkeypatch, caplog):
+    obj, _armature = scenes.make_arm()
+    other, _rig = scenes.make_arm(name="Other")
+    scenes.add_sinew(obj)
+    scenes.add_sinew(other)
+    write = mesh_io.write_points
+
+    def fail_for_one(mesh, name, points):
+        if mesh == obj.data:
+            raise RuntimeError("disk on fire")
+        write(mesh, name, points)
+
+    monkeypatch.setattr(mesh_io, "write_points", fail_for_one)
+    scenes.shapes(obj, [4, 5, 6])
+    assert not properties.of(obj).enabled
+    assert "disk on fire" in properties.of(obj).error
+    assert sum("disk on fire" in record.getMessage() for record in caplog.records) == 1
+    assert properties.of(other).enabled
+    monkeypatch.undo()
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.sinew.rebind()
+    assert_follows(obj)
+    assert_follows(other)
+
+
+def test_modifier_in_front_is_refused_with_a_sentence():
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Mirror", "MIRROR")
+    obj.modifiers.move(1, 0)
+    bpy.context.view_layer.update()
+    before = snapshot.of_file()
+    with pytest.raises(RuntimeError, match="Mirror stands in front of Armature"):
+        bpy.ops.sinew.add()
+    assert snapshot.of_file() == before
+
+
+def test_an_unchanged_object_is_not_written(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(6)
+    written = []
+    monkeypatch.setattr(mesh_io, "write_points", lambda *_args: written.append(1))
+    bpy.context.scene.frame_set(6)
+    handlers.refresh(bpy.context)
+    assert not written
+
+
+def test_unregister_gives_the_modifiers_their_armatures():
+    import sinew_addon
+
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    sinew_addon.unregister()
+    try:
+        assert obj.modifiers["Armature"].object == armature
+        assert not hasattr(bpy.types.Object, "sinew")
+    finally:
+        sinew_addon.register()
+    bpy.context.scene.frame_set(10)
+    assert_follows(obj)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures: what renders with Sinew equals what renders with the Armature modifier."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from mathutils import Matrix
+
+SIZE = 96
+
+
+def prepare(scene: bpy.types.Scene, motion_blur: bool) -> None:
+    """Cycles without noise between runs: one seed, no denoiser."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 3.0
+    camera.matrix_world = Matrix.Translation((1.0, 0.0, 5.0))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.rotation_euler = (0.5, 0.3, 0.0)
+    scene.collection.objects.link(sun)
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", 16, 1
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = motion_blur, 1.0
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "IMAGE"
+    scene.render.image_settings.file_format = "PNG"
+
+
+def render_animation(scene: bpy.types.Scene, folder, frames: tuple[int, int]) -> np.ndarray:
+    """float32 [frames, pixels]: an animation rendered in the background, read back from its files."""
+    scene.frame_start, scene.frame_end = frames
+    scene.render.filepath = f"{folder}/"
+    bpy.ops.render.render(animation=True)
+    return np.stack([read_picture(path) for path in sorted(folder.glob("*.png"))])
+
+
+def read_picture(path) -> np.ndarray:
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels
+
+
+@pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "motion blur"])
+@pytest.mark.parametrize(("method", "preserve_volume"), [("lbs", False), ("dq", True)])
+def test_background_animation_equals_the_modifier(tmp_path, method, preserve_volume, motion_blur):
+    obj, _armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur)
+    obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
+    (tmp_path / "modifier").mkdir()
+    (tmp_path / "sinew").mkdir()
+    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
+    assert np.abs(expected[0] - expected[2]).mean() > 0.005, "nothing moves: nothing is tested"
+    scenes.add_sinew(obj, method)
+    got = render_animation(scene, tmp_path / "sinew", (5, 7))
+    # Points equal to 1e-6 still move a sample across a silhouette here and there.
+    assert np.abs(got - expected).mean() < 2e-4
+
+
+def test_motion_blur_blurs(tmp_path):
+    """The check above would pass if neither picture were blurred."""
+    obj, _armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur=False)
+    scenes.add_sinew(obj, "dq")
+    (tmp_path / "sharp").mkdir()
+    (tmp_path / "blurred").mkdir()
+    sharp = render_animation(scene, tmp_path / "sharp", (6, 6))
+    scene.render.use_motion_blur = True
+    blurred = render_animation(scene, tmp_path / "blurred", (6, 6))
+    assert np.abs(sharp - blurred).mean() > 0.002
+
+
+def test_hidden_rig_renders_like_the_modifier(tmp_path):
+    obj, armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur=False)
+    armature.hide_render = armature.hide_viewport = True
+    (tmp_path / "modifier").mkdir()
+    (tmp_path / "sinew").mkdir()
+    expected = render_animation(scene, tmp_path / "modifier", (9, 9))
+    scenes.add_sinew(obj, "lbs")
+    scene.frame_set(1)
+    got = render_animation(scene, tmp_path / "sinew", (9, 9))
+    assert np.abs(got - expected).mean() < 2e-4
+
+
+def test_after_a_render_the_current_frame_is_shown(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur=True)
+    scenes.add_sinew(obj, "dq")
+    scene.frame_set(11)
+    before = scenes.final_points(obj)
+    render_animation(scene, tmp_path, (2, 3))
+    assert scene.frame_current == 11
+    assert np.array_equal(scenes.final_points(obj), before)

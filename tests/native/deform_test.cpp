@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <functional>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+
+#include "sinew/deform/deformer.h"
+#include "sinew/skinning/dq.h"
+#include "sinew/skinning/lbs.h"
+#include "sinew/skinning/qv.h"
+#include "support.h"
+
+namespace sinew {
+
+// Found by argument: without it GoogleTest names each test by the bytes of its row, addresses included.
+static void PrintTo(const Method& method, std::ostream* stream) { *stream << method.name; }
+
+namespace {
+
+using test::about;
+using test::distance;
+using test::Random;
+using test::same_bits;
+using test::scaling;
+
+/// A mesh and a pose that own what BindData points at.
+struct Scene {
+    std::vector<Vec3<float>> rest_points;
+    std::vector<std::int32_t> offsets{0};
+    std::vector<std::int32_t> bones;
+    std::vector<float> weights;
+    std::vector<Affine<float>> rest_bones;
+    std::vector<Affine<float>> posed_from_rest;
+
+    BindData data() const { return {rest_points, offsets, bones, weights, rest_bones}; }
+
+    void add_vertex(const Vec3<float>& rest, const std::vector<Influence<float>>& influences) {
+        rest_points.push_back(rest);
+        for (const Influence<float>& influence : influences) {
+            bones.push_back(influence.bone);
+            weights.push_back(influence.weight);
+        }
+        offsets.push_back(static_cast<std::int32_t>(bones.size()));
+    }
+};
+
+/// Bones 2, 5, ... are stretched along their own axes, every second of those mirrored; 1 to 8 influences.
+Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent) {
+    Random random(seed);
+    Scene scene;
+    constexpr int kBones = 12;
+    for (int bone = 0; bone < kBones; ++bone) {
+        const Affine<double> rest = to_affine(random.motion(extent));
+        Affine<double> motion = to_affine(random.motion(extent));
+        if (bone % 3 == 2) {
+            const double mirror = bone % 2 == 0 ? 1.0 : -1.0;
+            const Affine<double> scale =
+                scaling<double>({mirror * random.uniform(0.4, 2.0), random.uniform(0.4, 2.0), 1.0});
+            motion = motion * rest * scale * inverse(rest);
+        }
+        scene.rest_bones.push_back(cast<float>(rest));
+        scene.posed_from_rest.push_back(cast<float>(motion));
+    }
+    for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+        const auto count = static_cast<std::size_t>(1 + random.index(8));
+        scene.add_vertex(Vec3<float>(random.vector(extent)), random.influences<float>(count, kBones));
+    }
+    return scene;
+}
+
+std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
+                                  const DeformOptions& options = {}) {
+    std::vector<Vec3<float>> points(deformer.vertex_count(), Vec3<float>(-1e9f));
+    deformer.deform(scene.posed_from_rest, options, points);
+    return points;
+}
+
+template <class Method>
+std::vector<Vec3<double>> in_double(const Scene& scene) {
+    std::vector<typename Method::template Bone<double>> palette;
+    for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
+        palette.push_back(
+            Method::prepare(cast<double>(scene.posed_from_rest[bone]), cast<double>(scene.rest_bones[bone])));
+    }
+    std::vector<Vec3<double>> points;
+    for (std::size_t vertex = 0; vertex < scene.rest_points.size(); ++vertex) {
+        std::vector<Influence<double>> influences;
+        double sum = 0.0;
+        for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
+             i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
+            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i])});
+            sum += influences.back().weight;
+        }
+        for (Influence<double>& influence : influences) influence.weight /= sum;
+        points.push_back(Method::template deform_vertex<double>(palette, influences,
+                                                                Vec3<double>(scene.rest_points[vertex])));
+    }
+    return points;
+}
+
+std::vector<Vec3<double>> in_double(MethodId method, const Scene& scene) {
+    switch (method) {
+        case MethodId::lbs: return in_double<Lbs>(scene);
+        case MethodId::qv: return in_double<Qv>(scene);
+        case MethodId::dq: return in_double<Dq>(scene);
+    }
+    return {};
+}
+
+class Deform : public testing::TestWithParam<Method> {
+protected:
+    static MethodId method() { return GetParam().id; }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, Deform, testing::ValuesIn(kMethods),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+// kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The shift of a
+// dual quaternion is a product of two numbers of that size, so it grows with the size and no faster.
+constexpr double kTolerance = 2e-6;
+
+TEST_P(Deform, agrees_with_skinning_in_double) {
+    double worst = 0.0;
+    for (const double extent : {0.01, 1.0, 100.0}) {
+        for (std::uint32_t seed = 0; seed < 5; ++seed) {
+            const Scene scene = random_scene(seed, 500, extent);
+            const auto expected = in_double(method(), scene);
+            const auto points = deformed(Deformer(method(), scene.data()), scene);
+            for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+                worst = std::max(worst, distance(Vec3<double>(points[vertex]), expected[vertex]) / extent);
+            }
+        }
+    }
+    RecordProperty("worst_error", std::to_string(worst * 1e9) + "e-9");
+    EXPECT_LT(worst, kTolerance);
+}
+
+TEST_P(Deform, threads_change_no_bit) {
+    for (const std::size_t vertices : {0, 1, 4095, 4096, 4097, 8191, 8192, 8193, 12289, 20000}) {
+        const Scene scene = random_scene(7, vertices, 1.0);
+        const Deformer deformer(method(), scene.data());
+        const auto expected = deformed(deformer, scene, {{}, 1});
+        for (std::size_t threads = 0; threads <= 8; ++threads) {
+            const auto points = deformed(deformer, scene, {{}, threads});
+            ASSERT_EQ(points.size(), vertices);
+            for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+                ASSERT_TRUE(same_bits(points[vertex], expected[vertex])) << vertex << " on " << threads;
+            }
+        }
+    }
+}
+
+TEST_P(Deform, vertices_without_weight_stay_to_the_bit) {
+    Scene scene = random_scene(8, 3, 1.0);
+    const Vec3<float> rest(0.1f, -2e-20f, 3e20f);
+    scene.add_vertex(rest, {});
+    scene.add_vertex(rest, {{0, 0.0f}, {11, 0.0f}});
+    const Deformer deformer(method(), scene.data());
+    DeformOptions options;
+    for (int space = 0; space < 2; ++space) {
+        const auto points = deformed(deformer, scene, options);
+        EXPECT_TRUE(same_bits(points[3], rest));
+        EXPECT_TRUE(same_bits(points[4], rest));
+        options.bones_from_model = {to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, 2, 3}};
+    }
+}
+
+TEST_P(Deform, weights_are_normalised) {
+    const Scene scene = random_scene(9, 200, 1.0);
+    const auto expected = deformed(Deformer(method(), scene.data()), scene);
+    // Powers of two scale without rounding, so that nothing is left to differ.
+    for (const float factor : {0x1p-80f, 0.25f, 0x1p80f}) {
+        Scene scaled = scene;
+        for (float& weight : scaled.weights) weight *= factor;
+        const auto points = deformed(Deformer(method(), scaled.data()), scaled);
+        for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+            ASSERT_TRUE(same_bits(points[vertex], expected[vertex])) << factor;
+        }
+    }
+}
+
+TEST_P(Deform, the_largest_weights_do_not_overflow) {
+    Scene scene = random_scene(10, 0, 1.0);
+    const float most = std::numeric_limits<float>::max();
+    scene.add_vertex({1, 2, 3}, {{0, most}, {1, most}, {2, most}});
+    Scene plain = random_scene(10, 0, 1.0);
+    plain.add_vertex({1, 2, 3}, {{0, 1.0f}, {1, 1.0f}, {2, 1.0f}});
+    EXPECT_TRUE(same_bits(deformed(Deformer(method(), scene.data()), scene)[0],
+                          deformed(Deformer(method(), plain.data()), plain)[0]));
+}
+
+TEST_P(Deform, rest_pose_is_unchanged_to_the_bit) {
+    Scene scene = random_scene(11, 500, 1000.0);
+    scene.posed_from_rest.assign(scene.posed_from_rest.size(), {});
+    const auto points = deformed(Deformer(method(), scene.data()), scene);
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        ASSERT_TRUE(same_bits(points[vertex], scene.rest_points[vertex]));
+    }
+}
+
+TEST_P(Deform, new_rest_points_equal_a_new_deformer) {
+    Scene scene = random_scene(12, 300, 1.0);
+    Deformer deformer(method(), scene.data());
+    for (Vec3<float>& point : scene.rest_points) point = 0.5f * point + Vec3<float>(0, 1, 0);
+    deformer.set_rest_points(scene.rest_points);
+    const auto expected = deformed(Deformer(method(), scene.data()), scene);
+    const auto points = deformed(deformer, scene);
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        ASSERT_TRUE(same_bits(points[vertex], expected[vertex]));
+    }
+}
+
+TEST_P(Deform, bones_from_model_goes_there_and_back) {
+    const Scene scene = random_scene(13, 300, 1.0);
+    const Affine<double> turn = to_affine(QuatVec<double>{about<double>({1, 2, 3}, 40.0), {1, -2, 3}});
+    const Affine<float> bones_from_model = cast<float>(turn * scaling<double>({2.0, 0.5, -1.5}));
+    const auto points = deformed(Deformer(method(), scene.data()), scene, {bones_from_model, 0});
+    Scene there = scene;
+    for (Vec3<float>& point : there.rest_points) point = transform_point(bones_from_model, point);
+    const auto moved = deformed(Deformer(method(), there.data()), there);
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        const Vec3<float> expected = transform_point(inverse(bones_from_model), moved[vertex]);
+        ASSERT_LT(distance(points[vertex], expected), 1e-5);
+    }
+}
+
+TEST_P(Deform, bones_from_model_conjugates_one_bone) {
+    Scene scene = random_scene(14, 0, 1.0);
+    scene.add_vertex({0.1f, 0.2f, 0.3f}, {{0, 1.0f}});
+    const Affine<double> bones_from_model =
+        to_affine(QuatVec<double>{about<double>({1, 2, 3}, 40.0), {1, -2, 3}});
+    const Affine<double> expected =
+        inverse(bones_from_model) * cast<double>(scene.posed_from_rest[0]) * bones_from_model;
+    const auto points = deformed(Deformer(method(), scene.data()), scene, {cast<float>(bones_from_model), 0});
+    EXPECT_LT(distance(Vec3<double>(points[0]), transform_point(expected, {0.1, 0.2, 0.3})), 5e-6);
+}
+
+TEST_P(Deform, empty_rest_bones_mean_identity) {
+    Scene scene = random_scene(15, 200, 1.0);
+    scene.rest_bones.clear();
+    const auto points = deformed(Deformer(method(), scene.data()), scene);
+    scene.rest_bones.assign(scene.posed_from_rest.size(), {});
+    const auto expected = deformed(Deformer(method(), scene.data()), scene);
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        ASSERT_TRUE(same_bits(points[vertex], expected[vertex]));
+    }
+}
+
+TEST_P(Deform, bones_that_no_influence_names_are_not_needed) {
+    Scene scene = random_scene(16, 0, 1.0);
+    scene.add_vertex({1, 2, 3}, {{1, 1.0f}});
+    const Deformer deformer(method(), scene.data());
+    EXPECT_EQ(deformer.bone_count(), 2u);
+    const auto expected = deformed(deformer, scene);
+    scene.posed_from_rest.resize(2);
+    EXPECT_TRUE(same_bits(deformed(deformer, scene)[0], expected[0]));
+}
+
+TEST_P(Deform, says_what_it_was_made_of) {
+    Scene scene = random_scene(17, 0, 1.0);
+    scene.add_vertex({1, 2, 3}, {{1, 1.0f}, {4, 0.0f}});
+    scene.add_vertex({1, 2, 3}, {});
+    const Deformer deformer(method(), scene.data());
+    EXPECT_EQ(deformer.method(), method());
+    EXPECT_EQ(deformer.vertex_count(), 2u);
+    EXPECT_EQ(deformer.influence_count(), 1u);
+    EXPECT_EQ(deformer.bone_count(), 5u);
+}
+
+std::string message_of(const std::function<void()>& call) {
+    try {
+        call();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "nothing thrown";
+}
+
+std::string refusal(const std::function<void(Scene&)>& spoil) {
+    Scene scene;
+    scene.add_vertex({0, 0, 0}, {{0, 1.0f}});
+    scene.add_vertex({1, 1, 1}, {{0, 0.5f}, {1, 0.5f}});
+    spoil(scene);
+    return message_of([&] { const Deformer deformer(MethodId::lbs, scene.data()); });
+}
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+TEST(Deformer, accepts_the_scene_that_the_refusals_spoil) {
+    EXPECT_EQ(refusal([](Scene&) {}), "nothing thrown");
+}
+
+TEST(Deformer, refuses_rest_points_that_are_not_finite) {
+    EXPECT_EQ(refusal([](Scene& s) { s.rest_points[1].y = kNan; }),
+              "rest_points: expected finite values, got NaN or infinity at vertex 1");
+    EXPECT_EQ(refusal([](Scene& s) { s.rest_points[0].z = -kInfinity; }),
+              "rest_points: expected finite values, got NaN or infinity at vertex 0");
+}
+
+TEST(Deformer, refuses_another_number_of_weights) {
+    EXPECT_EQ(refusal([](Scene& s) { s.weights.pop_back(); }),
+              "influence_weights: expected one for each of the 3 influence_bones, got 2");
+}
+
+TEST(Deformer, refuses_another_number_of_offsets) {
+    EXPECT_EQ(refusal([](Scene& s) { s.offsets.pop_back(); }),
+              "influence_offsets: expected 3 values (vertices + 1), got 2");
+    EXPECT_EQ(refusal([](Scene& s) { s.offsets.clear(); }),
+              "influence_offsets: expected 3 values (vertices + 1), got 0");
+}
+
+TEST(Deformer, refuses_offsets_that_do_not_rise_from_0_to_the_end) {
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.offsets = {1, 1, 3};
+              }),
+              "influence_offsets: expected 0 at the start, got 1");
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.offsets = {0, -1, 3};
+              }),
+              "influence_offsets: expected values that never fall, got -1 after 0 at vertex 0");
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.offsets = {0, 4, 3};
+              }),
+              "influence_offsets: expected values that never fall, got 3 after 4 at vertex 1");
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.offsets = {0, 1, 2};
+              }),
+              "influence_offsets: expected 3 at the end (the number of influences), got 2");
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.offsets = {0, 1, 4};
+              }),
+              "influence_offsets: expected 3 at the end (the number of influences), got 4");
+}
+
+TEST(Deformer, refuses_a_negative_bone) {
+    EXPECT_EQ(refusal([](Scene& s) { s.bones[2] = -1; }),
+              "influence_bones: expected indices of bones, 0 or more, got -1 at influence 2");
+}
+
+TEST(Deformer, refuses_weights_that_are_negative_or_not_finite) {
+    EXPECT_EQ(refusal([](Scene& s) { s.weights[1] = -0.5f; }),
+              "influence_weights: expected finite values, 0 or more, got -0.500000 at influence 1");
+    EXPECT_EQ(refusal([](Scene& s) { s.weights[0] = kInfinity; }),
+              "influence_weights: expected finite values, 0 or more, got inf at influence 0");
+    EXPECT_NE(refusal([](Scene& s) { s.weights[0] = kNan; }).find("nan at influence 0"), std::string::npos);
+}
+
+TEST(Deformer, refuses_too_few_rest_bones) {
+    EXPECT_EQ(refusal([](Scene& s) { s.rest_bones.resize(1); }),
+              "rest_bones: expected at least 2 bones, got 1");
+}
+
+TEST(Deformer, refuses_other_new_rest_points) {
+    Scene scene;
+    scene.add_vertex({0, 0, 0}, {{0, 1.0f}});
+    Deformer deformer(MethodId::lbs, scene.data());
+    const std::vector<Vec3<float>> two(2);
+    const std::vector<Vec3<float>> spoilt{{0, kNan, 0}};
+    EXPECT_EQ(message_of([&] { deformer.set_rest_points(two); }), "rest_points: expected 1 points, got 2");
+    EXPECT_EQ(message_of([&] { deformer.set_rest_points(spoilt); }),
+              "rest_points: expected finite values, got NaN or infinity at vertex 0");
+    scene.posed_from_rest.resize(1);
+    EXPECT_TRUE(same_bits(deformed(deformer, scene)[0], {0, 0, 0}));
+}
+
+TEST(Deformer, empty_mesh_works) {
+    const Scene scene;
+    const Deformer deformer(MethodId::dq, scene.data());
+    EXPECT_EQ(deformer.bone_count(), 0u);
+    EXPECT_TRUE(deformed(deformer, scene).empty());
+}
+
+}  // namespace
+}  // namespace sinew

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "sinew/skinning/influence.h"
+#include "sinew/transform/convert.h"
+
+namespace sinew::test {
+
+/// Random numbers that are the same on every machine: the standard's distributions are not.
+class Random {
+public:
+    explicit Random(std::uint32_t seed) : engine_(seed) {}
+
+    double uniform(double low, double high) {
+        return low + (high - low) * (static_cast<double>(engine_()) / 4294967296.0);
+    }
+
+    std::int32_t index(std::int32_t end) { return static_cast<std::int32_t>(uniform(0.0, end)); }
+
+    Vec3<double> vector(double extent) {
+        const double x = uniform(-extent, extent);
+        const double y = uniform(-extent, extent);
+        return {x, y, uniform(-extent, extent)};
+    }
+
+    Quat<double> rotation() {
+        for (;;) {
+            const Vec3<double> v = vector(1.0);
+            const Quat<double> q(uniform(-1.0, 1.0), v.x, v.y, v.z);
+            if (glm::length(q) > 0.1) return glm::normalize(q);
+        }
+    }
+
+    QuatVec<double> motion(double extent) {
+        const Quat<double> q = rotation();
+        return {q, vector(extent)};
+    }
+
+    /// Positive weights of sum 1, each for another bone where there are enough.
+    template <class T>
+    std::vector<Influence<T>> influences(std::size_t count, std::int32_t bones) {
+        std::vector<Influence<T>> result;
+        double sum = 0.0;
+        const std::int32_t first = index(bones);
+        for (std::size_t i = 0; i < count; ++i) {
+            const double weight = uniform(0.05, 1.0);
+            sum += weight;
+            result.push_back({(first + static_cast<std::int32_t>(i)) % bones, static_cast<T>(weight)});
+        }
+        for (Influence<T>& influence : result) influence.weight = static_cast<T>(influence.weight / sum);
+        return result;
+    }
+
+private:
+    std::mt19937 engine_;
+};
+
+template <class T>
+Quat<T> about(const Vec3<T>& axis, T degrees) {
+    return glm::angleAxis(degrees * std::numbers::pi_v<T> / T(180), glm::normalize(axis));
+}
+
+template <class T>
+Affine<T> scaling(const Vec3<T>& factors) {
+    Affine<T> a;
+    for (int i = 0; i < 3; ++i) a.linear[i][i] = factors[i];
+    return a;
+}
+
+template <class T>
+bool is_finite(const Vec3<T>& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+template <class T>
+bool is_finite(const Affine<T>& a) {
+    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
+           is_finite(a.translation);
+}
+
+template <class T>
+double distance(const Vec3<T>& a, const Vec3<T>& b) {
+    return static_cast<double>(glm::length(a - b));
+}
+
+/// The largest difference of an entry.
+template <class T>
+double distance(const Affine<T>& a, const Affine<T>& b) {
+    double largest = distance(a.translation, b.translation);
+    for (int i = 0; i < 3; ++i) largest = std::max(largest, distance(a.linear[i], b.linear[i]));
+    return largest;
+}
+
+/// How far `linear` is from a right-handed rotation.
+template <class T>
+double rotation_error(const Mat3<T>& linear) {
+    const Affine<T> product{glm::transpose(linear) * linear, Vec3<T>(T(0))};
+    return distance(product, Affine<T>{}) + std::abs(static_cast<double>(glm::determinant(linear)) - 1.0);
+}
+
+template <class T>
+bool same_bits(const Vec3<T>& a, const Vec3<T>& b) {
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+}  // namespace sinew::test

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skinning in float64 numpy and matrix form, from the papers: what the library is measured against.
+
+Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv) and Kavan,
+Collins, Zara, O'Sullivan 2008, algorithm 1 (dq); slow, one vertex at a time, and shares no formula with the
+library where there are two. Quaternions are (w, x, y, z).
+"""
+
+import numpy as np
+
+
+def turn(rotation):
+    """The proper rotation nearest to the 3x3 `rotation` (polar decomposition)."""
+    u, _, vt = np.linalg.svd(rotation)
+    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+
+
+def is_rigid(linear):
+    return bool(np.allclose(linear.T @ linear, np.eye(3), rtol=0, atol=1e-5) and np.linalg.det(linear) > 0)
+
+
+def rotation_of_bone(posed_from_rest, rest_bone):
+    """The turn of a bone's motion, 3x3: where it is scaled, that of its posed axes made orthonormal and
+    right-handed with Y kept, then X as near as can be."""
+    if is_rigid(posed_from_rest[:3, :3]):
+        return turn(posed_from_rest[:3, :3])
+    axes = posed_from_rest[:3, :3] @ rest_bone[:3, :3]
+    y = axes[:, 1] / np.linalg.norm(axes[:, 1])
+    assert y @ axes[:, 0] < 1.0, "beyond this shear Blender's rule picks another axis than the reference"
+    x = axes[:, 0] - y * (y @ axes[:, 0])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, y, np.cross(x, y)]) @ rest_bone[:3, :3].T
+
+
+def quaternion(rotation):
+    """The unit quaternion of `rotation`, of either sign: the eigenvector of Bar-Itzhack's matrix."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    k = np.array(
+        [
+            [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, xx - yy - zz, xy + yx, xz + zx],
+            [xz - zx, xy + yx, yy - xx - zz, yz + zy],
+            [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+        ]
+    )
+    return np.linalg.eigh(k)[1][:, -1]
+
+
+def rotation(q):
+    """The 3x3 rotation of the unit quaternion `q`."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * y * y - 2 * z * z, 2 * x * y - 2 * w * z, 2 * x * z + 2 * w * y],
+            [2 * x * y + 2 * w * z, 1 - 2 * x * x - 2 * z * z, 2 * y * z - 2 * w * x],
+            [2 * x * z - 2 * w * y, 2 * y * z + 2 * w * x, 1 - 2 * x * x - 2 * y * y],
+        ]
+    )
+
+
+def left_multiplication(q):
+    """The 4x4 matrix that multiplies a quaternion by `q` from the left."""
+    w, x, y, z = q
+    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+
+
+def translation(real, dual):
+    """Kavan et al. 2008, algorithm 1: the last column of the matrix of the blended dual quaternion."""
+    w0, x0, y0, z0 = real
+    we, xe, ye, ze = dual
+    return 2.0 * np.array(
+        [
+            -we * x0 + xe * w0 - ye * z0 + ze * y0,
+            -we * y0 + xe * z0 + ye * w0 - ze * x0,
+            -we * z0 - xe * y0 + ye * x0 + ze * w0,
+        ]
+    )
+
+
+def in_one_hemisphere(quaternions, weights):
+    """Signs that turn each quaternion to the side of the weighted sum of those before it, and how far the
+    closest of them is from a tie (1: none is near)."""
+    signs, total, margin = [], np.zeros(4), 1.0
+    for q, weight in zip(quaternions, weights, strict=True):
+        side = q @ total
+        if total.any():
+            margin = min(margin, abs(side) / np.linalg.norm(total))
+        signs.append(-1.0 if side < 0.0 else 1.0)
+        total = total + signs[-1] * weight * q
+    return np.array(signs), margin
+
+
+def lbs(point, motions, rotations, weights):
+    blended = np.tensordot(weights, motions, axes=1)
+    return (blended @ np.append(point, 1.0))[:3], 1.0
+
+
+def rigid_terms(point, motions, rotations):
+    """For each bone the rigid motion with its turn that takes `point` where the whole bone takes it."""
+    shifts = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point
+    return np.array([quaternion(r) for r in rotations]), shifts
+
+
+def qv(point, motions, rotations, weights):
+    quaternions, shifts = rigid_terms(point, motions, rotations)
+    signs, margin = in_one_hemisphere(quaternions, weights)
+    blended = (signs * weights) @ quaternions
+    return rotation(blended / np.linalg.norm(blended)) @ point + weights @ shifts, margin
+
+
+def dq(point, motions, rotations, weights):
+    quaternions, shifts = rigid_terms(point, motions, rotations)
+    duals = np.array(
+        [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, shifts, strict=True)]
+    )
+    signs, margin = in_one_hemisphere(quaternions, weights)
+    real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals
+    length = np.linalg.norm(real)
+    real, dual = real / length, dual / length
+    return rotation(real) @ point + translation(real, dual), margin
+
+
+METHODS = {"lbs": lbs, "qv": qv, "dq": dq}
+
+
+def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=None):
+    """Deformed points float64 [vertices, 3], and [vertices] how far each is from a tie of signs.
+
+    A vertex without influences, or with all weights zero, stays.
+    """
+    transforms = np.asarray(transforms, np.float64)
+    if rest_bones is None:
+        rest_bones = np.tile(np.eye(4), (len(transforms), 1, 1))
+    rest_bones = np.asarray(rest_bones, np.float64)
+    rotations = np.array([rotation_of_bone(m, b) for m, b in zip(transforms, rest_bones, strict=True)])
+    points = np.asarray(rest_points, np.float64).copy()
+    margins = np.ones(len(points))
+    for vertex in range(len(points)):
+        span = slice(offsets[vertex], offsets[vertex + 1])
+        share = np.asarray(weights[span], np.float64)
+        if share.sum() > 0.0:
+            of = bones[span]
+            points[vertex], margins[vertex] = METHODS[method](
+                points[vertex], transforms[of], rotations[of], share / share.sum()
+            )
+    return points, margins

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random rigs and meshes in the arrays that sinew.Deformer takes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import sinew
+from reference import rotation
+
+
+def random_rotation(rng):
+    q = rng.normal(size=4)
+    return rotation(q / np.linalg.norm(q))
+
+
+def about(axis, degrees):
+    """float64 [4, 4]: the turn by `degrees` about `axis` through the origin."""
+    half = np.radians(degrees) / 2
+    axis = np.asarray(axis, np.float64) / np.linalg.norm(axis)
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation([np.cos(half), *(np.sin(half) * axis)])
+    return matrix
+
+
+def shift(vector):
+    matrix = np.eye(4)
+    matrix[:3, 3] = vector
+    return matrix
+
+
+def random_motion(rng, extent=1.0):
+    matrix = shift(rng.uniform(-extent, extent, 3))
+    matrix[:3, :3] = random_rotation(rng)
+    return matrix
+
+
+def transform(matrix, points):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+@dataclass(frozen=True)
+class Rig:
+    rest_points: np.ndarray
+    offsets: np.ndarray
+    bones: np.ndarray
+    weights: np.ndarray
+    transforms: np.ndarray
+    rest_bones: np.ndarray
+
+    @property
+    def mesh(self):
+        return self.rest_points, self.offsets, self.bones, self.weights
+
+    def deformer(self, method):
+        return sinew.Deformer(*self.mesh, method, self.rest_bones)
+
+    def deform(self, method, **options):
+        return self.deformer(method).deform(self.transforms, **options)
+
+    def with_(self, **fields):
+        return replace(self, **{name: np.ascontiguousarray(value) for name, value in fields.items()})
+
+    def with_motions(self, transforms, **fields):
+        return self.with_(transforms=np.asarray(transforms, np.float32), **fields)
+
+
+def random_rig(seed, vertices=200, bones=15, extent=1.0, most_influences=12, scaled=False):
+    """Bones turned any way; 1 to `most_influences` bones a vertex. `scaled`: every second bone is stretched
+    along its axes, and of those every second one mirrored."""
+    rng = np.random.default_rng(seed)
+    rest_bones = np.array([random_motion(rng, extent) for _ in range(bones)])
+    transforms = np.array([random_motion(rng, extent) for _ in range(bones)])
+    if scaled:
+        for bone in range(1, bones, 2):
+            factors = rng.uniform(0.4, 2.0, 3)
+            if bone % 4 == 3:
+                factors[rng.integers(3)] *= -1.0
+            rest = rest_bones[bone]
+            transforms[bone] = transforms[bone] @ rest @ np.diag([*factors, 1.0]) @ np.linalg.inv(rest)
+    counts = rng.integers(1, most_influences + 1, vertices)
+    return Rig(
+        rest_points=rng.uniform(-extent, extent, (vertices, 3)).astype(np.float32),
+        offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        bones=np.concatenate([rng.permutation(bones)[:n] for n in counts] or [[]]).astype(np.int32),
+        weights=rng.uniform(0.05, 1.0, counts.sum()).astype(np.float32),
+        transforms=transforms.astype(np.float32),
+        rest_bones=rest_bones.astype(np.float32),
+    )

@@ -1,0 +1,459 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import os
+import sys
+import threading
+
+import numpy as np
+import pytest
+import reference
+import sinew
+from rigs import Rig, about, random_motion, random_rig, shift, transform
+
+METHODS = [method.name for method in sinew.methods()]
+RIGID = [name for name in METHODS if name != "lbs"]
+
+# Times the size of the scene: float32's 6e-8 after some tens of operations.
+TOLERANCE = 4e-6
+# Nearer than this to a tie between q and -q the two sides are both right, and far apart.
+NO_TIE = 1e-4
+
+every_method = pytest.mark.parametrize("method", METHODS)
+
+
+def assert_agrees(method, rig, extent, tolerance=TOLERANCE):
+    expected, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
+    sure = margins > NO_TIE
+    assert sure.mean() > 0.95
+    errors = np.linalg.norm(rig.deform(method) - expected, axis=1)[sure] / extent
+    assert errors.max() < tolerance, f"worst error {errors.max():.2e} of the size of the scene"
+
+
+def test_methods_have_a_reference():
+    assert set(METHODS) == set(reference.METHODS)
+
+
+def test_methods_say_what_they_are():
+    rows = sinew.methods()
+    assert len({row.number for row in rows}) == len({row.name for row in rows}) == len(rows)
+    assert {row.name: row.number for row in rows} == {"lbs": 1, "qv": 2, "dq": 3}
+    for row in rows:
+        assert row.label
+        assert row.description
+        assert row.needs
+        assert row.name in repr(row)
+
+
+@every_method
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+@pytest.mark.parametrize("extent", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_agrees_with_the_reference(method, scaled, extent, seed):
+    assert_agrees(method, random_rig(seed, extent=extent, scaled=scaled), extent)
+
+
+@every_method
+@pytest.mark.parametrize("influences", range(1, 13))
+def test_agrees_with_the_reference_at_every_number_of_influences(method, influences):
+    rig = random_rig(influences, vertices=60, scaled=True)
+    counts = np.full(60, influences)
+    rng = np.random.default_rng(influences)
+    rig = rig.with_(
+        offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        bones=np.concatenate([rng.permutation(15)[:influences] for _ in counts]).astype(np.int32),
+        weights=rng.uniform(0.05, 1.0, counts.sum()).astype(np.float32),
+    )
+    assert_agrees(method, rig, 1.0)
+
+
+@every_method
+def test_agrees_with_the_reference_with_sheared_bones(method):
+    rig = random_rig(20)
+    motions = rig.transforms.astype(np.float64)
+    rng = np.random.default_rng(21)
+    for bone in range(0, 15, 2):
+        motions[bone, :3, :3] = motions[bone, :3, :3] @ (np.eye(3) + rng.uniform(-0.3, 0.3, (3, 3)))
+    assert_agrees(method, rig.with_motions(motions), 1.0)
+
+
+@every_method
+def test_agrees_with_the_reference_with_identity_rest_bones(method):
+    rig = random_rig(22, scaled=True)
+    expected, margins = reference.deform(method, *rig.mesh, rig.transforms)
+    points = sinew.Deformer(*rig.mesh, method).deform(rig.transforms)
+    np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=TOLERANCE)
+
+
+@every_method
+def test_agrees_with_the_reference_far_from_the_origin(method):
+    rig = random_rig(23, scaled=True)
+    far = shift([1000.0, -500.0, 2000.0])
+    rig = rig.with_motions(
+        far @ rig.transforms @ np.linalg.inv(far),
+        rest_points=transform(far, rig.rest_points).astype(np.float32),
+        rest_bones=(far @ rig.rest_bones).astype(np.float32),
+    )
+    assert_agrees(method, rig, 2300.0)
+
+
+@every_method
+def test_few_weights_many_scales(method):
+    rig = random_rig(24, scaled=True)
+    for factor in (1e-30, 1e-3, 7.0, 1e30):
+        assert_agrees(method, rig.with_(weights=(rig.weights * np.float32(factor)).astype(np.float32)), 1.0)
+
+
+@every_method
+def test_rest_pose_is_unchanged_to_the_bit(method):
+    rig = random_rig(25, extent=100.0)
+    identity = np.tile(np.eye(4, dtype=np.float32), (15, 1, 1))
+    np.testing.assert_array_equal(rig.with_motions(identity).deform(method), rig.rest_points)
+
+
+@every_method
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+def test_rigid_motion_after_the_pose_commutes(method, scaled):
+    rig = random_rig(26, scaled=scaled)
+    motion = random_motion(np.random.default_rng(27), 2.0)
+    _, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
+    moved = rig.with_motions(motion @ rig.transforms.astype(np.float64)).deform(method)
+    expected = transform(motion, rig.deform(method).astype(np.float64))
+    np.testing.assert_allclose(moved[margins > NO_TIE], expected[margins > NO_TIE], atol=4 * TOLERANCE)
+
+
+def change_by_space(method, rig, other_from_space):
+    """The largest distance by which points differ when rest points, rest bones and motions are given in
+    another space and the result is taken back."""
+    _, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
+    back = np.linalg.inv(other_from_space)
+    there = rig.with_motions(
+        other_from_space @ rig.transforms.astype(np.float64) @ back,
+        rest_points=transform(other_from_space, rig.rest_points.astype(np.float64)).astype(np.float32),
+        rest_bones=(other_from_space @ rig.rest_bones.astype(np.float64)).astype(np.float32),
+    )
+    points = transform(back, there.deform(method).astype(np.float64))
+    return np.linalg.norm(points - rig.deform(method), axis=1)[margins > NO_TIE].max()
+
+
+@every_method
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+def test_turned_axes_change_nothing(method, scaled):
+    turned = random_motion(np.random.default_rng(28), 0.0)
+    assert change_by_space(method, random_rig(29, scaled=scaled), turned) < 4 * TOLERANCE
+
+
+@every_method
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+def test_another_origin_changes_only_qv(method, scaled):
+    change = change_by_space(method, random_rig(30, scaled=scaled), shift([3.0, -2.0, 1.0]))
+    if method == "qv":
+        assert change > 0.1
+    else:
+        assert change < 10 * TOLERANCE
+
+
+@every_method
+def test_bone_numbers_mean_nothing(method):
+    rig = random_rig(31, scaled=True)
+    number = np.random.default_rng(32).permutation(15)
+    order = np.argsort(number)
+    renumbered = rig.with_(
+        bones=number[rig.bones].astype(np.int32),
+        transforms=rig.transforms[order],
+        rest_bones=rig.rest_bones[order],
+    )
+    np.testing.assert_array_equal(renumbered.deform(method), rig.deform(method))
+
+
+@every_method
+@pytest.mark.parametrize("vertices", [0, 1, 4095, 4096, 4097, 8193, 20000])
+def test_threads_change_no_bit(method, vertices):
+    rig = random_rig(33, vertices=vertices, most_influences=4, scaled=True)
+    expected = rig.deform(method, threads=1)
+    for threads in (None, 2, 3, 8, 10**30):
+        np.testing.assert_array_equal(rig.deform(method, threads=threads), expected)
+
+
+@every_method
+@pytest.mark.parametrize("degrees", [179.999, 180.0, 180.001, 360.0, 540.0])
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 2, 3)])
+def test_opposite_twists_give_finite_points(method, degrees, axis):
+    weights = np.linspace(0.0, 1.0, 11, dtype=np.float32)
+    rest = np.tile(np.float32([0.3, 0.4, 0.5]), (11, 1))
+    mesh = (
+        rest,
+        np.arange(0, 24, 2, dtype=np.int32),
+        np.tile(np.int32([0, 1]), 11),
+        np.column_stack([1 - weights, weights]).ravel(),
+    )
+    twist = np.array([np.eye(4), about(axis, degrees)], np.float32)
+    points = sinew.Deformer(*mesh, method).deform(twist)
+    assert np.isfinite(points).all()
+    assert (np.linalg.norm(points, axis=1) <= np.linalg.norm(rest, axis=1) + 1e-6).all()
+    np.testing.assert_allclose(points[0], rest[0], atol=1e-6)
+    np.testing.assert_allclose(points[-1], transform(twist[1], rest)[-1], atol=1e-6)
+
+
+@every_method
+@pytest.mark.parametrize("zeros", [(0,), (1,), (2,), (0, 1), (1, 2), (0, 2), (0, 1, 2)])
+def test_bones_scaled_to_nothing_give_finite_points(method, zeros):
+    rig = random_rig(34)
+    motions = rig.transforms.astype(np.float64)
+    for bone in range(0, 15, 2):
+        factors = np.ones(4)
+        factors[list(zeros)] = 0.0
+        rest = rig.rest_bones[bone].astype(np.float64)
+        motions[bone] = motions[bone] @ rest @ np.diag(factors) @ np.linalg.inv(rest)
+    points = rig.with_motions(motions).deform(method)
+    assert np.isfinite(points).all()
+    assert np.abs(points).max() < 10.0
+
+
+@pytest.mark.parametrize("method", RIGID)
+def test_twists_keep_the_distance_from_their_axis(method):
+    weights = np.linspace(0.0, 1.0, 9, dtype=np.float32)
+    rest = np.tile(np.float32([2.0, 0.6, 0.8]), (9, 1))
+    rig = Rig(
+        rest,
+        np.arange(0, 20, 2, dtype=np.int32),
+        np.tile(np.int32([0, 1]), 9),
+        np.column_stack([1 - weights, weights]).ravel(),
+        np.array([np.eye(4), about((1, 0, 0), 170)], np.float32),
+        np.tile(np.eye(4, dtype=np.float32), (2, 1, 1)),
+    )
+    points = rig.deform(method)
+    np.testing.assert_allclose(np.hypot(points[:, 1], points[:, 2]), 1.0, atol=1e-6)
+    assert np.hypot(*rig.deform("lbs")[4, 1:]) < 0.1
+
+
+@every_method
+def test_vertices_without_weight_stay_to_the_bit(method):
+    rest = np.float32([[0.1, 0.2, 0.3], [1e-20, -1e20, 7.0], [1.0, 2.0, 3.0]])
+    deformer = sinew.Deformer(
+        rest, np.int32([0, 0, 2, 3]), np.int32([0, 1, 1]), np.float32([0, 0, 1]), method
+    )
+    motions = np.array([random_motion(np.random.default_rng(i)) for i in range(2)], np.float32)
+    for space in (None, about((1, 2, 3), 40).astype(np.float32)):
+        points = deformer.deform(motions, bones_from_model=space)
+        np.testing.assert_array_equal(points[:2], rest[:2])
+        assert np.abs(points[2] - rest[2]).max() > 0.1
+
+
+@every_method
+def test_counts_are_of_what_was_bound(method):
+    deformer = sinew.Deformer(
+        np.zeros((2, 3), np.float32), np.int32([0, 2, 2]), np.int32([1, 4]), np.float32([1, 0]), method
+    )
+    assert deformer.method == method
+    assert (deformer.vertex_count, deformer.influence_count, deformer.bone_count) == (2, 1, 5)
+
+
+def test_linear_blend_is_the_default():
+    rig = random_rig(35)
+    assert sinew.Deformer(*rig.mesh).method == "lbs"
+
+
+@every_method
+def test_set_rest_points_equals_a_new_deformer(method):
+    rig = random_rig(36, scaled=True)
+    other = (rig.rest_points * np.float32(0.5) + np.float32(1.0)).astype(np.float32)
+    deformer = rig.deformer(method)
+    assert deformer.set_rest_points(other) is None
+    np.testing.assert_array_equal(
+        deformer.deform(rig.transforms), rig.with_(rest_points=other).deform(method)
+    )
+
+
+@every_method
+def test_input_is_copied(method):
+    rig = random_rig(37, scaled=True)
+    arrays = [array.copy() for array in (*rig.mesh, rig.rest_bones)]
+    deformer = sinew.Deformer(*arrays[:4], method, arrays[4])
+    for array in arrays:
+        array[...] = 0
+    np.testing.assert_array_equal(deformer.deform(rig.transforms), rig.deform(method))
+
+
+@every_method
+def test_bones_from_model_equals_doing_it_by_hand(method):
+    rig = random_rig(38, scaled=True)
+    bones_from_model = random_motion(np.random.default_rng(39), 2.0) @ np.diag([2.0, 0.5, -1.5, 1.0])
+    points = rig.deform(method, bones_from_model=bones_from_model.astype(np.float32))
+    there = rig.with_(
+        rest_points=transform(bones_from_model, rig.rest_points.astype(np.float64)).astype(np.float32)
+    )
+    _, margins = reference.deform(method, *there.mesh, there.transforms, there.rest_bones)
+    expected = transform(np.linalg.inv(bones_from_model), there.deform(method).astype(np.float64))
+    np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=10 * TOLERANCE)
+
+
+@every_method
+def test_bones_from_model_takes_three_rows_and_identity(method):
+    rig = random_rig(40)
+    identity = np.eye(4, dtype=np.float32)
+    expected = rig.deform(method)
+    np.testing.assert_array_equal(rig.deform(method, bones_from_model=identity), expected)
+    np.testing.assert_array_equal(rig.deform(method, bones_from_model=identity[:3]), expected)
+
+
+@every_method
+def test_out_is_written_in_place_and_returned(method):
+    rig = random_rig(41, scaled=True)
+    out = np.full_like(rig.rest_points, np.nan)
+    assert rig.deform(method, out=out) is out
+    np.testing.assert_array_equal(out, rig.deform(method))
+
+
+@every_method
+def test_out_may_be_a_part_of_a_larger_array(method):
+    rig = random_rig(42)
+    whole = np.full((202, 3), 7.0, np.float32)
+    part = whole[1:-1]
+    assert rig.deform(method, out=part) is part
+    np.testing.assert_array_equal(whole[1:-1], rig.deform(method))
+    assert (whole[[0, -1]] == 7.0).all()
+
+
+@every_method
+def test_out_may_be_the_array_of_rest_points(method):
+    rig = random_rig(43)
+    points = rig.rest_points.copy()
+    deformer = sinew.Deformer(points, *rig.mesh[1:], method)
+    expected = deformer.deform(rig.transforms)
+    for _ in range(2):
+        np.testing.assert_array_equal(deformer.deform(rig.transforms, out=points), expected)
+
+
+@every_method
+def test_bone_transforms_may_have_three_rows(method):
+    rig = random_rig(44, scaled=True)
+    deformer = sinew.Deformer(*rig.mesh, method, rig.rest_bones[:, :3])
+    np.testing.assert_array_equal(deformer.deform(rig.transforms[:, :3]), rig.deform(method))
+
+
+@every_method
+def test_fourth_row_is_not_read(method):
+    rig = random_rig(45)
+    spoilt = rig.transforms.copy()
+    spoilt[:, 3] = np.nan
+    np.testing.assert_array_equal(rig.deformer(method).deform(spoilt), rig.deform(method))
+
+
+@every_method
+def test_more_bones_than_needed_change_nothing(method):
+    rig = random_rig(46)
+    more = np.concatenate([rig.transforms, np.full((3, 4, 4), 9.0, np.float32)])
+    np.testing.assert_array_equal(rig.deformer(method).deform(more), rig.deform(method))
+
+
+@every_method
+def test_layout_of_the_input_means_nothing(method):
+    rig = random_rig(47, scaled=True)
+    expected = rig.deform(method)
+
+    # Blender's foreach_get gives matrices column by column.
+    def as_blender_gives(matrices):
+        flat = np.ascontiguousarray(matrices.transpose(0, 2, 1)).ravel()
+        return flat.reshape(-1, 4, 4).transpose(0, 2, 1)
+
+    motions, rest_bones = as_blender_gives(rig.transforms), as_blender_gives(rig.rest_bones)
+    assert not motions.flags.c_contiguous
+    every_second = [np.repeat(array, 2, axis=0)[::2] for array in rig.mesh]
+    assert not any(array.flags.c_contiguous for array in every_second)
+    deformer = sinew.Deformer(*every_second, method, rest_bones)
+    np.testing.assert_array_equal(deformer.deform(motions), expected)
+    deformer.set_rest_points(np.asfortranarray(rig.rest_points))
+    np.testing.assert_array_equal(deformer.deform(np.asfortranarray(rig.transforms)), expected)
+
+
+@every_method
+def test_read_only_input_is_accepted(method):
+    rig = random_rig(48)
+    expected = rig.deform(method)
+    for array in (*rig.mesh, rig.transforms, rig.rest_bones):
+        array.setflags(write=False)
+    np.testing.assert_array_equal(rig.deform(method), expected)
+
+
+@every_method
+def test_empty_mesh_works(method):
+    deformer = sinew.Deformer(
+        np.empty((0, 3), np.float32), np.int32([0]), np.empty(0, np.int32), np.empty(0, np.float32), method
+    )
+    for motions in (np.empty((0, 4, 4), np.float32), np.eye(4, dtype=np.float32)[None]):
+        points = deformer.deform(motions)
+        assert points.shape == (0, 3)
+        assert points.dtype == np.float32
+
+
+@every_method
+def test_many_threads_may_use_one_deformer(method):
+    rig = random_rig(49, vertices=10000, most_influences=4, scaled=True)
+    deformer = rig.deformer(method)
+    expected = deformer.deform(rig.transforms)
+    results = []
+
+    def work():
+        results.extend(deformer.deform(rig.transforms, threads=2) for _ in range(5))
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(results) == 20
+    for points in results:
+        np.testing.assert_array_equal(points, expected)
+
+
+@every_method
+def test_gil_is_released(method):
+    rig = random_rig(50, vertices=50000, most_influences=4)
+    deformer = rig.deformer(method)
+    out = np.empty_like(rig.rest_points)
+    gate = threading.Lock()
+    gate.acquire()
+    ready = threading.Event()
+    progress = []
+
+    def work():
+        ready.set()
+        with gate:
+            progress.append(True)
+
+    thread = threading.Thread(target=work)
+    interval = sys.getswitchinterval()
+    thread.start()
+    ready.wait()
+    # Python takes the GIL from nobody for this long: the thread moves only when someone lets it go.
+    sys.setswitchinterval(1000.0)
+    try:
+        gate.release()
+        for _ in range(1000):
+            deformer.deform(rig.transforms, out=out, threads=1)
+            if progress:
+                break
+        moved = bool(progress)
+    finally:
+        sys.setswitchinterval(interval)
+        thread.join()
+    assert moved
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_deforms_in_a_forked_child():
+    rig = random_rig(51, vertices=20000, most_influences=4)
+    deformer = rig.deformer("dq")
+    expected = deformer.deform(rig.transforms, threads=4)
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            import signal
+
+            signal.alarm(60)  # a child that waits for its parent's threads must fail, not hang
+            code = int(not np.array_equal(deformer.deform(rig.transforms, threads=4), expected))
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 0

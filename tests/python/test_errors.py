@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every refusal names the argument, what was wanted and what came."""
+
+import numpy as np
+import pytest
+import sinew
+
+NAN, INF = np.float32("nan"), np.float32("inf")
+
+
+def good():
+    """Two vertices on two bones: what each case below spoils in one place."""
+    return {
+        "rest_points": np.float32([[0, 0, 0], [1, 1, 1]]),
+        "influence_offsets": np.int32([0, 1, 3]),
+        "influence_bones": np.int32([0, 0, 1]),
+        "influence_weights": np.float32([1, 0.5, 0.5]),
+        "method": "dq",
+        "rest_bones": np.tile(np.eye(4, dtype=np.float32), (2, 1, 1)),
+    }
+
+
+def bones(count=2):
+    return np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
+
+
+def spoilt(array, index, value):
+    array = array.copy()
+    array[index] = value
+    return array
+
+
+def refusal(call, *args, **kwargs):
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 - callers compare the whole message
+        call(*args, **kwargs)
+    return str(caught.value)
+
+
+def test_what_the_cases_spoil_is_accepted():
+    sinew.Deformer(**good()).deform(bones())
+
+
+POINTS, OFFSETS = "float32 [n, 3]", "int32 [vertices + 1]"
+BONES, WEIGHTS = "int32 [influences]", "float32 [influences]"
+AFFINES = "float32 [n, 4, 4] or [n, 3, 4]"
+FINITE_WEIGHTS = "finite values, 0 or more"
+
+CONSTRUCTOR = [
+    ("rest_points", good()["rest_points"].astype(np.float64), POINTS, "float64 [2, 3]"),
+    ("rest_points", np.zeros((2, 4), np.float32), POINTS, "float32 [2, 4]"),
+    ("rest_points", np.zeros(6, np.float32), POINTS, "float32 [6]"),
+    ("rest_points", np.zeros((1, 2, 3), np.float32), POINTS, "float32 [1, 2, 3]"),
+    ("rest_points", np.zeros((2, 3), ">f4"), POINTS, ">f4 [2, 3]"),
+    ("rest_points", [[0, 0, 0], [1, 1, 1]], POINTS, "list"),
+    ("rest_points", None, POINTS, "NoneType"),
+    (
+        "rest_points",
+        spoilt(good()["rest_points"], (1, 2), NAN),
+        "finite values",
+        "NaN or infinity at vertex 1",
+    ),
+    (
+        "rest_points",
+        spoilt(good()["rest_points"], (0, 0), -INF),
+        "finite values",
+        "NaN or infinity at vertex 0",
+    ),
+    ("influence_offsets", np.int64([0, 1, 3]), OFFSETS, "int64 [3]"),
+    ("influence_offsets", np.float32([0, 1, 3]), OFFSETS, "float32 [3]"),
+    ("influence_offsets", np.int32([[0, 1, 3]]), OFFSETS, "int32 [1, 3]"),
+    ("influence_offsets", [0, 1, 3], OFFSETS, "list"),
+    ("influence_offsets", np.int32([0, 3]), "3 values (vertices + 1)", "2"),
+    ("influence_offsets", np.int32([]), "3 values (vertices + 1)", "0"),
+    ("influence_offsets", np.int32([1, 1, 3]), "0 at the start", "1"),
+    ("influence_offsets", np.int32([-1, 1, 3]), "0 at the start", "-1"),
+    ("influence_offsets", np.int32([0, 4, 3]), "values that never fall", "3 after 4 at vertex 1"),
+    ("influence_offsets", np.int32([0, -1, 3]), "values that never fall", "-1 after 0 at vertex 0"),
+    ("influence_offsets", np.int32([0, 1, 2]), "3 at the end (the number of influences)", "2"),
+    ("influence_offsets", np.int32([0, 1, 4]), "3 at the end (the number of influences)", "4"),
+    ("influence_bones", np.int64([0, 0, 1]), BONES, "int64 [3]"),
+    ("influence_bones", np.uint32([0, 0, 1]), BONES, "uint32 [3]"),
+    ("influence_bones", np.int32([[0, 0, 1]]), BONES, "int32 [1, 3]"),
+    ("influence_bones", [0, 0, 1], BONES, "list"),
+    ("influence_bones", np.int32([0, -1, 1]), "indices of bones, 0 or more", "-1 at influence 1"),
+    ("influence_weights", np.float64([1, 0.5, 0.5]), WEIGHTS, "float64 [3]"),
+    ("influence_weights", np.float32([[1, 0.5, 0.5]]), WEIGHTS, "float32 [1, 3]"),
+    ("influence_weights", (1, 0.5, 0.5), WEIGHTS, "tuple"),
+    ("influence_weights", np.float32([1, 1]), "one for each of the 3 influence_bones", "2"),
+    ("influence_weights", np.float32([1, -0.5, 1]), FINITE_WEIGHTS, "-0.500000 at influence 1"),
+    ("influence_weights", np.float32([NAN, 1, 1]), FINITE_WEIGHTS, "nan at influence 0"),
+    ("influence_weights", np.float32([1, 1, INF]), FINITE_WEIGHTS, "inf at influence 2"),
+    ("method", "DQ", "one of lbs, qv, dq", "'DQ'"),
+    ("method", "", "one of lbs, qv, dq", "''"),
+    ("rest_bones", bones().astype(np.float64), AFFINES, "float64 [2, 4, 4]"),
+    ("rest_bones", bones()[0], AFFINES, "float32 [4, 4]"),
+    ("rest_bones", bones()[:, :, :3], AFFINES, "float32 [2, 4, 3]"),
+    ("rest_bones", bones()[:, :2], AFFINES, "float32 [2, 2, 4]"),
+    ("rest_bones", bones().tolist(), AFFINES, "list"),
+    ("rest_bones", spoilt(bones(), (1, 0, 3), NAN), "finite values", "NaN or infinity at index 1"),
+    ("rest_bones", bones(1), "at least 2 bones", "1"),
+]
+
+
+@pytest.mark.parametrize(("argument", "value", "wanted", "got"), CONSTRUCTOR)
+def test_constructor_refuses(argument, value, wanted, got):
+    message = refusal(sinew.Deformer, **{**good(), argument: value})
+    assert message == f"{argument}: expected {wanted}, got {got}"
+
+
+def test_method_that_is_no_text_is_a_type_error():
+    with pytest.raises(TypeError, match="method"):
+        sinew.Deformer(**{**good(), "method": 3})
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted", "got"),
+    [
+        (np.zeros((3, 3), np.float32), "2 points", "3"),
+        (np.zeros((2, 3), np.float64), POINTS, "float64 [2, 3]"),
+        (np.zeros((2, 2), np.float32), POINTS, "float32 [2, 2]"),
+        ([[0, 0, 0], [1, 1, 1]], POINTS, "list"),
+        (np.float32([[0, 0, 0], [0, INF, 0]]), "finite values", "NaN or infinity at vertex 1"),
+    ],
+)
+def test_set_rest_points_refuses_and_keeps_the_old(value, wanted, got):
+    deformer = sinew.Deformer(**good())
+    assert refusal(deformer.set_rest_points, value) == f"rest_points: expected {wanted}, got {got}"
+    np.testing.assert_array_equal(deformer.deform(bones()), good()["rest_points"])
+
+
+def read_only():
+    array = np.zeros((2, 3), np.float32)
+    array.setflags(write=False)
+    return array
+
+
+OUT = "writable C-contiguous float32 [2, 3]"
+AFFINE = "float32 [4, 4] or [3, 4]"
+THREADS = "None or 1 or more"
+
+DEFORM = [
+    ("bone_transforms", bones(1), "at least 2 bones", "1"),
+    ("bone_transforms", bones(0), "at least 2 bones", "0"),
+    ("bone_transforms", bones().astype(np.float64), AFFINES, "float64 [2, 4, 4]"),
+    ("bone_transforms", bones()[0], AFFINES, "float32 [4, 4]"),
+    ("bone_transforms", bones().reshape(2, 16), AFFINES, "float32 [2, 16]"),
+    ("bone_transforms", bones().reshape(2, 2, 8), AFFINES, "float32 [2, 2, 8]"),
+    ("bone_transforms", bones().tolist(), AFFINES, "list"),
+    ("bone_transforms", None, AFFINES, "NoneType"),
+    ("bone_transforms", spoilt(bones(), (1, 2, 3), NAN), "finite values", "NaN or infinity at index 1"),
+    ("bone_transforms", spoilt(bones(), (0, 0, 0), INF), "finite values", "NaN or infinity at index 0"),
+    ("out", np.zeros((3, 3), np.float32), OUT, "float32 [3, 3]"),
+    ("out", np.zeros((2, 4), np.float32), OUT, "float32 [2, 4]"),
+    ("out", np.zeros(6, np.float32), OUT, "float32 [6]"),
+    ("out", np.zeros((2, 3), np.float64), OUT, "float64 [2, 3]"),
+    ("out", np.zeros((2, 3), np.float32, order="F"), OUT, "one that is not C-contiguous"),
+    ("out", np.zeros((4, 3), np.float32)[::2], OUT, "one that is not C-contiguous"),
+    ("out", read_only(), OUT, "a read-only array"),
+    ("out", [[0, 0, 0], [0, 0, 0]], OUT, "list"),
+    ("threads", 0, THREADS, "0"),
+    ("threads", -3, THREADS, "-3"),
+    ("threads", -(10**30), THREADS, str(-(10**30))),
+    ("threads", 2.0, THREADS, "float"),
+    ("threads", "2", THREADS, "str"),
+    ("bones_from_model", np.eye(4), AFFINE, "float64 [4, 4]"),
+    ("bones_from_model", np.eye(3, dtype=np.float32), AFFINE, "float32 [3, 3]"),
+    ("bones_from_model", bones(), AFFINE, "float32 [2, 4, 4]"),
+    ("bones_from_model", bones()[0].tolist(), AFFINE, "list"),
+    ("bones_from_model", spoilt(bones()[0], (2, 3), NAN), "finite values", "NaN or infinity"),
+    ("bones_from_model", np.zeros((4, 4), np.float32), "an invertible transform", "one of determinant 0"),
+    ("bones_from_model", spoilt(bones()[0], (1, 1), 0), "an invertible transform", "one of determinant 0"),
+]
+
+
+@pytest.mark.parametrize(("argument", "value", "wanted", "got"), DEFORM)
+def test_deform_refuses(argument, value, wanted, got):
+    deformer = sinew.Deformer(**good())
+    message = refusal(deformer.deform, **{"bone_transforms": bones(), argument: value})
+    assert message == f"{argument}: expected {wanted}, got {got}"
+
+
+def test_a_refused_call_leaves_out_alone():
+    out = np.full((2, 3), 7.0, np.float32)
+    refusal(sinew.Deformer(**good()).deform, bones(1), out=out)
+    refusal(sinew.Deformer(**good()).deform, bones(), out=out, threads=0)
+    assert (out == 7.0).all()
