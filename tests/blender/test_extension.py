@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The zip that people install, installed as they do: into Blenders that have nothing else of Sinew."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import zipfile
+from pathlib import Path
+
+import bpy
+import pytest
+import scenes
+from conftest import REPOSITORY
+
+INSTALL = """
+import json, sys
+sys.path.append(sys.argv[1])
+import addon_utils, bpy
+import numpy as np
+
+addon_utils.enable("bl_pkg")
+bpy.ops.wm.open_mainfile(filepath=sys.argv[3])
+bpy.ops.extensions.package_install_files(filepath=sys.argv[2], repo="user_default", enable_on_install=True)
+obj = bpy.data.objects["Arm"]
+bpy.context.view_layer.objects.active = obj
+bpy.ops.sinew.add()
+obj.sinew.method = "dq"
+bpy.context.scene.frame_set(11)
+mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+mesh.vertices.foreach_get("co", points.ravel())
+np.save(sys.argv[4], points)
+import sinew
+facts = {
+    "library": sinew.__file__,
+    "error": obj.sinew.error,
+    "panel": bpy.types.SINEW_PT_main.bl_category,
+    "modules": sorted(m for m in sys.modules if m.startswith("bl_ext")),
+}
+print("FACTS " + json.dumps(facts))
+module = next(m for m in facts["modules"] if m.endswith(".sinew"))
+addon_utils.disable(module)
+assert not hasattr(bpy.types.Object, "sinew")
+addon_utils.enable(module)
+bpy.context.scene.frame_set(10)
+assert not obj.sinew.error
+addon_utils.disable(module)
+"""
+
+
+@pytest.fixture
+def package() -> Path:
+    path = os.environ.get("SINEW_PACKAGE")
+    if not path:
+        pytest.skip("SINEW_PACKAGE is not set: the zip is not tested; ./dev package builds it")
+    return Path(path)
+
+
+@pytest.fixture
+def bare_site(tmp_path) -> Path:
+    """This Python's packages without anything of Sinew."""
+    bare = tmp_path / "site"
+    bare.mkdir()
+    for entry in Path(sysconfig.get_paths()["purelib"]).iterdir():
+        if "sinew" not in entry.name.lower() and entry.suffix != ".pth":
+            (bare / entry.name).symlink_to(entry)
+    return bare
+
+
+def test_installs_and_works_in_the_same_session(package, bare_site, tmp_path):
+    obj, _armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)[0]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    user = tmp_path / "user"
+    points = tmp_path / "points.npy"
+    result = subprocess.run(
+        [sys.executable, "-S", "-c", INSTALL, bare_site, package, tmp_path / "arm.blend", points],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"BLENDER_USER_RESOURCES": str(user)},
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
+    assert Path(facts["library"]).is_relative_to(user), "another sinew than the zip's was loaded"
+    assert facts["error"] == ""
+    assert facts["panel"] == "Sinew"
+    import numpy as np
+
+    assert scenes.worst(np.load(points), expected) <= 1e-5
+
+
+def test_the_zip_holds_what_the_platform_asks_for(package):
+    with zipfile.ZipFile(package) as archive:
+        names = archive.namelist()
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    assert len(manifest["tagline"]) <= 64
+    assert manifest["tagline"][-1].isalnum()
+    assert all(wheel.removeprefix("./") in names for wheel in manifest["wheels"])
+    assert any(f"-cp{sys.version_info.major}{sys.version_info.minor}-" in wheel for wheel in manifest["wheels"])
+    assert not [n for n in names if "numpy" in n or "__pycache__" in n or n == "pyproject.toml"]
+
+
+WITHOUT_LIBRARY = """
+import sys
+sys.modules["sinew"] = None
+import bpy, sinew_addon
+from sinew_addon.blender import native
+sinew_addon.register()
+assert "does not load" in native.load_error(), native.load_error()
+assert bpy.types.SINEW_PT_unavailable.bl_category == "Sinew"
+assert not hasattr(bpy.types.Object, "sinew")
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+sinew_addon.unregister()
+"""
+
+
+def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "qv")
+    before, after = tmp_path / "before.blend", tmp_path / "after.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(before))
+    subprocess.run([sys.executable, "-c", WITHOUT_LIBRARY, before, after], check=True, timeout=60)
+    bpy.ops.wm.open_mainfile(filepath=str(after))
+    assert bpy.data.objects["Arm"].sinew.method == "qv"
+    bpy.context.scene.frame_set(7)
+    assert not bpy.data.objects["Arm"].sinew.error
+
+
+def test_a_whole_blender_with_its_window(package, tmp_path, real_rig):
+    """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
+    program = os.environ.get("SINEW_FULL_BLENDER")
+    if not program:
+        pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
+    if bpy.app.version < (5, 2):
+        pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
+    # The whole Blender sees the temporary folder, not this checkout's neighbours.
+    shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
+    shutil.copy(package, tmp_path / "sinew.zip")
+    shutil.copy(REPOSITORY / "docs" / "photograph_panel.py", tmp_path / "photograph_panel.py")
+    result = subprocess.run(
+        [program, "run", "--factory-startup", "--python-exit-code", "3", "human.blend",
+         "--python", "photograph_panel.py", "--", "sinew.zip", "panel.png"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=400,
+        check=False,
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+    )
+    assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
+    facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
+    assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
+    assert facts["error"] == ""
+    assert (tmp_path / "panel.png").stat().st_size > 20_000
