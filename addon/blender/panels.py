@@ -3,39 +3,19 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
-from . import handlers, native, operators, properties
+from . import handlers, operators, properties
+from .sidebar import Sidebar, draw_text
 
-# Characters of the interface font that fit a pixel of sidebar at scale 1; a label is not wrapped by Blender.
-CHARACTERS_PER_PIXEL = 0.14
-
-
-class _Sidebar:
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Sinew"
-
-
-class SINEW_PT_unavailable(_Sidebar, bpy.types.Panel):
-    """Stands in for everything where the native library does not load."""
-
-    bl_label = "Sinew"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        _draw_text(self.layout, context, native.load_error() or "Restart Blender to use Sinew", icon="ERROR")
-
-
-class SINEW_PT_main(_Sidebar, bpy.types.Panel):
+class SINEW_PT_main(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         meshes = operators.targets(context)
         if not meshes:
-            _draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
+            draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
             return
         driven = [obj for obj in meshes if properties.is_driven(obj)]
         if len(driven) < len(meshes):
@@ -51,7 +31,7 @@ class SINEW_PT_main(_Sidebar, bpy.types.Panel):
             row.operator("sinew.rebind", icon="FILE_REFRESH")
             row.operator("sinew.remove", icon="X")
             if not context.scene.render.use_lock_interface:
-                _draw_text(layout, context, "Before rendering in this window, lock the interface:", icon="INFO")
+                draw_text(layout, context, "Before rendering in this window, lock the interface:", icon="INFO")
                 layout.prop(context.scene.render, "use_lock_interface")
 
 
@@ -61,9 +41,9 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
     if settings.error:
-        _draw_text(layout, context, settings.error, icon="ERROR", alert=True)
+        draw_text(layout, context, settings.error, icon="ERROR", alert=True)
     layout.prop(settings, "method", text="")
-    _draw_text(layout, context, properties.METHODS[settings.method].description)
+    draw_text(layout, context, properties.METHODS[settings.method].description)
 
 
 def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
@@ -85,24 +65,7 @@ def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy
         split.label(text=value)
     if state is not None:
         for warning in state.facts.warnings:
-            _draw_text(layout, context, warning, icon="ERROR")
-
-
-def _draw_text(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    text: str,
-    icon: str = "NONE",
-    alert: bool = False,
-) -> None:
-    """Text broken into as many labels as the sidebar's width asks for."""
-    scale = context.preferences.system.ui_scale
-    width = max(20, int(context.region.width / scale * CHARACTERS_PER_PIXEL))
-    column = layout.column(align=True)
-    column.alert = alert
-    column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, width)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
+            draw_text(layout, context, warning, icon="ERROR")
 
 
 CLASSES = (SINEW_PT_main,)

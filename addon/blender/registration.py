@@ -21,9 +21,9 @@ def register() -> None:
     if native.load_error() is not None:
         # Properties would need the table of methods: without the library only the reason is shown, and what
         # a file holds of Sinew stays in it untouched.
-        from . import panels
+        from . import sidebar
 
-        _register_classes((panels.SINEW_PT_unavailable,))
+        _register_classes((sidebar.SINEW_PT_unavailable,))
         return
     from . import handlers, operators, panels, properties
 

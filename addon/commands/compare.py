@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.compare import Column, close_view, whole_view, write_sheet
+from ..core.compare import Column, close_view, require_pillow, whole_view, write_sheet
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.metrics import volume
@@ -43,6 +43,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     from ..blender import evaluate, files, render
 
+    require_pillow()
     methods = [name.strip() for name in args.methods.split(",")]
     evaluate.check_methods(methods)
     frames = parse_frames(args.frame)

@@ -18,7 +18,7 @@ MARGIN = 16
 # A little to the character's left and above, from Blender's front (-Y).
 VIEW_DIRECTION = np.array([0.45, -1.0, 0.22])
 # Close-ups show this part of the mesh's diagonal.
-CLOSE_UP = 0.16
+CLOSE_UP = 0.22
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,17 @@ def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return right, np.cross(direction, right)
 
 
+def require_pillow() -> None:
+    """Raises SinewError where Pillow is missing, as in Blender's own Python."""
+    try:
+        import PIL  # noqa: F401
+    except ImportError:
+        raise SinewError(
+            "comparison sheets need Pillow, which this Python does not have; "
+            "install sinew-blender in a Python of its own and run `sinew compare` there"
+        ) from None
+
+
 @dataclass(frozen=True)
 class Column:
     """One method's part of the sheet: its name, a line about it, and its pictures from top to bottom."""
@@ -105,15 +116,10 @@ class Column:
 def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str], path: Path) -> None:
     """Puts the pictures side by side, labelled, into one PNG; beside `path` first, then renamed.
 
-    Raises SinewError where Pillow is missing or the file can not be written.
+    Requires Pillow. Raises SinewError where the file can not be written.
     """
-    try:
-        from PIL import Image, ImageDraw, ImageFont
-    except ImportError:
-        raise SinewError(
-            "comparison sheets need Pillow, which this Python does not have; "
-            "install sinew-blender in a Python of its own and run `sinew compare` there"
-        ) from None
+    from PIL import Image, ImageDraw, ImageFont
+
     large, small = ImageFont.load_default(size=24), ImageFont.load_default(size=17)
     pictures = [[Image.open(picture).convert("RGBA") for picture in column.pictures] for column in columns]
     cell = pictures[0][0].width

@@ -21,7 +21,8 @@ from conftest import REPOSITORY
 INSTALL = """
 import json, sys
 sys.path.append(sys.argv[1])
-import addon_utils, bpy
+import bpy
+import addon_utils
 import numpy as np
 
 addon_utils.enable("bl_pkg")
