@@ -9,25 +9,45 @@ import numpy as np
 from ..core.rig import Bones
 
 
-def read_bones(armature: bpy.types.Object) -> Bones:
-    """The rest bones of an armature object, in the order of its pose."""
-    bones = armature.data.bones
+def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
+    """The rest bones of an evaluated armature object in the order of its pose, and the joints of bendy ones."""
+    bones = evaluated_armature.data.bones
     deform = np.empty(len(bones), dtype=bool)
+    lengths = np.empty(len(bones), dtype=np.float32)
+    segments = np.empty(len(bones), dtype=np.int32)
     bones.foreach_get("use_deform", deform)
-    return Bones(tuple(bone.name for bone in bones), deform, _read_matrices(bones, "matrix_local"))
+    bones.foreach_get("length", lengths)
+    bones.foreach_get("bbone_segments", segments)
+    rest = _read_matrices(bones, "matrix_local")
+    first_joints = np.full(len(bones), -1, dtype=np.int32)
+    parts, count = [rest], len(bones)
+    for bone in np.flatnonzero(segments > 1):
+        first_joints[bone] = count
+        parts.append(_read_joints(evaluated_armature, rest, int(bone), int(segments[bone]), at_rest=True))
+        count += segments[bone] + 1
+    return Bones(
+        tuple(bone.name for bone in bones), deform, np.concatenate(parts), lengths, segments, first_joints
+    )
 
 
 def rest_changed(armature: bpy.types.Object, known: Bones) -> bool:
     """Whether the rest bones differ from `known` in number or place; cheap enough for every frame."""
     bones = armature.data.bones
-    return len(bones) != len(known.names) or not np.array_equal(
-        _read_matrices(bones, "matrix_local"), known.rest
-    )
+    count = len(known.names)
+    return len(bones) != count or not np.array_equal(_read_matrices(bones, "matrix_local"), known.rest[:count])
 
 
-def read_pose(evaluated_armature: bpy.types.Object) -> np.ndarray:
-    """float32 [bones, 4, 4]: each posed bone in armature space."""
-    return _read_matrices(evaluated_armature.pose.bones, "matrix")
+def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
+    """float32 [bones + joints, 4, 4]: each posed bone in armature space, then the joints of `bones`."""
+    pose = _read_matrices(evaluated_armature.pose.bones, "matrix")
+    if not bones.bend:
+        return pose
+    parts = [pose]
+    for bone in np.flatnonzero(bones.segments > 1):
+        parts.append(
+            _read_joints(evaluated_armature, pose, int(bone), int(bones.segments[bone]), at_rest=False)
+        )
+    return np.concatenate(parts)
 
 
 def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarray:
@@ -35,6 +55,15 @@ def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarra
     bones.foreach_get(name, flat)
     # Blender hands matrices over by columns.
     return flat.reshape(-1, 4, 4).transpose(0, 2, 1)
+
+
+def _read_joints(
+    evaluated_armature: bpy.types.Object, matrices: np.ndarray, bone: int, segments: int, at_rest: bool
+) -> np.ndarray:
+    """float32 [segments + 1, 4, 4]: a bendy bone's joints in armature space, from its matrix there."""
+    pose_bone = evaluated_armature.pose.bones[bone]
+    joints = [np.array(pose_bone.bbone_segment_matrix(k, rest=at_rest)) for k in range(segments + 1)]
+    return (matrices[bone].astype(np.float64) @ np.stack(joints)).astype(np.float32)
 
 
 def bones_from_model(evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object) -> np.ndarray:

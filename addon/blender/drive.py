@@ -129,9 +129,9 @@ def remove(obj: bpy.types.Object) -> None:
         modifier.show_render = settings.show_render
     nodes = sinew_modifier(obj)
     if nodes is not None:
-        active = obj.modifiers.active
+        active = obj.modifiers.active if obj.modifiers.active != nodes else modifier
         obj.modifiers.remove(nodes)
-        if active != nodes and active is not None:
+        if active is not None:
             obj.modifiers.active = active
     name = settings.attribute
     if not any(_uses_attribute(other, obj.data, name) for other in bpy.data.objects if other != obj):

@@ -16,7 +16,8 @@ from ..core.influences import GroupWeights, build_influences
 from ..core.rig import RigFacts, describe_rig
 from ..core.session import Binding, Frame
 from ..core.shape_keys import ShapeKeys
-from . import armature_io, drive, mesh_io, pose_driver, properties
+from . import armature_io, drive, mesh_io, modifier_options, pose_driver, properties
+from .modifier_options import ModifierOptions
 
 log = logging.getLogger("sinew")
 
@@ -26,6 +27,7 @@ class Driven:
     """What is known of one driven object between events; made again whenever it may be out of date."""
 
     armature: int  # its session_uid
+    options: ModifierOptions
     binding: Binding
     facts: RigFacts
     group_names: list[str]
@@ -173,12 +175,12 @@ def _update_object(
         )
     if armature.mode == "EDIT":
         return
-    driven = _current(obj, armature, changes)
     evaluated = obj.evaluated_get(depsgraph)
     evaluated_armature = armature.evaluated_get(depsgraph)
+    driven = _current(obj, armature, evaluated_armature, changes)
     frame = Frame(
         method=evaluated.sinew.method,
-        pose=armature_io.read_pose(evaluated_armature),
+        pose=armature_io.read_pose(evaluated_armature, driven.binding.bones),
         bones_from_model=armature_io.bones_from_model(evaluated, evaluated_armature),
         rest_points=_rest_points(obj, driven, depsgraph),
     )
@@ -188,16 +190,25 @@ def _update_object(
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
 
 
-def _current(obj: bpy.types.Object, armature: bpy.types.Object, changes: _Changes) -> Driven:
-    """The object's state, bound anew where its mesh, weights or bones changed."""
+def _current(
+    obj: bpy.types.Object,
+    armature: bpy.types.Object,
+    evaluated_armature: bpy.types.Object,
+    changes: _Changes,
+) -> Driven:
+    """The object's state, bound anew where its mesh, weights, bones or modifier changed."""
     driven = session.driven.get(obj.session_uid)
-    if driven is None or driven.armature != armature.session_uid:
-        return _bind(obj, armature)
+    modifier = drive.armature_modifier(obj)
+    if modifier is None:
+        raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
+    options = ModifierOptions.read(modifier)
+    if driven is None or driven.armature != armature.session_uid or driven.options != options:
+        return _bind(obj, armature, evaluated_armature, options)
     mesh = obj.data
     keys = mesh.shape_keys
     bones_changed = armature_io.rest_changed(armature, driven.binding.bones)
     if armature.data.session_uid in changes.armatures and not bones_changed:
-        bones = armature_io.read_bones(armature)
+        bones = armature_io.read_bones(evaluated_armature)
         _follow_renamed_bones(obj, driven.binding.bones.names, bones.names)
         bones_changed = not bones.equals(driven.binding.bones)
     regrouped = (
@@ -207,32 +218,40 @@ def _current(obj: bpy.types.Object, armature: bpy.types.Object, changes: _Change
     by_keys = keys is not None and keys.session_uid in changes.keys
     touched = mesh.session_uid in changes.meshes and not by_keys
     if bones_changed or regrouped or touched or len(mesh.vertices) != len(driven.rest_points):
-        return _bind(obj, armature, driven)
+        return _bind(obj, armature, evaluated_armature, options, driven)
     return driven
 
 
-def _bind(obj: bpy.types.Object, armature: bpy.types.Object, old: Driven | None = None) -> Driven:
+def _bind(
+    obj: bpy.types.Object,
+    armature: bpy.types.Object,
+    evaluated_armature: bpy.types.Object,
+    options: ModifierOptions,
+    old: Driven | None = None,
+) -> Driven:
     """Reads mesh, weights and bones; keeps the old binding where they came out the same."""
-    bones = armature_io.read_bones(armature)
+    bones = armature_io.read_bones(evaluated_armature)
     weights = mesh_io.read_group_weights(obj.data)
     names = [group.name for group in obj.vertex_groups]
     points = mesh_io.read_points(obj.data.vertices)
     keys = mesh_io.read_shape_keys(obj, weights)
-    same = (
+    if (
         old is not None
         and names == old.group_names
         and bones.equals(old.binding.bones)
         and weights.equals(old.weights)
-    )
-    if same:
-        old.rest_points, old.shape_keys, old.key_values = points, keys, None
-        old.mixed_points = None
+    ):
+        old.rest_points, old.shape_keys = points, keys
+        old.key_values = old.mixed_points = None
         return old
-    influences = build_influences(weights, bones.of_groups(names))
+    influences = build_influences(options.groups(weights), bones.of_groups(names))
     facts = describe_rig(influences, bones, names)
-    driven = Driven(armature.session_uid, Binding(bones, influences), facts, names, weights, points, keys)
+    modifier = drive.armature_modifier(obj)
+    facts = facts.with_warnings(modifier_options.differences(obj, modifier, armature, facts.bare_vertices))
+    binding = Binding(bones, influences, options.mask_weights(obj, weights))
+    driven = Driven(armature.session_uid, options, binding, facts, names, weights, points, keys)
     session.driven[obj.session_uid] = driven
-    pose_driver.ensure(obj, armature, driven.binding.moving_bones)
+    pose_driver.ensure(obj, armature, binding.moving_bones)
     return driven
 
 

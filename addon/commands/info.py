@@ -57,7 +57,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
                 "bones_with_weights": facts.weighted_bones,
                 "influences_mean": round(facts.mean_influences, 4),
                 "influences_most": facts.most_influences,
-                "warnings": [*facts.warnings, *survey.obstacles(obj)],
+                "warnings": list(facts.warnings),
             }
         )
     return meshes

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .bendy import spread_over_joints
 from .influences import Influences
 
 NAMES_SHOWN = 5
@@ -14,28 +15,55 @@ NAMES_SHOWN = 5
 
 @dataclass(frozen=True)
 class Bones:
-    """The bones of an armature at rest.
+    """The bones of an armature at rest, and after them the joints of those that bend.
 
-    names    all bones, in Blender's order
-    deform   bool [bones], those that may move vertices
-    rest     float32 [bones, 4, 4], armature space, Y along the bone
+    names         all bones, in Blender's order
+    deform        bool [bones], those that may move vertices
+    rest          float32 [bones + joints, 4, 4], armature space, Y along the bone
+    lengths       float32 [bones]
+    segments      int32 [bones], 1 for a bone that does not bend
+    first_joints  int32 [bones], where in `rest` the segments + 1 joints of a bending bone begin
     """
 
     names: tuple[str, ...]
     deform: np.ndarray
     rest: np.ndarray
+    lengths: np.ndarray
+    segments: np.ndarray
+    first_joints: np.ndarray
+
+    @property
+    def bend(self) -> bool:
+        return bool((self.segments > 1).any())
+
+    @property
+    def rest_axes(self) -> np.ndarray:
+        """`rest` with axes of unit length: a bendy bone's joints can be scaled at rest."""
+        axes = self.rest.copy()
+        lengths = np.linalg.norm(axes[:, :3, :3], axis=1, keepdims=True)
+        axes[:, :3, :3] /= np.where(lengths > 0.0, lengths, 1.0)
+        return axes
 
     def equals(self, other: Bones) -> bool:
         return (
             self.names == other.names
             and np.array_equal(self.deform, other.deform)
             and np.array_equal(self.rest, other.rest)
+            and np.array_equal(self.segments, other.segments)
         )
 
     def of_groups(self, group_names: list[str]) -> np.ndarray:
         """int32 [groups]: the deforming bone of each group's name, -1 for none."""
         index = {name: bone for bone, name in enumerate(self.names) if self.deform[bone]}
         return np.array([index.get(name, -1) for name in group_names], dtype=np.int32).reshape(-1)
+
+    def spread(self, influences: Influences, points: np.ndarray) -> Influences:
+        """Influences over bones and joints, for rest points in armature space."""
+        if not self.bend:
+            return influences
+        return spread_over_joints(
+            influences, points, self.rest[: len(self.names)], self.lengths, self.segments, self.first_joints
+        )
 
 
 @dataclass(frozen=True)
@@ -45,9 +73,13 @@ class RigFacts:
     vertices: int
     bones: int
     weighted_bones: int
+    bare_vertices: int
     mean_influences: float
     most_influences: int
     warnings: tuple[str, ...]
+
+    def with_warnings(self, more: list[str]) -> RigFacts:
+        return replace(self, warnings=(*self.warnings, *more))
 
 
 def describe_rig(influences: Influences, bones: Bones, group_names: list[str]) -> RigFacts:
@@ -64,6 +96,7 @@ def describe_rig(influences: Influences, bones: Bones, group_names: list[str]) -
         vertices=len(counts),
         bones=len(bones.names),
         weighted_bones=len(np.unique(influences.bones)),
+        bare_vertices=bare,
         mean_influences=float(counts.mean()) if len(counts) else 0.0,
         most_influences=int(counts.max(initial=0)),
         warnings=tuple(warnings),

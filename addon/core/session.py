@@ -18,7 +18,7 @@ class Frame:
     """What decides the shape of one frame.
 
     method            name of a method
-    pose              float32 [bones, 4, 4], armature space, as Blender gives it
+    pose              float32 [bones + joints, 4, 4], armature space, as Blender gives it
     bones_from_model  float64 [4, 4], takes the mesh's object space to armature space
     rest_points       float32 [vertices, 3], object space, shape keys applied
     """
@@ -32,9 +32,11 @@ class Frame:
 class Binding:
     """A mesh bound to bones. Deforms when a frame differs from the last, and says how long it took."""
 
-    def __init__(self, bones: Bones, influences: Influences) -> None:
+    def __init__(self, bones: Bones, influences: Influences, mask: np.ndarray | None = None) -> None:
+        """mask: float32 [vertices], the share of the deformation each vertex takes; None for all of it."""
         self.bones = bones
         self.influences = influences
+        self.mask = mask
         self._rest_from_armature = np.linalg.inv(bones.rest.astype(np.float64))
         self._deformer: sinew.Deformer | None = None
         self._last: Frame | None = None
@@ -45,10 +47,6 @@ class Binding:
     def moving_bones(self) -> list[str]:
         """Names of the bones that move at least one vertex."""
         return [self.bones.names[bone] for bone in np.unique(self.influences.bones)]
-
-    def forget_frame(self) -> None:
-        """The next frame is deformed even if it equals the last, as after undo."""
-        self._last = None
 
     def deform(self, frame: Frame) -> np.ndarray | None:
         """Deformed points float32 [vertices, 3] in object space, valid until the next call; None where the
@@ -66,22 +64,35 @@ class Binding:
             out=self._points,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
         )
+        if self.mask is not None:
+            self._points -= frame.rest_points
+            self._points *= self.mask[:, None]
+            self._points += frame.rest_points
         self._last = frame
         self.milliseconds = 1000.0 * (time.perf_counter() - started)
         return self._points
 
     def _bound(self, frame: Frame) -> sinew.Deformer:
-        if self._deformer is None or self._deformer.method != frame.method:
+        last = self._last
+        reshaped = last is None or frame.rest_points is not last.rest_points
+        # Which joints of a bendy bone move a vertex depends on where it lies along the bone.
+        moved = reshaped or not np.array_equal(frame.bones_from_model, last.bones_from_model)
+        deformer = self._deformer
+        if deformer is None or deformer.method != frame.method or (self.bones.bend and moved):
+            space = frame.bones_from_model
+            influences = self.bones.spread(
+                self.influences, frame.rest_points @ space[:3, :3].T + space[:3, 3]
+            )
             self._deformer = sinew.Deformer(
                 frame.rest_points,
-                self.influences.offsets,
-                self.influences.bones,
-                self.influences.weights,
+                influences.offsets,
+                influences.bones,
+                influences.weights,
                 frame.method,
-                rest_bones=self.bones.rest,
+                rest_bones=self.bones.rest_axes,
             )
-        elif self._last is None or frame.rest_points is not self._last.rest_points:
-            self._deformer.set_rest_points(frame.rest_points)
+        elif reshaped:
+            deformer.set_rest_points(frame.rest_points)
         return self._deformer
 
 

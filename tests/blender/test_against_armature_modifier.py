@@ -192,3 +192,46 @@ def test_every_method_follows_rigid_motion(method):
     motion = np.array(root.matrix @ root.bone.matrix_local.inverted())
     expected = scenes.rest_points(obj) @ motion[:3, :3].T + motion[:3, 3]
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (1.2, 0.7, 1.4)])
+@pytest.mark.parametrize("placed", [False, True])
+def test_bendy_bones(scale, placed):
+    obj, armature = scenes.make_arm(bones=3)
+    for bone, segments in zip(armature.data.bones, (5, 8, 1), strict=True):
+        bone.bbone_segments = segments
+        bone.bbone_curveinx, bone.bbone_curveoutz = 0.1, -0.15
+    pose = armature.pose.bones
+    pose[0].bbone_rollout, pose[1].bbone_curveoutx = 0.8, 0.4
+    pose[1].bbone_scalein = (1.3, 1.0, 0.8)
+    pose[1].scale = scale
+    if placed:
+        obj.location, obj.scale = (0.3, 0.1, -0.2), (1.0, 0.8, 1.1)
+        armature.rotation_euler = (0.1, 0.2, 0.3)
+    bpy.context.view_layer.update()
+    assert_equal_to_modifier(obj, [1, 5, 11])
+
+
+def test_bendy_bones_of_a_hidden_armature():
+    obj, armature = scenes.make_arm(bones=3)
+    for bone in armature.data.bones:
+        bone.bbone_segments = 6
+    armature.hide_viewport = armature.hide_render = True
+    bpy.context.view_layer.update()
+    assert_equal_to_modifier(obj, [1, 5, 11])
+
+
+@pytest.mark.parametrize("invert", [False, True])
+@pytest.mark.parametrize("mask", ["bone.1", "half", "no such group"])
+def test_masks(mask, invert):
+    obj, _armature = scenes.make_arm()
+    obj.vertex_groups.new(name="half").add(list(range(0, 200, 2)), 0.5, "REPLACE")
+    obj.modifiers["Armature"].vertex_group = mask
+    obj.modifiers["Armature"].invert_vertex_group = invert
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_vertex_groups_switched_off():
+    obj, _armature = scenes.make_arm()
+    obj.modifiers["Armature"].use_vertex_groups = False
+    assert_equal_to_modifier(obj, [1, 11])

@@ -405,3 +405,38 @@ def test_unregister_gives_the_modifiers_their_armatures():
         sinew_addon.register()
     bpy.context.scene.frame_set(10)
     assert_follows(obj)
+
+
+def test_options_of_the_modifier_changed_while_at_work():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(11)
+    obj.modifiers["Armature"].vertex_group = "bone.1"
+    bpy.context.scene.frame_set(10)
+    assert_follows(obj)
+
+
+def test_deleted_armature_modifier_turns_the_mesh_off_with_a_sentence():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    obj.modifiers.remove(obj.modifiers["Armature"])
+    bpy.context.scene.frame_set(6)
+    assert "Armature modifier was deleted" in properties.of(obj).error
+    drive.remove(obj)
+    assert not properties.is_driven(obj)
+    assert len(obj.modifiers) == 0
+
+
+def test_what_is_not_reproduced_is_warned_of():
+    obj, armature = scenes.make_arm()
+    for group in obj.vertex_groups:
+        group.remove([0, 1])
+    obj.modifiers["Armature"].use_bone_envelopes = True
+    obj.modifiers["Armature"].use_multi_modifier = True
+    armature.data.bones[0].use_envelope_multiply = True
+    armature.data.bones[1].bbone_segments = 4
+    armature.data.bones[1].bbone_mapping_mode = "CURVED"
+    scenes.add_sinew(obj)
+    warnings = " ".join(handlers.state_of(obj).facts.warnings)
+    for words in ("2 of 252 vertices", "Multi Modifier", "envelopes", "Envelope Multiply", "curved mapping"):
+        assert words in warnings
