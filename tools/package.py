@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Puts the extension and the library's wheels into dist/sinew-VERSION.zip, and prints its path.
+
+Bundled are the wheels of this version in dist/wheels/, wherever they were built. The zip's manifest names
+them (`wheels`) and their systems (`platforms`); the same files always give the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import re
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+ADDON = ROOT / "addon"
+NOT_SHIPPED = re.compile(r"pyproject\.toml|__pycache__|build|dist|\..*|.*\.(pyc|egg-info|blend\d+|orig|rej)")
+WHEEL_NAME = re.compile(r"[^-]+-(?P<version>[^-]+)(-\d[^-]*)?-(?P<python>[^-]+)-[^-]+-(?P<system>[^-]+)\.whl")
+PLATFORMS = {
+    r"(manylinux.*|linux)_x86_64": ["linux-x64"],
+    r"(manylinux.*|linux)_aarch64": ["linux-arm64"],
+    r"macosx_.*_arm64": ["macos-arm64"],
+    r"macosx_.*_x86_64": ["macos-x64"],
+    r"macosx_.*_universal2": ["macos-arm64", "macos-x64"],
+    r"win_amd64": ["windows-x64"],
+    r"win_arm64": ["windows-arm64"],
+}
+# The earliest date that a zip can hold.
+EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+class Wheel:
+    def __init__(self, path: Path) -> None:
+        fields = WHEEL_NAME.fullmatch(path.name)
+        if fields is None:
+            raise SystemExit(f"package: {path.name} is not a wheel's name")
+        self.path = path
+        self.version, self.python = fields["version"], fields["python"]
+        # A wheel may carry several tags of one system, as manylinux_2_17_x86_64.manylinux2014_x86_64 does.
+        self.tags = fields["system"].split(".")
+
+    @property
+    def platforms(self) -> list[str]:
+        found: set[str] = set()
+        for tag in self.tags:
+            for pattern, names in PLATFORMS.items():
+                if re.fullmatch(pattern, tag):
+                    found.update(names)
+        if not found:
+            raise SystemExit(f"package: Blender has no platform for {self.path.name}")
+        return sorted(found)
+
+    @property
+    def is_portable(self) -> bool:
+        return not any(tag.startswith("linux_") for tag in self.tags)
+
+
+def recorded_wheels(stamps: Path | None) -> dict[str, tuple[str, str]]:
+    """What ./dev built itself: wheel's name -> (digest of the native sources, digest of the wheel)."""
+    records = {}
+    for stamp in sorted(stamps.glob("wheel-*")) if stamps else []:
+        inputs, name, digest = stamp.read_text().splitlines()
+        records[name] = (inputs.split()[-1], digest)
+    return records
+
+
+def select_wheels(version: str, stamps: Path | None, sources: str | None) -> list[Wheel]:
+    records = recorded_wheels(stamps)
+    chosen: dict[tuple[str, tuple[str, ...]], Wheel] = {}
+    for path in sorted((ROOT / "dist/wheels").glob("*.whl")):
+        wheel = Wheel(path)
+        if wheel.version != version:
+            continue
+        built_from, digest = records.get(path.name, (None, None))
+        # A Python that has gone since leaves its wheel behind; one put here by hand has no such record.
+        if built_from and built_from != sources and digest == hashlib.sha256(path.read_bytes()).hexdigest():
+            print(f"package: leaving out {path.name}, built from older sources", file=sys.stderr)
+            continue
+        key = (wheel.python, tuple(wheel.platforms))
+        if key not in chosen or wheel.is_portable:
+            chosen[key] = wheel
+    if not chosen:
+        raise SystemExit(f"package: dist/wheels/ holds no wheel of version {version}")
+    return [chosen[key] for key in sorted(chosen)]
+
+
+def warn_of_gaps(wheels: list[Wheel]) -> None:
+    """Blender installs a zip on each of its platforms, so each should have a wheel for the same Pythons."""
+    pythons = {wheel.python for wheel in wheels}
+    for platform in sorted({p for wheel in wheels for p in wheel.platforms}):
+        missing = pythons - {wheel.python for wheel in wheels if platform in wheel.platforms}
+        if missing:
+            print(f"package: no wheel on {platform} for {', '.join(sorted(missing))}", file=sys.stderr)
+
+
+def manifest_with_wheels(text: str, wheels: list[Wheel]) -> str:
+    before = tomllib.loads(text)
+    for key in ("wheels", "platforms"):
+        if key in before:
+            raise SystemExit(f"package: addon/blender_manifest.toml must leave {key} to packaging")
+    platforms = sorted({p for wheel in wheels for p in wheel.platforms})
+    added = "platforms = [" + ", ".join(f'"{p}"' for p in platforms) + "]\nwheels = [\n"
+    added += "".join(f'    "./wheels/{wheel.path.name}",\n' for wheel in wheels) + "]\n"
+    # A key after a table's heading would belong to that table.
+    table = re.search(r"^\[", text, re.MULTILINE)
+    at = table.start() if table else len(text)
+    result = text[:at] + added + ("\n" if table else "") + text[at:]
+    after = tomllib.loads(result)
+    listed = [f"./wheels/{wheel.path.name}" for wheel in wheels]
+    if after != before | {"wheels": listed, "platforms": platforms}:
+        raise SystemExit("package: addon/blender_manifest.toml is not written as this tool expects")
+    return result
+
+
+def shipped_files(folder: Path) -> list[Path]:
+    found: list[Path] = []
+    for entry in sorted(folder.iterdir()):
+        if NOT_SHIPPED.fullmatch(entry.name):
+            continue
+        found += shipped_files(entry) if entry.is_dir() else [entry]
+    return found
+
+
+def write_zip(target: Path, files: dict[str, bytes]) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        with zipfile.ZipFile(unfinished, "w") as archive:
+            for name in sorted(files):
+                entry = zipfile.ZipInfo(name, EPOCH)
+                entry.create_system = 3
+                entry.external_attr = 0o100644 << 16
+                # A wheel is compressed already.
+                entry.compress_type = zipfile.ZIP_STORED if name.endswith(".whl") else zipfile.ZIP_DEFLATED
+                archive.writestr(entry, files[name])
+        os.replace(unfinished, target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--stamps", type=Path, help="folder of ./dev's records of the wheels that it built")
+    parser.add_argument("--sources", help="digest of the native sources as they are now")
+    options = parser.parse_args()
+
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    manifest = (ADDON / "blender_manifest.toml").read_text()
+    if tomllib.loads(manifest)["version"] != version:
+        raise SystemExit(f"package: addon/blender_manifest.toml is not of pyproject.toml's version {version}")
+
+    wheels = select_wheels(version, options.stamps, options.sources)
+    warn_of_gaps(wheels)
+    files = {path.relative_to(ADDON).as_posix(): path.read_bytes() for path in shipped_files(ADDON)}
+    files["blender_manifest.toml"] = manifest_with_wheels(manifest, wheels).encode()
+    files["LICENSE"] = (ROOT / "LICENSE").read_bytes()
+    files |= {f"wheels/{wheel.path.name}": wheel.path.read_bytes() for wheel in wheels}
+    target = ROOT / "dist" / f"sinew-{version}.zip"
+    write_zip(target, files)
+    print(target.relative_to(ROOT).as_posix())
+
+
+if __name__ == "__main__":
+    main()
