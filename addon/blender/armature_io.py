@@ -10,7 +10,7 @@ from ..core.rig import Bones
 
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
-    """The rest bones of an evaluated armature object in the order of its pose, and the joints of bendy ones."""
+    """The rest bones of an evaluated armature object, in the order of its pose, and bendy ones' joints."""
     bones = evaluated_armature.data.bones
     deform = np.empty(len(bones), dtype=bool)
     lengths = np.empty(len(bones), dtype=np.float32)
@@ -34,7 +34,9 @@ def rest_changed(armature: bpy.types.Object, known: Bones) -> bool:
     """Whether the rest bones differ from `known` in number or place; cheap enough for every frame."""
     bones = armature.data.bones
     count = len(known.names)
-    return len(bones) != count or not np.array_equal(_read_matrices(bones, "matrix_local"), known.rest[:count])
+    return len(bones) != count or not np.array_equal(
+        _read_matrices(bones, "matrix_local"), known.rest[:count]
+    )
 
 
 def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:

@@ -59,7 +59,9 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
     """Those of `objects` that are meshes deformed by an armature, or driven by Sinew."""
-    return [o for o in objects if o.type == "MESH" and (properties.is_driven(o) or armature_of(o) is not None)]
+    return [
+        o for o in objects if o.type == "MESH" and (properties.is_driven(o) or armature_of(o) is not None)
+    ]
 
 
 def check_can_add(obj: bpy.types.Object) -> bpy.types.ArmatureModifier:

@@ -36,7 +36,11 @@ def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy
     if name is not None:
         meshes = [obj for obj in meshes if obj.name == name]
     if not meshes:
-        what = f"no mesh called {name!r} that an armature deforms" if name else "no mesh is deformed by an armature"
+        what = (
+            f"no mesh called {name!r} that an armature deforms"
+            if name
+            else "no mesh is deformed by an armature"
+        )
         raise SinewError(what)
     _show_layers(bpy.context.view_layer.layer_collection)
     for obj in meshes:

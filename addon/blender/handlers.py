@@ -141,9 +141,8 @@ def _driven_objects(changes: _Changes) -> list[bpy.types.Object]:
 def _check_armature(obj: bpy.types.Object) -> None:
     """Lets go of an armature that the artist deleted: our pointer alone would keep it in the file."""
     armature = properties.of(obj).armature
-    if armature is not None and armature.library is None and not armature.users_scene:
-        if obj.users_scene:
-            properties.of(obj).armature = None
+    if armature is not None and armature.library is None and not armature.users_collection:
+        properties.of(obj).armature = None
 
 
 def _turn_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: Exception) -> None:
@@ -170,8 +169,8 @@ def _update_object(
     armature = settings.armature
     if armature is None:
         raise SinewError(
-            f"{obj.name}: its armature was deleted; choose another in the Armature modifier and press Rebind, "
-            "or Remove"
+            f"{obj.name}: its armature was deleted; choose another in the Armature modifier and press "
+            "Rebind, or Remove"
         )
     if armature.mode == "EDIT":
         return
@@ -301,7 +300,7 @@ def on_loaded(*_args: object) -> None:
 
 @persistent
 def on_save(*_args: object) -> None:
-    """A saved file has the Armature modifiers' pointers, so that without Sinew they need only switching on."""
+    """A saved file has the Armature modifiers' pointers: without Sinew they need only switching on."""
     for obj in bpy.data.objects:
         if properties.is_driven(obj):
             drive.give_back(obj)

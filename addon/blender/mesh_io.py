@@ -29,9 +29,7 @@ def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
         for entry in entries:
             groups.append(entry.group)
             weights.append(entry.weight)
-    return GroupWeights(
-        counts, np.array(groups, dtype=np.int32), np.array(weights, dtype=np.float32)
-    )
+    return GroupWeights(counts, np.array(groups, dtype=np.int32), np.array(weights, dtype=np.float32))
 
 
 def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys | None:

@@ -44,18 +44,25 @@ class ModifierOptions:
 def differences(
     obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, armature: bpy.types.Object, bare: int
 ) -> list[str]:
-    """A sentence for each thing that the modifier does and Sinew does not; `bare` vertices have no weights."""
+    """A sentence for each thing that the modifier does and Sinew does not.
+
+    bare  how many vertices have no weights
+    """
     found = []
     deforming = [bone for bone in armature.data.bones if bone.use_deform]
     if modifier.use_multi_modifier:
         found.append(f"{modifier.name} is a Multi Modifier, which Sinew treats as a plain one")
     if modifier.use_bone_envelopes and bare:
-        found.append(f"{modifier.name} moves vertices without weights by bone envelopes, which Sinew does not")
+        found.append(
+            f"{modifier.name} moves vertices without weights by bone envelopes, which Sinew does not"
+        )
     if modifier.use_vertex_groups and any(bone.use_envelope_multiply for bone in deforming):
         found.append("Bones with Envelope Multiply: Sinew uses their weights alone")
     if any(bone.bbone_segments > 1 and bone.bbone_mapping_mode == "CURVED" for bone in deforming):
         found.append("Bendy bones with curved mapping: Sinew maps them straight")
-    others = [m.name for m in obj.modifiers if m.type == "ARMATURE" and m != modifier and m.object is not None]
+    others = [
+        m.name for m in obj.modifiers if m.type == "ARMATURE" and m != modifier and m.object is not None
+    ]
     if others:
         found.append(f"Further Armature modifiers stay Blender's: {', '.join(others)}")
     return found

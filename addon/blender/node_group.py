@@ -17,7 +17,9 @@ def get_or_make() -> bpy.types.NodeTree:
 
 
 def is_sinew(modifier: bpy.types.Modifier) -> bool:
-    return modifier.type == "NODES" and modifier.node_group is not None and bool(modifier.node_group.get(MARK))
+    return (
+        modifier.type == "NODES" and modifier.node_group is not None and bool(modifier.node_group.get(MARK))
+    )
 
 
 def remove_unused() -> None:

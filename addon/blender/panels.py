@@ -8,6 +8,7 @@ import bpy
 from . import handlers, operators, properties
 from .sidebar import Sidebar, draw_text
 
+
 class SINEW_PT_main(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
 
@@ -31,7 +32,9 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
             row.operator("sinew.rebind", icon="FILE_REFRESH")
             row.operator("sinew.remove", icon="X")
             if not context.scene.render.use_lock_interface:
-                draw_text(layout, context, "Before rendering in this window, lock the interface:", icon="INFO")
+                draw_text(
+                    layout, context, "Before rendering in this window, lock the interface:", icon="INFO"
+                )
                 layout.prop(context.scene.render, "use_lock_interface")
 
 

@@ -52,7 +52,9 @@ class SinewSettings(bpy.types.PropertyGroup):
     # The Armature modifier's own flags, given back on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True)
-    pose: bpy.props.FloatProperty(options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver")
+    pose: bpy.props.FloatProperty(
+        options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
+    )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
 

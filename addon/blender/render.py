@@ -31,7 +31,9 @@ def has_opengl() -> bool:
     else:  # bpy as a module
         command = [sys.executable, "-c", _PROBE]
     try:
-        probe = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False)
+        probe = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False
+        )
     except (OSError, subprocess.TimeoutExpired):
         return False
     return probe.returncode == 0

@@ -32,8 +32,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument("--frame", required=True, help="the frame to draw")
     parser.add_argument("--object", metavar="NAME", help="only this mesh")
     parser.add_argument("--size", type=int, default=640, help="pixels of each picture (default: %(default)s)")
-    parser.add_argument("--engine", choices=("auto", "workbench", "cycles"), default="auto",
-                        help="auto: Workbench, or Cycles where there is no OpenGL")
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "workbench", "cycles"),
+        default="auto",
+        help="auto: Workbench, or Cycles where there is no OpenGL",
+    )
     parser.add_argument("--out", required=True, type=Path, metavar="SHEET.png")
     return parser
 

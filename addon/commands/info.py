@@ -65,7 +65,9 @@ def describe_file(path: Path) -> list[dict[str, object]]:
 
 def _show(report: dict, console: Console) -> None:
     meshes = report["meshes"]
-    console.say(f"{report['file']}: {len(meshes) or 'no'} armature-deformed mesh{'' if len(meshes) == 1 else 'es'}")
+    console.say(
+        f"{report['file']}: {len(meshes) or 'no'} armature-deformed mesh{'' if len(meshes) == 1 else 'es'}"
+    )
     if not meshes:
         return
     console.table(

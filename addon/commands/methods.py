@@ -21,7 +21,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods = sinew.methods()
     if args.json:
         rows = [
-            {"name": m.name, "label": m.label, "description": m.description, "needs": m.needs} for m in methods
+            {"name": m.name, "label": m.label, "description": m.description, "needs": m.needs}
+            for m in methods
         ]
         console.say(json.dumps(rows, indent=2))
     else:

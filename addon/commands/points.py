@@ -18,8 +18,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser = subparsers.add_parser(
         "points",
         help="write the deformed vertices of chosen frames",
-        description="Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, 3], "
-        "its key the object's name, the vertices of the final evaluated mesh in object space; and an array "
+        description="Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, "
+        "3], its key the object's name: the vertices of the final evaluated mesh in object space; and an array "
         "`frames`.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
@@ -76,8 +76,8 @@ def _stack(name: str, per_frame: list[np.ndarray], frames: list[float]) -> np.nd
     for frame, points in zip(frames, per_frame, strict=True):
         if points.shape != per_frame[0].shape:
             raise SinewError(
-                f"{name}: {len(points)} vertices at frame {frame} but {len(per_frame[0])} at frame {frames[0]}; "
-                "a modifier changes the topology, ask for these frames one by one"
+                f"{name}: {len(points)} vertices at frame {frame} but {len(per_frame[0])} at frame "
+                f"{frames[0]}; a modifier changes the topology, ask for these frames one by one"
             )
     return np.stack(per_frame)
 

@@ -16,8 +16,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser = subparsers.add_parser(
         "reskin",
         help="write copies of files whose meshes are deformed by Sinew",
-        description="Writes a copy of each file in which every armature-deformed mesh uses Sinew with the method "
-        "chosen. Inputs are never written to. A folder stands for all .blend files below it.",
+        description="Writes a copy of each file in which every armature-deformed mesh uses Sinew with the "
+        "method chosen. Inputs are never written to. A folder stands for all .blend files below it.",
     )
     parser.add_argument("inputs", nargs="+", type=Path, metavar="FILE_OR_FOLDER")
     parser.add_argument("--method", required=True, help="a method of `sinew methods`")

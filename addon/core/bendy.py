@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bendy bones: a bone of n segments moves vertices by n + 1 joints along it, each vertex by the two beside it.
+"""Bendy bones: n segments move vertices by n + 1 joints along the bone, each vertex by the two beside it.
 
 Based on: what Blender's Armature modifier does for the straight mapping.
 """
@@ -50,6 +50,4 @@ def spread_over_joints(
     kept = weights.ravel() > 0.0
     offsets = np.zeros(len(counts) + 1, dtype=np.int32)
     np.cumsum(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)), out=offsets[1:])
-    return Influences(
-        offsets, slots.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32)
-    )
+    return Influences(offsets, slots.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32))

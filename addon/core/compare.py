@@ -132,7 +132,9 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
     for index, column in enumerate(columns):
         x = MARGIN + index * (cell + MARGIN)
         draw.text((x, head), _fitted(draw, column.title, large, cell), font=large, fill=TEXT)
-        draw.text((x, head + 24 + MARGIN // 2), _fitted(draw, column.note, small, cell), font=small, fill=FAINT)
+        draw.text(
+            (x, head + 24 + MARGIN // 2), _fitted(draw, column.note, small, cell), font=small, fill=FAINT
+        )
         for row, picture in enumerate(pictures[index]):
             y = head + label + row * (row_label + cell)
             draw.text((x, y), row_titles[row], font=small, fill=FAINT)

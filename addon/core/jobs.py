@@ -27,7 +27,9 @@ def plan_jobs(inputs: list[Path], out: Path) -> list[Job]:
     for given in inputs:
         if given.is_dir():
             # What an earlier run wrote below the folder is not input.
-            found = [p for p in sorted(given.rglob("*.blend")) if p.is_file() and not _is_below(p, out, given)]
+            found = [
+                p for p in sorted(given.rglob("*.blend")) if p.is_file() and not _is_below(p, out, given)
+            ]
             if not found:
                 raise SinewError(f"{given}: no .blend files in this folder")
             jobs += [Job(path, out / path.relative_to(given)) for path in found]

@@ -124,7 +124,10 @@ def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):
     assert properties.of(obj).method == "dq"
     assert scenes.worst(scenes.shapes(obj, [6, 11]), expected) <= 1e-5
     # A second run says so instead of writing over the first one's copies.
-    assert "--overwrite" in run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out", status=1).stderr
+    assert (
+        "--overwrite"
+        in run_sinew("reskin", path, "--method", "dq", "--out", tmp_path / "out", status=1).stderr
+    )
     run_sinew("reskin", path, "--method", "qv", "--out", tmp_path / "out", "--overwrite")
 
 
@@ -146,7 +149,9 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
     (folder / "truncated.blend").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     result = run_sinew("reskin", folder, "--method", "dq", "--out", tmp_path / "out", status=1)
     assert "2 of 5 files" in result.stdout
-    written = sorted(str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*") if p.is_file())
+    written = sorted(
+        str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*") if p.is_file()
+    )
     assert written == ["a good one.blend", "sub/名前.blend"]
     for name in ("empty.blend", "text.blend", "truncated.blend"):
         assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
@@ -162,12 +167,21 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["points", tmp_path / "no.blend", "--method", "dq", "--frames", "1", "--out", out], "no such file"),
         (["points", tmp_path / "empty.blend", "--method", "dq", "--frames", "1", "--out", out], "is empty"),
         (["points", tmp_path, "--method", "dq", "--frames", "1", "--out", out], "is a folder"),
-        (["points", tmp_path / "nothing.blend", "--method", "dq", "--frames", "1", "--out", out], "no mesh is deformed"),
+        (
+            ["points", tmp_path / "nothing.blend", "--method", "dq", "--frames", "1", "--out", out],
+            "no mesh is deformed",
+        ),
         (["points", path, "--method", "best", "--frames", "1", "--out", out], "expected one of"),
         (["points", path, "--method", "dq", "--frames", "9-3", "--out", out], "backwards"),
         (["points", path, "--method", "dq", "--frames", "one", "--out", out], "expected frames"),
-        (["points", path, "--method", "dq", "--frames", "1", "--object", "Leg", "--out", out], "no mesh called 'Leg'"),
-        (["compare", path, "--methods", "lbs,x", "--frame", "1", "--out", tmp_path / "a.png"], "expected one of"),
+        (
+            ["points", path, "--method", "dq", "--frames", "1", "--object", "Leg", "--out", out],
+            "no mesh called 'Leg'",
+        ),
+        (
+            ["compare", path, "--methods", "lbs,x", "--frame", "1", "--out", tmp_path / "a.png"],
+            "expected one of",
+        ),
         (["compare", path, "--frame", "1,2", "--out", tmp_path / "a.png"], "expected one frame"),
         (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
         (["info", tmp_path / "no.blend"], "no such file"),
@@ -187,7 +201,18 @@ def test_compare_draws_a_sheet(tmp_path, engine):
     out = tmp_path / "sheet.png"
     rig = REPOSITORY / "blend_files" / "wrist.blend"
     run_sinew(
-        "compare", rig, "--methods", "blender,lbs,dq", "--frame", 24, "--size", 128, "--engine", engine, "--out", out
+        "compare",
+        rig,
+        "--methods",
+        "blender,lbs,dq",
+        "--frame",
+        24,
+        "--size",
+        128,
+        "--engine",
+        engine,
+        "--out",
+        out,
     )
     with Image.open(out) as image:
         pixels = np.asarray(image.convert("L"), dtype=np.float64)

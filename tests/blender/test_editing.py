@@ -118,7 +118,7 @@ def test_the_method_can_be_keyed():
 
 
 def test_undo_and_redo():
-    obj, armature = scenes.make_arm()
+    obj, _armature = scenes.make_arm()
     bpy.ops.ed.undo_push(message="start")
     bpy.ops.sinew.add()
     properties.of(obj).method = "dq"

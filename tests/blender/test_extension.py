@@ -86,7 +86,8 @@ def test_installs_and_works_in_the_same_session(package, bare_site, tmp_path):
         text=True,
         timeout=120,
         check=False,
-        env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"BLENDER_USER_RESOURCES": str(user)},
+        env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+        | {"BLENDER_USER_RESOURCES": str(user)},
     )
     assert result.returncode == 0, result.stdout + result.stderr
     facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
@@ -105,7 +106,9 @@ def test_the_zip_holds_what_the_platform_asks_for(package):
     assert len(manifest["tagline"]) <= 64
     assert manifest["tagline"][-1].isalnum()
     assert all(wheel.removeprefix("./") in names for wheel in manifest["wheels"])
-    assert any(f"-cp{sys.version_info.major}{sys.version_info.minor}-" in wheel for wheel in manifest["wheels"])
+    assert any(
+        f"-cp{sys.version_info.major}{sys.version_info.minor}-" in wheel for wheel in manifest["wheels"]
+    )
     assert not [n for n in names if "numpy" in n or "__pycache__" in n or n == "pyproject.toml"]
 
 
@@ -148,8 +151,19 @@ def test_a_whole_blender_with_its_window(package, tmp_path, real_rig):
     shutil.copy(package, tmp_path / "sinew.zip")
     shutil.copy(REPOSITORY / "docs" / "photograph_panel.py", tmp_path / "photograph_panel.py")
     result = subprocess.run(
-        [program, "run", "--factory-startup", "--python-exit-code", "3", "human.blend",
-         "--python", "photograph_panel.py", "--", "sinew.zip", "panel.png"],
+        [
+            program,
+            "run",
+            "--factory-startup",
+            "--python-exit-code",
+            "3",
+            "human.blend",
+            "--python",
+            "photograph_panel.py",
+            "--",
+            "sinew.zip",
+            "panel.png",
+        ],
         cwd=tmp_path,
         capture_output=True,
         text=True,
