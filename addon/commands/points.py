@@ -19,8 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "points",
         help="write the deformed vertices of chosen frames",
         description="Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, "
-        "3], its key the object's name: the vertices of the final evaluated mesh in object space; and an array "
-        "`frames`.",
+        "3], its key the object's name: the vertices of the final evaluated mesh in object space; and an "
+        "array `frames`.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument(
