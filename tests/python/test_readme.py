@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The README's Python program runs, and its table of methods is the library's."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import sinew
+
+README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_python_program_deforms(capsys):
+    program = re.search(r"```python\n(.*?)```", README, re.DOTALL).group(1)
+    names = {}
+    exec(program, names)
+    points = names["deformer"].deform(names["bones"])
+    # The middle vertex turns by half of the second bone's half turn.
+    np.testing.assert_allclose(points, [[0, 1, 0], [1, 0, 1], [2, -1, 0]], atol=1e-6)
+    assert capsys.readouterr().out.startswith("[[")
+
+
+def test_the_table_names_every_method_and_no_other():
+    rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", README, re.MULTILINE)
+    assert [name for name, _text in rows] == [method.name for method in sinew.methods()]
+    for (_name, text), method in zip(rows, sinew.methods(), strict=True):
+        assert method.label.lower() in text.lower()
+        assert method.description[1:] in text
