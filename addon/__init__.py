@@ -3,12 +3,16 @@
 
 
 def register() -> None:
+    from . import cli
     from .blender import registration
 
     registration.register()
+    cli.register_command()
 
 
 def unregister() -> None:
+    from . import cli
     from .blender import registration
 
+    cli.unregister_command()
     registration.unregister()

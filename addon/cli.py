@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import sys
 
 from .core.errors import SinewError
+
+_commands: list[object] = []
 
 
 def main(argv: list[str]) -> int:
@@ -43,6 +46,22 @@ def main(argv: list[str]) -> int:
 def run() -> None:
     """Entry point of the program in plain Python."""
     sys.exit(main(sys.argv[1:]))
+
+
+def register_command() -> None:
+    """Makes `blender --command sinew` run this."""
+    import bpy
+
+    _commands.append(bpy.utils.register_cli_command("sinew", main))
+    # As in blender/registration.py: left registered at the end of a process with bpy as a module, it crashes.
+    atexit.register(unregister_command)
+
+
+def unregister_command() -> None:
+    import bpy
+
+    while _commands:
+        bpy.utils.unregister_cli_command(_commands.pop())
 
 
 def _prepare_blender() -> None:

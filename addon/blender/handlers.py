@@ -47,6 +47,7 @@ class Session:
     objects: list[bpy.types.Object] | None = None
     object_count: int = 0
     driven: dict[int, Driven] = field(default_factory=dict)
+    updating: bool = False
 
     def forget(self) -> None:
         self.objects = None
@@ -63,11 +64,25 @@ def state_of(obj: bpy.types.Object) -> Driven | None:
 
 def refresh(context: bpy.types.Context) -> None:
     """Deforms all driven objects at the current frame, as after a change of settings."""
+    if session.updating:
+        # A handler turned an object off: asking for another evaluation now could be from a render's thread.
+        return
     depsgraph = context.evaluated_depsgraph_get()
-    _update(context.scene, depsgraph, _Changes())
+    _update(depsgraph, _Changes())
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
         context.view_layer.update()
+
+
+def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    refresh(context)
+
+
+def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    settings = properties.of(obj)
+    drive.switch(obj, settings.enabled)
+    settings.error = ""
+    refresh(context)
 
 
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -112,17 +127,25 @@ class _Changes:
         return changes
 
 
-def _update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, changes: _Changes) -> None:
-    for obj in _driven_objects(changes):
+def _update(depsgraph: bpy.types.Depsgraph, changes: _Changes) -> None:
+    session.updating = True
+    try:
+        for obj in _driven_objects(changes):
+            _update_or_turn_off(obj, depsgraph, changes)
+    finally:
+        session.updating = False
+
+
+def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: _Changes) -> None:
+    try:
         settings = properties.of(obj)
-        if not settings.enabled or obj.mode == "EDIT":
-            continue
-        try:
+        if settings.enabled and obj.mode != "EDIT":
             _update_object(obj, settings, depsgraph, changes)
-        except ReferenceError:
-            session.objects = None
-        except Exception as error:
-            _turn_off(obj, settings, error)
+    except ReferenceError:
+        # Deleted since the objects were listed.
+        session.objects = None
+    except Exception as error:
+        _turn_off(obj, settings, error)
 
 
 def _driven_objects(changes: _Changes) -> list[bpy.types.Object]:
@@ -278,13 +301,13 @@ def _rest_points(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Dep
 
 
 @persistent
-def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _update(scene, depsgraph, _Changes.read(depsgraph))
+def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _update(depsgraph, _Changes.read(depsgraph))
 
 
 @persistent
-def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _update(scene, depsgraph, _Changes.read(depsgraph))
+def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _update(depsgraph, _Changes.read(depsgraph))
 
 
 @persistent
@@ -334,6 +357,8 @@ _HANDLERS = {
 
 def register() -> None:
     session.forget()
+    properties.listeners.method_changed = _method_changed
+    properties.listeners.enabled_changed = _enabled_changed
     for event, functions in _HANDLERS.items():
         getattr(bpy.app.handlers, event).extend(functions)
 

@@ -3,24 +3,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import bpy
 import sinew
 
 METHODS = {method.name: method for method in sinew.methods()}
 
 
-def _method_changed(_settings: SinewSettings, context: bpy.types.Context) -> None:
-    from . import handlers
+@dataclass
+class Listeners:
+    """Who hears of changed settings; set on registration, as what reacts to settings also reads them."""
 
-    handlers.refresh(context)
+    method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+
+
+listeners = Listeners()
+
+
+def _method_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+    if listeners.method_changed is not None:
+        listeners.method_changed(settings.id_data, context)
 
 
 def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
-    from . import drive, handlers
-
-    drive.switch(settings.id_data, settings.enabled)
-    settings.error = ""
-    handlers.refresh(context)
+    if listeners.enabled_changed is not None:
+        listeners.enabled_changed(settings.id_data, context)
 
 
 class SinewSettings(bpy.types.PropertyGroup):

@@ -10,11 +10,6 @@ import bpy
 from . import native
 
 _registered: list[type] = []
-_commands: list[object] = []
-
-
-def is_registered() -> bool:
-    return bool(_registered)
 
 
 def register() -> None:
@@ -30,7 +25,6 @@ def register() -> None:
     _register_classes((properties.SinewSettings, *operators.CLASSES, *panels.CLASSES))
     bpy.types.Object.sinew = bpy.props.PointerProperty(type=properties.SinewSettings)
     handlers.register()
-    _register_command()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
     # handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5.
     atexit.register(unregister)
@@ -47,8 +41,6 @@ def unregister() -> None:
             if properties.is_driven(obj):
                 drive.give_back(obj)
         del bpy.types.Object.sinew
-    while _commands:
-        bpy.utils.unregister_cli_command(_commands.pop())
     while _registered:
         bpy.utils.unregister_class(_registered.pop())
 
@@ -57,9 +49,3 @@ def _register_classes(classes: tuple[type, ...]) -> None:
     for cls in classes:
         bpy.utils.register_class(cls)
         _registered.append(cls)
-
-
-def _register_command() -> None:
-    from .. import cli
-
-    _commands.append(bpy.utils.register_cli_command("sinew", cli.main))
