@@ -13,19 +13,12 @@ from ..core.errors import SinewError
 from . import mesh_io, node_group, pose_driver, properties
 
 # Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
-HARMLESS_IN_FRONT = {
-    "ARMATURE",
-    "DATA_TRANSFER",
-    "MESH_CACHE",
-    "NORMAL_EDIT",
-    "UV_PROJECT",
-    "UV_WARP",
-    "WEIGHTED_NORMAL",
-}
+HARMLESS_IN_FRONT = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
 
 
 def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:
-    """The Armature modifier that Sinew stands in for, or would: the first one with an armature."""
+    """The Armature modifier that Sinew stands in for, or would: the first one with an armature, those that
+    are switched off last."""
     if properties.is_driven(obj):
         modifier = obj.modifiers.get(properties.of(obj).armature_modifier)
         if modifier is not None and modifier.type == "ARMATURE":
@@ -37,10 +30,12 @@ def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | Non
             properties.of(obj).armature_modifier = behind.name
             return behind
         return None
-    for modifier in obj.modifiers:
-        if modifier.type == "ARMATURE" and modifier.object is not None:
-            return modifier
-    return None
+    candidates = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object is not None]
+    return min(candidates, key=lambda m: not _is_on(m), default=None)
+
+
+def _is_on(modifier: bpy.types.Modifier) -> bool:
+    return modifier.show_viewport or modifier.show_render
 
 
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
@@ -81,14 +76,11 @@ def check_can_add(obj: bpy.types.Object) -> bpy.types.ArmatureModifier:
     for other in obj.modifiers:
         if other == modifier:
             break
-        if (other.show_viewport or other.show_render) and other.type not in HARMLESS_IN_FRONT:
+        if _is_on(other) and other.type not in HARMLESS_IN_FRONT:
             raise SinewError(
                 f"{obj.name}: modifier {other.name} stands in front of {modifier.name} and changes the mesh "
                 "before it; apply it or move it behind"
             )
-    earlier = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object is not None]
-    if earlier[0] != modifier:
-        raise SinewError(f"{obj.name}: {earlier[0].name} stands in front of {modifier.name}; move it behind")
     return modifier
 
 

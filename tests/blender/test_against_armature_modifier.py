@@ -235,3 +235,23 @@ def test_vertex_groups_switched_off():
     obj, _armature = scenes.make_arm()
     obj.modifiers["Armature"].use_vertex_groups = False
     assert_equal_to_modifier(obj, [1, 11])
+
+
+def test_a_second_armature_modifier_goes_on_behind():
+    obj, _armature = scenes.make_arm()
+    _unused, other = scenes.make_arm(name="Other")
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object = other
+    assert_equal_to_modifier(obj, [1, 6, 11])
+    assert second.object == other
+
+
+def test_a_switched_off_armature_modifier_in_front_is_passed_over():
+    obj, _armature = scenes.make_arm()
+    _unused, other = scenes.make_arm(name="Other")
+    first = obj.modifiers.new("First", "ARMATURE")
+    first.object = other
+    first.show_viewport = first.show_render = False
+    obj.modifiers.move(1, 0)
+    assert_equal_to_modifier(obj, [1, 6, 11])
+    assert drive.armature_modifier(obj).name == "Armature"
