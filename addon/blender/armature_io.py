@@ -8,6 +8,8 @@ import numpy as np
 
 from ..core.rig import Bones
 
+SAME_SPACE = np.identity(4)
+
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     """The rest bones of an evaluated armature object, in the order of its pose, and bendy ones' joints."""
@@ -27,15 +29,6 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
         count += segments[bone] + 1
     return Bones(
         tuple(bone.name for bone in bones), deform, np.concatenate(parts), lengths, segments, first_joints
-    )
-
-
-def rest_changed(armature: bpy.types.Object, known: Bones) -> bool:
-    """Whether the rest bones differ from `known` in number or place; cheap enough for every frame."""
-    bones = armature.data.bones
-    count = len(known.names)
-    return len(bones) != count or not np.array_equal(
-        _read_matrices(bones, "matrix_local"), known.rest[:count]
     )
 
 
@@ -73,5 +66,5 @@ def bones_from_model(evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.t
     mesh_world = np.array(evaluated_mesh.matrix_world, dtype=np.float64)
     armature_world = np.array(evaluated_armature.matrix_world, dtype=np.float64)
     if np.array_equal(mesh_world, armature_world):
-        return np.identity(4)
+        return SAME_SPACE
     return np.linalg.inv(armature_world) @ mesh_world

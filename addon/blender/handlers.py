@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights, build_influences
-from ..core.rig import RigFacts, describe_rig
+from ..core.rig import Bones, RigFacts, describe_rig
 from ..core.session import Binding, Frame
 from ..core.shape_keys import ShapeKeys
 from . import armature_io, drive, mesh_io, modifier_options, pose_driver, properties
@@ -229,10 +229,10 @@ def _current(
         return _bind(obj, armature, evaluated_armature, options)
     mesh = obj.data
     keys = mesh.shape_keys
-    bones_changed = armature_io.rest_changed(armature, driven.binding.bones)
-    if armature.data.session_uid in changes.armatures and not bones_changed:
+    bones_changed = False
+    if armature.data.session_uid in changes.armatures:
         bones = armature_io.read_bones(evaluated_armature)
-        _follow_renamed_bones(obj, driven.binding.bones.names, bones.names)
+        _follow_renamed_bones(obj, driven.binding.bones, bones)
         bones_changed = not bones.equals(driven.binding.bones)
     regrouped = (
         obj.session_uid in changes.objects and [g.name for g in obj.vertex_groups] != driven.group_names
@@ -278,14 +278,14 @@ def _bind(
     return driven
 
 
-def _follow_renamed_bones(obj: bpy.types.Object, old: tuple[str, ...], new: tuple[str, ...]) -> None:
+def _follow_renamed_bones(obj: bpy.types.Object, old: Bones, new: Bones) -> None:
     """Blender renames the vertex groups of a renamed bone only where a modifier points to the armature;
     while Sinew holds the pointer it is ours to do."""
-    if len(old) != len(new):
+    if not np.array_equal(old.rest, new.rest):
         return
-    for before, after in zip(old, new, strict=True):
-        group = obj.vertex_groups.get(before)
-        if before != after and before not in new and group is not None and after not in obj.vertex_groups:
+    for before, after in zip(old.names, new.names, strict=True):
+        group = obj.vertex_groups.get(before) if before != after else None
+        if group is not None and before not in new.names and after not in obj.vertex_groups:
             group.name = after
 
 

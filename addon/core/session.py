@@ -12,6 +12,8 @@ import sinew
 from .influences import Influences
 from .rig import Bones
 
+IDENTITY = np.identity(4)
+
 
 @dataclass
 class Frame:
@@ -58,7 +60,7 @@ class Binding:
         deformer = self._bound(frame)
         # In double: a bone far from the origin would lose digits in the product of two float matrices.
         posed_from_rest = frame.pose.astype(np.float64) @ self._rest_from_armature
-        same_space = np.array_equal(frame.bones_from_model, np.identity(4))
+        same_space = np.array_equal(frame.bones_from_model, IDENTITY)
         deformer.deform(
             posed_from_rest.astype(np.float32),
             out=self._points,
