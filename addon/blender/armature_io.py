@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..core.envelopes import Envelopes
 from ..core.rig import Bones
 
 SAME_SPACE = np.identity(4)
@@ -27,9 +28,9 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
         first_joints[bone] = count
         parts.append(_read_joints(evaluated_armature, rest, int(bone), int(segments[bone]), at_rest=True))
         count += segments[bone] + 1
-    return Bones(
-        tuple(bone.name for bone in bones), deform, np.concatenate(parts), lengths, segments, first_joints
-    )
+    names = tuple(bone.name for bone in bones)
+    envelopes = _read_envelopes(bones)
+    return Bones(names, deform, np.concatenate(parts), lengths, segments, first_joints, envelopes)
 
 
 def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
@@ -43,6 +44,23 @@ def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
             _read_joints(evaluated_armature, pose, int(bone), int(bones.segments[bone]), at_rest=False)
         )
     return np.concatenate(parts)
+
+
+def _read_envelopes(bones: bpy.types.bpy_prop_collection) -> Envelopes:
+    def read(name: str, width: int = 1, dtype: type = np.float32) -> np.ndarray:
+        flat = np.empty(width * len(bones), dtype=dtype)
+        bones.foreach_get(name, flat)
+        return flat.reshape(-1, width) if width > 1 else flat
+
+    return Envelopes(
+        heads=read("head_local", 3),
+        tails=read("tail_local", 3),
+        head_radii=read("head_radius"),
+        tail_radii=read("tail_radius"),
+        distances=read("envelope_distance"),
+        weights=read("envelope_weight"),
+        multiply=read("use_envelope_multiply", dtype=bool),
+    )
 
 
 def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarray:

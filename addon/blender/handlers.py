@@ -12,11 +12,11 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from ..core.influences import GroupWeights, build_influences
-from ..core.rig import Bones, RigFacts, describe_rig
+from ..core.influences import GroupWeights
+from ..core.rig import Bones, RigFacts
 from ..core.session import Binding, Frame
 from ..core.shape_keys import ShapeKeys
-from . import armature_io, drive, mesh_io, modifier_options, pose_driver, properties
+from . import armature_io, drive, mesh_io, pose_driver, properties, survey
 from .modifier_options import ModifierOptions
 
 log = logging.getLogger("sinew")
@@ -198,13 +198,14 @@ def _update_object(
         return
     evaluated = obj.evaluated_get(depsgraph)
     evaluated_armature = armature.evaluated_get(depsgraph)
-    driven = _current(obj, armature, evaluated_armature, changes)
+    space = armature_io.bones_from_model(evaluated, evaluated_armature)
+    driven = _current(obj, armature, evaluated_armature, space, changes)
     # Binding is not part of a frame's time: it happens once.
     started = time.perf_counter()
     frame = Frame(
         method=evaluated.sinew.method,
         pose=armature_io.read_pose(evaluated_armature, driven.binding.bones),
-        bones_from_model=armature_io.bones_from_model(evaluated, evaluated_armature),
+        bones_from_model=space,
         rest_points=_rest_points(obj, driven, depsgraph),
     )
     points = driven.binding.deform(frame)
@@ -217,6 +218,7 @@ def _current(
     obj: bpy.types.Object,
     armature: bpy.types.Object,
     evaluated_armature: bpy.types.Object,
+    space: np.ndarray,
     changes: _Changes,
 ) -> Driven:
     """The object's state, bound anew where its mesh, weights, bones or modifier changed."""
@@ -226,7 +228,7 @@ def _current(
         raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
     options = ModifierOptions.read(modifier)
     if driven is None or driven.armature != armature.session_uid or driven.options != options:
-        return _bind(obj, armature, evaluated_armature, options)
+        return _bind(obj, armature, evaluated_armature, space, options)
     mesh = obj.data
     keys = mesh.shape_keys
     bones_changed = False
@@ -241,7 +243,7 @@ def _current(
     by_keys = keys is not None and keys.session_uid in changes.keys
     touched = mesh.session_uid in changes.meshes and not by_keys
     if bones_changed or regrouped or touched or len(mesh.vertices) != len(driven.rest_points):
-        return _bind(obj, armature, evaluated_armature, options, driven)
+        return _bind(obj, armature, evaluated_armature, space, options, driven)
     return driven
 
 
@@ -249,6 +251,7 @@ def _bind(
     obj: bpy.types.Object,
     armature: bpy.types.Object,
     evaluated_armature: bpy.types.Object,
+    space: np.ndarray,
     options: ModifierOptions,
     old: Driven | None = None,
 ) -> Driven:
@@ -267,11 +270,9 @@ def _bind(
         old.rest_points, old.shape_keys = points, keys
         old.key_values = old.mixed_points = None
         return old
-    influences = build_influences(options.groups(weights), bones.of_groups(names))
-    facts = describe_rig(influences, bones, names)
-    modifier = drive.armature_modifier(obj)
-    facts = facts.with_warnings(modifier_options.differences(obj, modifier, armature, facts.bare_vertices))
-    binding = Binding(bones, influences, options.mask_weights(obj, weights))
+    weighting = options.weighting(obj, weights, bones)
+    facts = survey.describe(obj, armature, weighting, points @ space[:3, :3].T + space[:3, 3])
+    binding = Binding(weighting, options.mask_weights(obj, weights))
     driven = Driven(armature.session_uid, options, binding, facts, names, weights, points, keys)
     session.driven[obj.session_uid] = driven
     pose_driver.ensure(obj, armature, binding.moving_bones)

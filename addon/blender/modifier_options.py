@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.influences import GroupWeights
+from ..core.influences import GroupWeights, entries_of_bones
+from ..core.rig import Bones, Weighting
 
 
 @dataclass(frozen=True)
@@ -16,18 +17,24 @@ class ModifierOptions:
     """The options that Sinew reproduces."""
 
     use_vertex_groups: bool
+    use_envelopes: bool
     mask: str
     invert_mask: bool
 
     @classmethod
     def read(cls, modifier: bpy.types.ArmatureModifier) -> ModifierOptions:
-        return cls(modifier.use_vertex_groups, modifier.vertex_group, modifier.invert_vertex_group)
+        return cls(
+            modifier.use_vertex_groups,
+            modifier.use_bone_envelopes,
+            modifier.vertex_group,
+            modifier.invert_vertex_group,
+        )
 
-    def groups(self, weights: GroupWeights) -> GroupWeights:
-        """The vertex groups that deform: none where the modifier is told to leave them."""
-        if self.use_vertex_groups:
-            return weights
-        return GroupWeights(np.zeros_like(weights.counts), weights.groups[:0], weights.weights[:0])
+    def weighting(self, obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
+        """What deforms the mesh: its groups that have a bone, or none where the modifier leaves them."""
+        names = [group.name for group in obj.vertex_groups]
+        bone_of_group = bones.of_groups(names) if self.use_vertex_groups else np.full(len(names), -1)
+        return Weighting(bones, entries_of_bones(weights, bone_of_group), self.use_envelopes)
 
     def mask_weights(self, obj: bpy.types.Object, weights: GroupWeights) -> np.ndarray | None:
         """float32 [vertices], the share of the deformation each vertex takes; None for all of it.
@@ -42,22 +49,13 @@ class ModifierOptions:
 
 
 def differences(
-    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, armature: bpy.types.Object, bare: int
+    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, armature: bpy.types.Object
 ) -> list[str]:
-    """A sentence for each thing that the modifier does and Sinew does not.
-
-    bare  how many vertices have no weights
-    """
+    """A sentence for each thing that the modifier does and Sinew does not."""
     found = []
     deforming = [bone for bone in armature.data.bones if bone.use_deform]
     if modifier.use_multi_modifier:
         found.append(f"{modifier.name} is a Multi Modifier, which Sinew treats as a plain one")
-    if modifier.use_bone_envelopes and bare:
-        found.append(
-            f"{modifier.name} moves vertices without weights by bone envelopes, which Sinew does not"
-        )
-    if modifier.use_vertex_groups and any(bone.use_envelope_multiply for bone in deforming):
-        found.append("Bones with Envelope Multiply: Sinew uses their weights alone")
     if any(bone.bbone_segments > 1 and bone.bbone_mapping_mode == "CURVED" for bone in deforming):
         found.append("Bendy bones with curved mapping: Sinew maps them straight")
     others = [

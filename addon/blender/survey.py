@@ -1,27 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be said of a mesh without driving it."""
+"""What an artist should know of a mesh that an armature deforms."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ..core.errors import SinewError
-from ..core.influences import build_influences
-from ..core.rig import RigFacts, describe_rig
-from . import armature_io, drive, mesh_io, modifier_options, properties
+from ..core.rig import RigFacts, Weighting, describe_rig
+from . import armature_io, drive, mesh_io, properties
+from .modifier_options import ModifierOptions, differences
 
 
-def describe(obj: bpy.types.Object) -> RigFacts:
-    """Facts of a mesh object that an armature deforms, with all that a user should be warned of."""
+def describe(
+    obj: bpy.types.Object, armature: bpy.types.Object, weighting: Weighting, points: np.ndarray
+) -> RigFacts:
+    """Counts, and warnings of what is missing in the rig or not reproduced.
+
+    points  [vertices, 3], rest points in armature space
+    """
+    facts = describe_rig(weighting, points, [group.name for group in obj.vertex_groups])
+    return facts.with_warnings(differences(obj, drive.armature_modifier(obj), armature))
+
+
+def describe_undriven(obj: bpy.types.Object) -> RigFacts:
+    """The same of a mesh object as it lies in the file, and what would keep Sinew from driving it."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    armature, modifier = drive.armature_of(obj), drive.armature_modifier(obj)
-    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-    names = [group.name for group in obj.vertex_groups]
-    options = modifier_options.ModifierOptions.read(modifier)
-    weights = options.groups(mesh_io.read_group_weights(obj.data))
-    facts = describe_rig(build_influences(weights, bones.of_groups(names)), bones, names)
-    more = modifier_options.differences(obj, modifier, armature, facts.bare_vertices)
-    return facts.with_warnings([*more, *_obstacles(obj)])
+    armature = drive.armature_of(obj)
+    evaluated_armature = armature.evaluated_get(depsgraph)
+    bones = armature_io.read_bones(evaluated_armature)
+    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), evaluated_armature)
+    options = ModifierOptions.read(drive.armature_modifier(obj))
+    weighting = options.weighting(obj, mesh_io.read_group_weights(obj.data), bones)
+    points = mesh_io.read_points(obj.data.vertices) @ space[:3, :3].T + space[:3, 3]
+    return describe(obj, armature, weighting, points).with_warnings(_obstacles(obj))
 
 
 def _obstacles(obj: bpy.types.Object) -> list[str]:

@@ -47,7 +47,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
     files.open_file(path)
     meshes = []
     for obj in drive.deformed_meshes(list(bpy.data.objects)):
-        facts = survey.describe(obj)
+        facts = survey.describe_undriven(obj)
         meshes.append(
             {
                 "object": obj.name,

@@ -41,6 +41,35 @@ class GroupWeights:
 
 
 @dataclass(frozen=True)
+class Entries:
+    """Group entries that have a bone, zero weights among them.
+
+    counts   int32 [vertices], entries of each vertex
+    bones    int32 [entries]
+    weights  float32 [entries]
+    """
+
+    counts: np.ndarray
+    bones: np.ndarray
+    weights: np.ndarray
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """int [entries]: the vertex of each entry."""
+        return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    def influences(self) -> Influences:
+        """What deforms: entries of weight zero are left out, and so are all of a vertex whose weights sum to
+        SMALLEST_WEIGHT_SUM or less. Stored order is kept: dual quaternions depend on it."""
+        vertices = self.vertices
+        sums = np.bincount(vertices, weights=self.weights, minlength=len(self.counts))
+        kept = (self.weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
+        offsets = np.zeros(len(self.counts) + 1, dtype=np.int32)
+        np.cumsum(np.bincount(vertices[kept], minlength=len(self.counts)), out=offsets[1:])
+        return Influences(offsets, self.bones[kept], self.weights[kept])
+
+
+@dataclass(frozen=True)
 class Influences:
     """Which bones move each vertex, and how much.
 
@@ -59,22 +88,15 @@ class Influences:
         return np.diff(self.offsets)
 
 
-def build_influences(groups: GroupWeights, bone_of_group: np.ndarray) -> Influences:
-    """The influences that `groups` give, as Blender's Armature modifier reads them.
+def entries_of_bones(groups: GroupWeights, bone_of_group: np.ndarray) -> Entries:
+    """The entries of groups that have a bone.
 
     bone_of_group  int32 [groups], the bone that each group moves with, -1 for none
-
-    Entries without a bone and of weight zero are left out, and so are all of a vertex whose weights sum to
-    SMALLEST_WEIGHT_SUM or less. Stored order is kept: dual quaternions depend on it.
     """
-    vertex_count = len(groups.counts)
-    vertices = np.repeat(np.arange(vertex_count), groups.counts)
+    vertices = np.repeat(np.arange(len(groups.counts)), groups.counts)
     table = np.append(bone_of_group.astype(np.int32), np.int32(-1))
     # A group index past the last group can stay behind in a mesh whose groups were deleted.
     bones = table[np.minimum(groups.groups, len(table) - 1)]
-    weights = np.where(bones >= 0, groups.weights, np.float32(0.0))
-    sums = np.bincount(vertices, weights=weights, minlength=vertex_count)
-    kept = (weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
-    offsets = np.zeros(vertex_count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(vertices[kept], minlength=vertex_count), out=offsets[1:])
-    return Influences(offsets, bones[kept], weights[kept].astype(np.float32))
+    kept = bones >= 0
+    counts = np.bincount(vertices[kept], minlength=len(groups.counts)).astype(np.int32)
+    return Entries(counts, bones[kept], groups.weights[kept])

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .bendy import spread_over_joints
-from .influences import Influences
+from .envelopes import Envelopes, fill_from_envelopes, multiply_by_envelopes
+from .influences import Entries, Influences
 
 NAMES_SHOWN = 5
 
@@ -23,6 +24,7 @@ class Bones:
     lengths       float32 [bones]
     segments      int32 [bones], 1 for a bone that does not bend
     first_joints  int32 [bones], where in `rest` the segments + 1 joints of a bending bone begin
+    envelopes     the reach of every bone
     """
 
     names: tuple[str, ...]
@@ -31,6 +33,7 @@ class Bones:
     lengths: np.ndarray
     segments: np.ndarray
     first_joints: np.ndarray
+    envelopes: Envelopes
 
     @property
     def bend(self) -> bool:
@@ -50,6 +53,7 @@ class Bones:
             and np.array_equal(self.deform, other.deform)
             and np.array_equal(self.rest, other.rest)
             and np.array_equal(self.segments, other.segments)
+            and self.envelopes.equals(other.envelopes)
         )
 
     def of_groups(self, group_names: list[str]) -> np.ndarray:
@@ -57,13 +61,40 @@ class Bones:
         index = {name: bone for bone, name in enumerate(self.names) if self.deform[bone]}
         return np.array([index.get(name, -1) for name in group_names], dtype=np.int32).reshape(-1)
 
-    def spread(self, influences: Influences, points: np.ndarray) -> Influences:
-        """Influences over bones and joints, for rest points in armature space."""
-        if not self.bend:
+
+@dataclass(frozen=True)
+class Weighting:
+    """From a mesh's group entries to the influences at given rest points.
+
+    entries        of deforming bones
+    use_envelopes  vertices without entries are moved by the envelopes that reach them
+    """
+
+    bones: Bones
+    entries: Entries
+    use_envelopes: bool
+
+    @property
+    def depends_on_points(self) -> bool:
+        multiply = bool(self.bones.envelopes.multiply[self.entries.bones].any())
+        return self.bones.bend or multiply or self.use_envelopes
+
+    def influences(self, points: np.ndarray) -> Influences:
+        """Over bones alone, for rest points float [vertices, 3] in armature space."""
+        entries, envelopes = self.entries, self.bones.envelopes
+        if envelopes.multiply[entries.bones].any():
+            entries = multiply_by_envelopes(entries, envelopes, points)
+        if self.use_envelopes:
+            entries = fill_from_envelopes(entries, envelopes, self.bones.deform, points)
+        return entries.influences()
+
+    def influences_over_joints(self, points: np.ndarray) -> Influences:
+        """Over bones and the joints of bendy ones."""
+        influences, bones = self.influences(points), self.bones
+        if not bones.bend:
             return influences
-        return spread_over_joints(
-            influences, points, self.rest[: len(self.names)], self.lengths, self.segments, self.first_joints
-        )
+        rest = bones.rest[: len(bones.names)]
+        return spread_over_joints(influences, points, rest, bones.lengths, bones.segments, bones.first_joints)
 
 
 @dataclass(frozen=True)
@@ -73,7 +104,6 @@ class RigFacts:
     vertices: int
     bones: int
     weighted_bones: int
-    bare_vertices: int
     mean_influences: float
     most_influences: int
     warnings: tuple[str, ...]
@@ -82,8 +112,12 @@ class RigFacts:
         return replace(self, warnings=(*self.warnings, *more))
 
 
-def describe_rig(influences: Influences, bones: Bones, group_names: list[str]) -> RigFacts:
-    """Counts and warnings. `weighted_bones` counts those that move at least one vertex."""
+def describe_rig(weighting: Weighting, points: np.ndarray, group_names: list[str]) -> RigFacts:
+    """Counts and warnings. `weighted_bones` counts those that move at least one vertex.
+
+    points  [vertices, 3], rest points in armature space
+    """
+    influences, bones = weighting.influences(points), weighting.bones
     counts = influences.counts
     warnings = []
     bare = int((counts == 0).sum())
@@ -96,7 +130,6 @@ def describe_rig(influences: Influences, bones: Bones, group_names: list[str]) -
         vertices=len(counts),
         bones=len(bones.names),
         weighted_bones=len(np.unique(influences.bones)),
-        bare_vertices=bare,
         mean_influences=float(counts.mean()) if len(counts) else 0.0,
         most_influences=int(counts.max(initial=0)),
         warnings=tuple(warnings),

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import sinew
 
-from .influences import Influences
-from .rig import Bones
+from .rig import Weighting
 
 IDENTITY = np.identity(4)
 
@@ -34,21 +33,24 @@ class Frame:
 class Binding:
     """A mesh bound to bones. Deforms when a frame differs from the last, and says how long it took."""
 
-    def __init__(self, bones: Bones, influences: Influences, mask: np.ndarray | None = None) -> None:
+    def __init__(self, weighting: Weighting, mask: np.ndarray | None = None) -> None:
         """mask: float32 [vertices], the share of the deformation each vertex takes; None for all of it."""
-        self.bones = bones
-        self.influences = influences
+        self.weighting = weighting
+        self.bones = weighting.bones
         self.mask = mask
-        self._rest_from_armature = np.linalg.inv(bones.rest.astype(np.float64))
+        self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
         self._deformer: sinew.Deformer | None = None
         self._last: Frame | None = None
-        self._points = np.empty((len(influences.offsets) - 1, 3), dtype=np.float32)
+        self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
         self.milliseconds = 0.0
 
     @property
     def moving_bones(self) -> list[str]:
-        """Names of the bones that move at least one vertex."""
-        return [self.bones.names[bone] for bone in np.unique(self.influences.bones)]
+        """Names of the bones that can move a vertex."""
+        bones = np.unique(self.weighting.entries.bones)
+        if self.weighting.use_envelopes:
+            bones = np.flatnonzero(self.bones.deform)
+        return [self.bones.names[bone] for bone in bones]
 
     def deform(self, frame: Frame) -> np.ndarray | None:
         """Deformed points float32 [vertices, 3] in object space, valid until the next call; None where the
@@ -77,13 +79,16 @@ class Binding:
     def _bound(self, frame: Frame) -> sinew.Deformer:
         last = self._last
         reshaped = last is None or frame.rest_points is not last.rest_points
-        # Which joints of a bendy bone move a vertex depends on where it lies along the bone.
         moved = reshaped or not np.array_equal(frame.bones_from_model, last.bones_from_model)
         deformer = self._deformer
-        if deformer is None or deformer.method != frame.method or (self.bones.bend and moved):
+        if (
+            deformer is None
+            or deformer.method != frame.method
+            or (moved and self.weighting.depends_on_points)
+        ):
             space = frame.bones_from_model
-            influences = self.bones.spread(
-                self.influences, frame.rest_points @ space[:3, :3].T + space[:3, 3]
+            influences = self.weighting.influences_over_joints(
+                frame.rest_points @ space[:3, :3].T + space[:3, 3]
             )
             self._deformer = sinew.Deformer(
                 frame.rest_points,

@@ -255,3 +255,51 @@ def test_a_switched_off_armature_modifier_in_front_is_passed_over():
     obj.modifiers.move(1, 0)
     assert_equal_to_modifier(obj, [1, 6, 11])
     assert drive.armature_modifier(obj).name == "Armature"
+
+
+def with_envelopes(armature: bpy.types.Object) -> None:
+    for index, bone in enumerate(armature.data.bones):
+        bone.head_radius, bone.tail_radius = 0.2 + 0.05 * index, 0.1
+        bone.envelope_distance, bone.envelope_weight = 0.3, 1.0 - 0.2 * index
+
+
+@pytest.mark.parametrize("bendy", [False, True])
+@pytest.mark.parametrize("use_groups", [False, True])
+def test_envelopes(use_groups, bendy):
+    obj, armature = scenes.make_arm(bones=3)
+    with_envelopes(armature)
+    if bendy:
+        armature.data.bones[1].bbone_segments = 5
+    obj.location = (0.0, 0.1, 0.05)
+    bpy.context.view_layer.update()
+    for group in obj.vertex_groups:
+        group.remove(list(range(60, 200)))
+    # One entry of weight zero keeps the envelopes off.
+    obj.vertex_groups[0].add(list(range(100, 110)), 0.0, "REPLACE")
+    modifier = obj.modifiers["Armature"]
+    modifier.use_bone_envelopes, modifier.use_vertex_groups = True, use_groups
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_envelope_multiply():
+    obj, armature = scenes.make_arm(bones=3)
+    with_envelopes(armature)
+    for bone in armature.data.bones[1:]:
+        bone.use_envelope_multiply = True
+    assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_envelopes_with_moving_shape_keys():
+    """Which envelopes hold a vertex changes with its shape key."""
+    obj, armature = scenes.make_arm(bones=3)
+    with_envelopes(armature)
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="lifted")
+    moved = scenes.rest_points(obj) + np.float32((0.4, 0.0, 0.3))
+    key.data.foreach_set("co", moved.ravel())
+    key.keyframe_insert("value", frame=1)
+    key.value = 1.0
+    key.keyframe_insert("value", frame=11)
+    modifier = obj.modifiers["Armature"]
+    modifier.use_bone_envelopes, modifier.use_vertex_groups = True, False
+    assert_equal_to_modifier(obj, [1, 6, 11])
