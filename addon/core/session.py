@@ -52,6 +52,11 @@ class Binding:
             bones = np.flatnonzero(self.bones.deform)
         return [self.bones.names[bone] for bone in bones]
 
+    @property
+    def last_frame(self) -> Frame | None:
+        """What was deformed last."""
+        return self._last
+
     def deform(self, frame: Frame) -> np.ndarray | None:
         """Deformed points float32 [vertices, 3] in object space, valid until the next call; None where the
         frame equals the last one."""

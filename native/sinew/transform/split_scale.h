@@ -34,12 +34,12 @@ template <class T>
     if (glm::length(y) <= kNoDirection) y = otherwise[1];
     y = glm::normalize(y);
 
-    // The odd tests against 1 with x and z not normalised are Blender's: under extreme shear and scale
-    // they pick another axis, and so must we.
+    // The odd tests against 1, with x and z not normalised and the second of x against z, are Blender's:
+    // under extreme shear and scale they pick another axis, and so must we.
     Vec3<T> x;
     if (glm::dot(y, linear[0]) < T(1)) {
         x = c[0] - y * glm::dot(y, c[0]);
-    } else if (glm::dot(y, linear[2]) < T(1)) {
+    } else if (glm::dot(linear[0], linear[2]) < T(1)) {
         x = glm::cross(y, c[2]);
     } else {
         x = glm::cross(y, Vec3<T>(y.y, y.z, y.x));
@@ -59,8 +59,8 @@ template <class T>
 /// rest_bone        the bone's rest axes (Y along the bone) and head in the same space, orthonormal
 ///
 /// A motion within 1e-5 of orthonormal, unmirrored and within 1e-4 of unit size counts as rigid.
-/// Where axes vanish or are parallel those left decide, and after them the rest axes. Source: the rule that Blender's Armature modifier has for
-/// Preserve Volume.
+/// Where axes vanish or are parallel those left decide, and after them the rest axes. Source: the rule that
+/// Blender's Armature modifier has for Preserve Volume.
 template <class T>
 [[nodiscard]] ScaleSplit<T> split_scale(const Affine<T>& posed_from_rest,
                                         const Affine<T>& rest_bone) noexcept {

@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random rigs, posed at random: Sinew against Blender's Armature modifier.
+
+    python tests/blender/fuzz_parity.py --rigs 10000 [--first 0] [--keep DIR]
+
+A rig is made from its seed and a set of features, each with random numbers of its own, so that leaving one
+out changes nothing else: a failing rig is made smaller by leaving out all features that the failure does
+not need, then saved as DIR/seed-N.blend.
+
+Left out of the comparison are vertices at a discontinuity of the modifier itself, where rounding decides:
+dual quaternions that meet within MARGIN of square (the sign of a term flips), and weights that sum to
+within MARGIN of the modifier's threshold. Both are computed from the input, in float64.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+import scenes
+from mathutils import Euler, Matrix, Vector
+from sinew_addon.blender import drive, handlers, properties
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+import reference
+
+MARGIN = 1e-3
+FEATURES = (
+    "object transforms",
+    "parenting",
+    "scale",
+    "mirror",
+    "inherit scale",
+    "bendy",
+    "envelopes",
+    "envelope multiply",
+    "mask",
+    "shape keys",
+    "undeforming bones",
+    "messy weights",
+    "modifier behind",
+)
+ORACLES = (("lbs", False), ("dq", True))
+
+
+@dataclass
+class Outcome:
+    """The worst error of one rig, as a part of the diagonal, and how many vertices were left out."""
+
+    seed: int
+    errors: dict[str, float] = field(default_factory=dict)
+    left_out: int = 0
+    vertices: int = 0
+
+    @property
+    def failed(self) -> bool:
+        return not all(error <= scenes.TOLERANCE for error in self.errors.values())
+
+
+def numbers(seed: int, feature: str) -> np.random.Generator:
+    return np.random.default_rng([seed, zlib.crc32(feature.encode())])
+
+
+def has(seed: int, feature: str, features: set[str], share: float = 0.4) -> bool:
+    return feature in features and numbers(seed, "has " + feature).random() < share
+
+
+def random_rotation(rng: np.random.Generator) -> Matrix:
+    return Euler(rng.uniform(-np.pi, np.pi, 3)).to_matrix().to_4x4()
+
+
+def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
+    rng = numbers(seed, "bones")
+    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = armature.data.edit_bones
+    for index in range(int(rng.integers(1, 13))):
+        bone = bones.new(f"bone.{index}")
+        parent = bones[int(rng.integers(0, index))] if index and rng.random() < 0.85 else None
+        connected = parent is not None and rng.random() < 0.6
+        bone.head = parent.tail if connected else Vector(rng.uniform(-1, 1, 3))
+        bone.tail = bone.head + Vector(rng.normal(0, 1, 3)).normalized() * rng.uniform(0.2, 0.8)
+        bone.roll = rng.uniform(-np.pi, np.pi)
+        bone.parent, bone.use_connect = parent, connected
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bones = armature.data.bones
+    if has(seed, "inherit scale", features):
+        rng = numbers(seed, "inherit scale")
+        modes = ("FULL", "FIX_SHEAR", "ALIGNED", "AVERAGE", "NONE")
+        for bone in bones:
+            bone.inherit_scale = modes[int(rng.integers(len(modes)))]
+    if has(seed, "undeforming bones", features):
+        rng = numbers(seed, "undeforming bones")
+        for bone in bones:
+            bone.use_deform = bool(rng.random() < 0.8)
+    if has(seed, "bendy", features):
+        rng = numbers(seed, "bendy")
+        for bone in bones:
+            if rng.random() < 0.5:
+                bone.bbone_segments = int(rng.integers(2, 9))
+                bone.bbone_curveinx, bone.bbone_curveoutz = rng.uniform(-0.3, 0.3, 2)
+    if has(seed, "envelopes", features) or has(seed, "envelope multiply", features):
+        rng = numbers(seed, "envelopes")
+        for bone in bones:
+            bone.head_radius, bone.tail_radius, bone.envelope_distance = rng.uniform(0.05, 0.6, 3)
+            bone.envelope_weight = rng.uniform(0.1, 1.0)
+    if has(seed, "envelope multiply", features):
+        rng = numbers(seed, "envelope multiply")
+        for bone in bones:
+            bone.use_envelope_multiply = bool(rng.random() < 0.4)
+    return armature
+
+
+def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.types.Object:
+    rng = numbers(seed, "mesh")
+    count = int(rng.integers(20, 120))
+    mesh = bpy.data.meshes.new("Mesh")
+    mesh.from_pydata(rng.uniform(-1.2, 1.2, (count, 3)).tolist(), [], [(0, 1, 2), (3, 4, 5)])
+    obj = bpy.data.objects.new("Mesh", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
+    messy = has(seed, "messy weights", features)
+    if messy:
+        groups.append(obj.vertex_groups.new(name="no bone of that name"))
+    weights = numbers(seed, "weights")
+    for vertex in range(count):
+        for group in weights.permutation(len(groups))[: int(weights.integers(1, 7))]:
+            groups[group].add([vertex], float(weights.uniform(0.05, 1.0)), "REPLACE")
+    if messy:
+        rng = numbers(seed, "messy weights")
+        for vertex in range(count):
+            fate, group = rng.random(), groups[int(rng.integers(len(groups)))]
+            if fate < 0.1:
+                for each in groups:
+                    each.remove([vertex])
+            elif fate < 0.2:
+                group.add([vertex], 0.0, "REPLACE")
+            elif fate < 0.3:
+                group.add([vertex], float(10 ** rng.uniform(-6, -2)), "REPLACE")
+    if has(seed, "shape keys", features):
+        rng = numbers(seed, "shape keys")
+        obj.shape_key_add(name="Basis")
+        for index in range(int(rng.integers(1, 4))):
+            key = obj.shape_key_add(name=f"key {index}")
+            moved = scenes.rest_points(obj) + rng.normal(0, 0.1, (count, 3)).astype(np.float32)
+            key.data.foreach_set("co", moved.ravel())
+            key.slider_min, key.slider_max = -1.0, 2.0
+            key.value, key.mute = rng.uniform(-0.5, 1.2), bool(rng.random() < 0.2)
+            if rng.random() < 0.3:
+                key.vertex_group = groups[0].name
+            if index and rng.random() < 0.3:
+                key.relative_key = obj.data.shape_keys.key_blocks[1]
+    return obj
+
+
+def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """The mesh object and its armature of one seed, posed, in an empty file."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    armature = make_armature(seed, features)
+    obj = make_mesh(seed, features, armature)
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    if has(seed, "envelopes", features):
+        modifier.use_bone_envelopes = True
+        modifier.use_vertex_groups = bool(numbers(seed, "use groups").random() < 0.7)
+    if has(seed, "mask", features):
+        rng = numbers(seed, "mask")
+        modifier.vertex_group = obj.vertex_groups[int(rng.integers(len(obj.vertex_groups)))].name
+        modifier.invert_vertex_group = bool(rng.random() < 0.5)
+    if has(seed, "modifier behind", features):
+        obj.modifiers.new("Cast", "CAST").factor = 0.3
+    if has(seed, "object transforms", features):
+        rng = numbers(seed, "object transforms")
+        for each in (obj, armature):
+            scale = rng.uniform(0.5, 2.0, 3) * rng.choice((1, 1, 1, -1), 3)
+            each.matrix_basis = (
+                Matrix.Translation(rng.uniform(-2, 2, 3)) @ random_rotation(rng) @ Matrix.Diagonal((*scale, 1))
+            )
+    if has(seed, "parenting", features):
+        obj.parent = armature
+    pose(seed, features, armature)
+    bpy.context.view_layer.update()
+    return obj, armature
+
+
+def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
+    rng = numbers(seed, "pose")
+    scaled, mirrored = has(seed, "scale", features), has(seed, "mirror", features, share=0.2)
+    for bone in armature.pose.bones:
+        bone.rotation_mode = "QUATERNION"
+        bone.rotation_quaternion = rng.normal(0, 1, 4)
+        bone.rotation_quaternion.normalize()
+        bone.location = rng.normal(0, 0.2, 3)
+        scale, sign, chosen = rng.uniform(0.5, 1.8, 3), rng.choice((1, -1), 3), rng.random()
+        if scaled and chosen < 0.6:
+            bone.scale = scale
+        if mirrored and chosen < 0.3:
+            bone.scale = Vector(sign * np.array(bone.scale))
+        bone.bbone_rollin, bone.bbone_curveoutx = rng.uniform(-1, 1), rng.uniform(-0.3, 0.3)
+
+
+def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
+    """3x3: the turn of a posed bone's axes, with the modifier's own choice of a second axis under shear."""
+    x, y, z = posed[:, 0], posed[:, 1] / np.linalg.norm(posed[:, 1]), posed[:, 2]
+    if y @ x < 1.0:
+        x = x - y * (y @ x)
+    elif x @ z < 1.0:
+        x = np.cross(y, z)
+    else:
+        x = np.cross(y, y[[1, 2, 0]])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def undecided(obj: bpy.types.Object) -> np.ndarray:
+    """bool [vertices]: those at a discontinuity of the modifier, of a driven object that was just deformed."""
+    driven = handlers.state_of(obj)
+    binding, frame = driven.binding, driven.binding.last_frame
+    space = frame.bones_from_model
+    points = frame.rest_points @ space[:3, :3].T + space[:3, 3]
+    influences = binding.weighting.influences_over_joints(points)
+    motions = frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64))
+    rest_axes = binding.bones.rest_axes.astype(np.float64)[:, :3, :3]
+    quaternions = np.array(
+        [
+            reference.quaternion(rotation_keeping_y(motion[:3, :3] @ rest) @ rest.T)
+            for motion, rest in zip(motions, rest_axes, strict=True)
+        ]
+    )
+    result = np.zeros(len(points), dtype=bool)
+    for vertex in range(len(points)):
+        total = np.zeros(4)
+        span = slice(influences.offsets[vertex], influences.offsets[vertex + 1])
+        for bone, weight in zip(influences.bones[span], influences.weights[span], strict=True):
+            meeting = float(quaternions[bone] @ total)
+            length = float(np.linalg.norm(total))
+            result[vertex] |= length > 0.0 and abs(meeting) < MARGIN * length
+            total += np.copysign(weight, meeting) * quaternions[bone] if length else weight * quaternions[bone]
+    entries = binding.weighting.entries
+    sums = np.bincount(entries.vertices, weights=entries.weights, minlength=len(points))
+    return result | (np.abs(sums - 1e-4) < MARGIN * 1e-4)
+
+
+def check(seed: int, features: set[str]) -> Outcome:
+    obj, _armature = make_rig(seed, features)
+    expected = {}
+    modifier = obj.modifiers["Armature"]
+    for method, preserve_volume in ORACLES:
+        modifier.use_deform_preserve_volume = preserve_volume
+        bpy.context.view_layer.update()
+        expected[method] = scenes.final_points(obj)
+    drive.add(obj)
+    handlers.refresh(bpy.context)
+    outcome = Outcome(seed, vertices=len(obj.data.vertices))
+    for method, _preserve_volume in ORACLES:
+        properties.of(obj).method = method
+        if not properties.of(obj).enabled:
+            outcome.errors[method] = float("inf")
+            continue
+        left_out = undecided(obj)
+        outcome.left_out = int(left_out.sum())
+        # A pose with scale makes the mesh larger, and its rounding with it.
+        extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected[method], axis=0))))
+        error = np.abs(scenes.final_points(obj) - expected[method])[~left_out].max(initial=0.0)
+        outcome.errors[method] = float(error) / extent
+    return outcome
+
+
+def shrink(seed: int) -> set[str]:
+    """The features that the failure of a seed needs."""
+    features = set(FEATURES)
+    for feature in FEATURES:
+        if check(seed, features - {feature}).failed:
+            features.discard(feature)
+    return features
+
+
+def run(first: int, count: int, keep: Path) -> list[Outcome]:
+    """Checks `count` seeds from `first`; saves those that fail, made small, in `keep`."""
+    outcomes = []
+    for seed in range(first, first + count):
+        outcome = check(seed, set(FEATURES))
+        outcomes.append(outcome)
+        if outcome.failed:
+            features = shrink(seed)
+            make_rig(seed, features)
+            keep.mkdir(parents=True, exist_ok=True)
+            bpy.ops.wm.save_as_mainfile(filepath=str(keep / f"seed-{seed}.blend"))
+            needed = sorted(f for f in features if has(seed, f, features) or f == "mirror")
+            print(f"seed {seed} fails: {outcome.errors}; needs {needed}; saved in {keep}", flush=True)
+    return outcomes
+
+
+def summarise(outcomes: list[Outcome]) -> str:
+    worst = {method: max(outcomes, key=lambda o: o.errors[method]) for method, _volume in ORACLES}
+    left_out = sum(o.left_out for o in outcomes)
+    vertices = sum(o.vertices for o in outcomes)
+    touched = sum(o.left_out > 0 for o in outcomes)
+    errors = ", ".join(f"{m} {o.errors[m]:.1e} (seed {o.seed})" for m, o in worst.items())
+    return (
+        f"{len(outcomes)} rigs, {sum(o.failed for o in outcomes)} failed; worst error as a part of the diagonal: "
+        f"{errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a discontinuity"
+    )
+
+
+def main() -> int:
+    import sinew_addon
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rigs", type=int, default=500)
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--keep", type=Path, default=Path("build/fuzz"), help="folder for rigs that fail")
+    args = parser.parse_args()
+    sinew_addon.register()
+    try:
+        outcomes = run(args.first, args.rigs, args.keep)
+    finally:
+        sinew_addon.unregister()
+    print(summarise(outcomes))
+    return int(any(outcome.failed for outcome in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
