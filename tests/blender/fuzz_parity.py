@@ -181,7 +181,9 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
         for each in (obj, armature):
             scale = rng.uniform(0.5, 2.0, 3) * rng.choice((1, 1, 1, -1), 3)
             each.matrix_basis = (
-                Matrix.Translation(rng.uniform(-2, 2, 3)) @ random_rotation(rng) @ Matrix.Diagonal((*scale, 1))
+                Matrix.Translation(rng.uniform(-2, 2, 3))
+                @ random_rotation(rng)
+                @ Matrix.Diagonal((*scale, 1))
             )
     if has(seed, "parenting", features):
         obj.parent = armature
@@ -242,7 +244,9 @@ def undecided(obj: bpy.types.Object) -> np.ndarray:
             meeting = float(quaternions[bone] @ total)
             length = float(np.linalg.norm(total))
             result[vertex] |= length > 0.0 and abs(meeting) < MARGIN * length
-            total += np.copysign(weight, meeting) * quaternions[bone] if length else weight * quaternions[bone]
+            total += (
+                np.copysign(weight, meeting) * quaternions[bone] if length else weight * quaternions[bone]
+            )
     entries = binding.weighting.entries
     sums = np.bincount(entries.vertices, weights=entries.weights, minlength=len(points))
     return result | (np.abs(sums - 1e-4) < MARGIN * 1e-4)
