@@ -54,13 +54,12 @@ def differences(
     """A sentence for each thing that the modifier does and Sinew does not."""
     found = []
     deforming = [bone for bone in armature.data.bones if bone.use_deform]
-    if modifier.use_multi_modifier:
-        found.append(f"{modifier.name} is a Multi Modifier, which Sinew treats as a plain one")
     if any(bone.bbone_segments > 1 and bone.bbone_mapping_mode == "CURVED" for bone in deforming):
         found.append("Bendy bones with curved mapping: Sinew maps them straight")
-    others = [
-        m.name for m in obj.modifiers if m.type == "ARMATURE" and m != modifier and m.object is not None
-    ]
+    others = [m for m in obj.modifiers if m.type == "ARMATURE" and m != modifier and m.object is not None]
     if others:
-        found.append(f"Further Armature modifiers stay Blender's: {', '.join(others)}")
+        found.append(f"Further Armature modifiers stay Blender's: {', '.join(m.name for m in others)}")
+    for other in others:
+        if other.use_multi_modifier:
+            found.append(f"{other.name} is a Multi Modifier: behind Sinew it acts as a plain one")
     return found

@@ -222,7 +222,7 @@ def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
 
 
 def undecided(obj: bpy.types.Object) -> np.ndarray:
-    """bool [vertices]: those at a discontinuity of the modifier, of a driven object that was just deformed."""
+    """bool [vertices]: those at a discontinuity of the modifier, of an object that was just deformed."""
     driven = handlers.state_of(obj)
     binding, frame = driven.binding, driven.binding.last_frame
     space = frame.bones_from_model
@@ -309,8 +309,8 @@ def summarise(outcomes: list[Outcome]) -> str:
     touched = sum(o.left_out > 0 for o in outcomes)
     errors = ", ".join(f"{m} {o.errors[m]:.1e} (seed {o.seed})" for m, o in worst.items())
     return (
-        f"{len(outcomes)} rigs, {sum(o.failed for o in outcomes)} failed; worst error as a part of the diagonal: "
-        f"{errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a discontinuity"
+        f"{len(outcomes)} rigs, {sum(o.failed for o in outcomes)} failed; worst error as a part of the "
+        f"diagonal: {errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a discontinuity"
     )
 
 

@@ -431,10 +431,11 @@ def test_what_is_not_reproduced_is_warned_of():
     obj, armature = scenes.make_arm()
     for group in obj.vertex_groups:
         group.remove([0, 1])
-    obj.modifiers["Armature"].use_multi_modifier = True
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object, second.use_multi_modifier = armature, True
     armature.data.bones[1].bbone_segments = 4
     armature.data.bones[1].bbone_mapping_mode = "CURVED"
     scenes.add_sinew(obj)
     warnings = " ".join(handlers.state_of(obj).facts.warnings)
-    for words in ("2 of 252 vertices", "Multi Modifier", "curved mapping"):
+    for words in ("2 of 252 vertices", "Second is a Multi Modifier", "curved mapping"):
         assert words in warnings
