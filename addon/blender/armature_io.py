@@ -23,14 +23,38 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     bones.foreach_get("bbone_segments", segments)
     rest = _read_matrices(bones, "matrix_local")
     first_joints = np.full(len(bones), -1, dtype=np.int32)
-    parts, count = [rest], len(bones)
+    parts, count, complete = [rest], len(bones), True
     for bone in np.flatnonzero(segments > 1):
+        try:
+            joints = _read_joints(evaluated_armature, rest, int(bone), int(segments[bone]), at_rest=True)
+        except RuntimeError:
+            # Blender has not evaluated this pose, as in a view layer that does not show it.
+            segments[bone], complete = 1, False
+            continue
         first_joints[bone] = count
-        parts.append(_read_joints(evaluated_armature, rest, int(bone), int(segments[bone]), at_rest=True))
+        parts.append(joints)
         count += segments[bone] + 1
-    names = tuple(bone.name for bone in bones)
-    envelopes = _read_envelopes(bones)
-    return Bones(names, deform, np.concatenate(parts), lengths, segments, first_joints, envelopes)
+    return Bones(
+        tuple(bone.name for bone in bones),
+        deform,
+        np.concatenate(parts),
+        lengths,
+        segments,
+        first_joints,
+        _read_envelopes(bones),
+        complete,
+    )
+
+
+def handles_of(armature: bpy.types.Object, names: list[str]) -> list[str]:
+    """The bones that shape the bendy ones among `names`: their handles, neighbours or chosen ones."""
+    handles = []
+    for name in names:
+        bone = armature.data.bones[name]
+        if bone.bbone_segments > 1:
+            chosen = (bone.bbone_custom_handle_start, bone.bbone_custom_handle_end, bone.parent)
+            handles += [b.name for b in (*chosen, *bone.children) if b is not None]
+    return sorted(set(handles) - set(names))
 
 
 def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
@@ -79,10 +103,17 @@ def _read_joints(
     return (matrices[bone].astype(np.float64) @ np.stack(joints)).astype(np.float32)
 
 
-def bones_from_model(evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object) -> np.ndarray:
-    """float64 [4, 4]: the mesh object's space to armature space."""
+def bones_from_model(
+    evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object
+) -> np.ndarray | None:
+    """float64 [4, 4]: the mesh object's space to armature space; None where the armature has no size."""
     mesh_world = np.array(evaluated_mesh.matrix_world, dtype=np.float64)
     armature_world = np.array(evaluated_armature.matrix_world, dtype=np.float64)
     if np.array_equal(mesh_world, armature_world):
         return SAME_SPACE
-    return np.linalg.inv(armature_world) @ mesh_world
+    try:
+        space = np.linalg.inv(armature_world) @ mesh_world
+        np.linalg.inv(space)
+    except np.linalg.LinAlgError:
+        return None
+    return space if np.isfinite(space).all() else None

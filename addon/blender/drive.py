@@ -12,6 +12,8 @@ import bpy
 from ..core.errors import SinewError
 from . import mesh_io, node_group, pose_driver, properties
 
+ATTRIBUTE = "sinew_points"
+
 # Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
 HARMLESS_IN_FRONT = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
 
@@ -39,7 +41,10 @@ def _is_on(modifier: bpy.types.Modifier) -> bool:
 
 
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    return next((m for m in obj.modifiers if node_group.is_sinew(m)), None)
+    """Sinew's own modifier; one that has lost its node group is known by its name."""
+    nodes = [m for m in obj.modifiers if m.type == "NODES"]
+    lost = (m for m in nodes if m.node_group is None and m.name.startswith("Sinew"))
+    return next((m for m in nodes if node_group.is_sinew(m)), None) or next(lost, None)
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -73,15 +78,26 @@ def check_can_add(obj: bpy.types.Object) -> bpy.types.ArmatureModifier:
         )
     if obj.mode == "EDIT":
         raise SinewError(f"{obj.name} is in edit mode; leave it first")
+    if obj.parent_type == "ARMATURE":
+        raise SinewError(
+            f"{obj.name}: its parent {obj.parent.name} deforms it too (parent type Armature); set its parent "
+            "type to Object"
+        )
+    check_in_front(obj)
+    return modifier
+
+
+def check_in_front(obj: bpy.types.Object) -> None:
+    """Raises SinewError where a modifier in front of the Armature modifier changes the mesh."""
+    modifier = armature_modifier(obj)
     for other in obj.modifiers:
         if other == modifier:
             break
-        if _is_on(other) and other.type not in HARMLESS_IN_FRONT:
+        if _is_on(other) and other.type not in HARMLESS_IN_FRONT and not node_group.is_sinew(other):
             raise SinewError(
                 f"{obj.name}: modifier {other.name} stands in front of {modifier.name} and changes the mesh "
                 "before it; apply it or move it behind"
             )
-    return modifier
 
 
 def add(obj: bpy.types.Object, method: str | None = None) -> None:
@@ -105,9 +121,8 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
         obj.modifiers.active = active
     settings.method = method or ("dq" if modifier.use_deform_preserve_volume else "lbs")
     settings.armature = modifier.object
-    settings.show_viewport = modifier.show_viewport
-    settings.show_render = modifier.show_render
     settings.armature_modifier = modifier.name
+    record_flags(obj)
     settings.attribute = _free_attribute_name(obj)
     node_group.set_attribute_name(nodes, settings.attribute)
     switch(obj, on=True)
@@ -127,9 +142,7 @@ def remove(obj: bpy.types.Object) -> None:
         obj.modifiers.remove(nodes)
         if active is not None:
             obj.modifiers.active = active
-    name = settings.attribute
-    if not any(_uses_attribute(other, obj.data, name) for other in bpy.data.objects if other != obj):
-        mesh_io.remove_points(obj.data, name)
+    _remove_attributes(obj)
     _remove_animation(obj)
     properties.clear(obj)
     node_group.remove_unused()
@@ -154,20 +167,38 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         nodes.show_render = on and settings.show_render
 
 
-def clear_pointer(obj: bpy.types.Object) -> None:
-    """Clears the Armature modifier's pointer, which the settings keep. An armature that the artist chose in
-    the modifier meanwhile is taken over."""
+def record_flags(obj: bpy.types.Object) -> None:
+    """Notes whether the Armature modifier is shown and rendered, to be given back."""
+    settings, modifier = properties.of(obj), armature_modifier(obj)
+    if modifier is not None:
+        settings.show_viewport, settings.show_render = modifier.show_viewport, modifier.show_render
+
+
+def adopt_pointer(obj: bpy.types.Object) -> None:
+    """Takes over an armature that the artist chose in the Armature modifier."""
     modifier = armature_modifier(obj)
-    if modifier is not None and modifier.object is not None and properties.of(obj).enabled:
+    if modifier is not None and modifier.object not in (None, properties.of(obj).armature):
         properties.of(obj).armature = modifier.object
+
+
+def clear_pointer(obj: bpy.types.Object) -> None:
+    """Clears the Armature modifier's pointer, which the settings keep."""
+    adopt_pointer(obj)
+    modifier = armature_modifier(obj)
+    if modifier is not None and modifier.object is not None:
         modifier.object = None
+
+
+def give_back_pointer(obj: bpy.types.Object) -> None:
+    """The Armature modifier points to its armature again."""
+    modifier = armature_modifier(obj)
+    if modifier is not None and modifier.object is None:
+        modifier.object = properties.of(obj).armature
 
 
 def give_back(obj: bpy.types.Object) -> None:
     """The Armature modifier points to its armature again, and nothing else of ours does."""
-    modifier = armature_modifier(obj)
-    if modifier is not None and modifier.object is None:
-        modifier.object = properties.of(obj).armature
+    give_back_pointer(obj)
     pose_driver.remove(obj)
 
 
@@ -193,41 +224,61 @@ def _free_attribute_name(obj: bpy.types.Object) -> str:
         if other != obj and properties.is_driven(other) and other.data == obj.data
     }
     used |= {attribute.name for attribute in obj.data.attributes}
-    name, number = "sinew_points", 0
+    name, number = ATTRIBUTE, 0
     while name in used:
         number += 1
-        name = f"sinew_points.{number:03d}"
+        name = f"{ATTRIBUTE}.{number:03d}"
     return name
 
 
-def _uses_attribute(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> bool:
-    return properties.is_driven(obj) and obj.data == mesh and properties.of(obj).attribute == name
+def _remove_attributes(obj: bpy.types.Object) -> None:
+    """Takes all attributes of ours off the mesh but those of its other users: a mesh that was copied with
+    its object's settings can have more than one."""
+    used = {
+        properties.of(other).attribute
+        for other in bpy.data.objects
+        if other != obj and properties.is_driven(other) and other.data == obj.data
+    }
+    for name in [attribute.name for attribute in obj.data.attributes]:
+        if name.startswith(ATTRIBUTE) and name not in used:
+            mesh_io.remove_points(obj.data, name)
+
+
+def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
+    """Takes keys of Sinew's settings off the object, unless another object plays the same action."""
+    animation = obj.animation_data
+    if animation is None:
+        return
+    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    for player in (animation, *strips):
+        action = player.action
+        if action is None or action.users > 1:
+            continue
+        removed = 0
+        for curves in _curve_lists(player):
+            for curve in [c for c in curves if c.data_path.startswith(path)]:
+                curves.remove(curve)
+                removed += 1
+        if removed and player is animation and not any(len(curves) for curves in _curve_lists(player)):
+            animation.action = None
+            bpy.data.actions.remove(action)
 
 
 def _remove_animation(obj: bpy.types.Object) -> None:
     """Takes keys and drivers of Sinew's settings off the object, and its animation data if they were all."""
+    remove_keys(obj)
     animation = obj.animation_data
     if animation is None:
         return
     for driver in [d for d in animation.drivers if d.data_path.startswith("sinew.")]:
         animation.drivers.remove(driver)
-    action = animation.action
-    if action is not None:
-        removed = False
-        for curves in _curve_lists(animation):
-            for curve in [c for c in curves if c.data_path.startswith("sinew.")]:
-                curves.remove(curve)
-                removed = True
-        if removed and not any(len(curves) for curves in _curve_lists(animation)) and action.users == 1:
-            animation.action = None
-            bpy.data.actions.remove(action)
     pose_driver.remove_empty_animation(obj)
 
 
-def _curve_lists(animation: bpy.types.AnimData) -> list[bpy.types.bpy_prop_collection]:
-    """The F-curves that `animation` plays: an action's own up to 4.3, those of its slot since 4.4."""
-    action = animation.action
-    slot = getattr(animation, "action_slot", None)
+def _curve_lists(player: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
+    """The F-curves that `player` plays: an action's own up to 4.3, those of its slot since 4.4."""
+    action = player.action
+    slot = getattr(player, "action_slot", None)
     if not hasattr(action, "layers"):
         return [action.fcurves]
     if slot is None:

@@ -58,6 +58,9 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
             properties.of(obj).enabled = False
         return
     drive.add(obj, method)
+    # What is asked for wins over keys in the file.
+    drive.remove_keys(obj, "sinew.method")
+    properties.of(obj).method = method
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
     handlers.refresh(bpy.context)

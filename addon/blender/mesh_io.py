@@ -57,7 +57,7 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
             if group is not None:
                 move *= weights.of_group(group.index)[:, None]
         moves.append(move)
-    return ShapeKeys(points[basis.name], moves)
+    return ShapeKeys(tuple(points), points[basis.name], moves)
 
 
 def read_key_values(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
@@ -68,11 +68,16 @@ def read_key_values(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np
     blocks.foreach_get("value", values)
     blocks.foreach_get("mute", muted)
     values[muted] = 0.0
-    if obj.show_only_shape_key:
-        values[:] = 0.0
-        if obj.active_shape_key_index < len(values):
-            values[obj.active_shape_key_index] = 1.0
     return values
+
+
+def read_pinned_points(obj: bpy.types.Object) -> np.ndarray:
+    """float32 [vertices, 3]: the shape key shown alone, as it is stored; the basis where it is muted."""
+    keys = obj.data.shape_keys
+    block = obj.active_shape_key
+    if block is None or block.mute:
+        block = keys.reference_key
+    return read_points(block.points)
 
 
 def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
@@ -88,6 +93,17 @@ def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
         mesh.attributes.active_index = active
     attribute.data.foreach_set("vector", points.ravel())
     mesh.update_tag()
+
+
+def write_points_once(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
+    """The same, unless it holds these points: writing tells Blender that the mesh changed."""
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and len(attribute.data) == len(points):
+        held = np.empty_like(points)
+        attribute.data.foreach_get("vector", held.ravel())
+        if np.array_equal(held, points):
+            return
+    write_points(mesh, name, points)
 
 
 def remove_points(mesh: bpy.types.Mesh, name: str) -> None:

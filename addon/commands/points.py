@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if not taken:
         raise SinewError(f"{args.file}: no mesh that Sinew can drive")
 
+    if "frames" in (obj.name for obj in taken):
+        raise SinewError(f"{args.file}: an object is called frames, as the array of frames is; rename it")
     points: dict[str, list[np.ndarray]] = {obj.name: [] for obj in taken}
     for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
         evaluate.set_frame(bpy.context.scene, frame)
@@ -86,8 +89,11 @@ def _write(path: Path, arrays: dict[str, np.ndarray]) -> None:
     unfinished = path.with_name(f".{path.name}.unfinished")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with unfinished.open("wb") as file:
-            np.savez(file, **arrays)
+        # Not np.savez, whose own arguments' names an object could have.
+        with zipfile.ZipFile(unfinished, "w") as archive:
+            for name, array in arrays.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, np.ascontiguousarray(array))
         os.replace(unfinished, path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)

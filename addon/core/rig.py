@@ -25,6 +25,7 @@ class Bones:
     segments      int32 [bones], 1 for a bone that does not bend
     first_joints  int32 [bones], where in `rest` the segments + 1 joints of a bending bone begin
     envelopes     the reach of every bone
+    complete      false where bendy bones had no joints yet, and count as not bending
     """
 
     names: tuple[str, ...]
@@ -34,6 +35,7 @@ class Bones:
     segments: np.ndarray
     first_joints: np.ndarray
     envelopes: Envelopes
+    complete: bool = True
 
     @property
     def bend(self) -> bool:

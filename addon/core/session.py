@@ -57,6 +57,11 @@ class Binding:
         """What was deformed last."""
         return self._last
 
+    @property
+    def points(self) -> np.ndarray:
+        """The result of the last call of deform, float32 [vertices, 3]."""
+        return self._points
+
     def deform(self, frame: Frame) -> np.ndarray | None:
         """Deformed points float32 [vertices, 3] in object space, valid until the next call; None where the
         frame equals the last one."""

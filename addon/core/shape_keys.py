@@ -13,10 +13,12 @@ import numpy as np
 class ShapeKeys:
     """The relative shape keys of a mesh.
 
+    names  of all keys, in order
     basis  float32 [vertices, 3]
     moves  one for each key: None for the basis, else float32 [vertices, 3], what value 1 adds
     """
 
+    names: tuple[str, ...]
     basis: np.ndarray
     moves: Sequence[np.ndarray | None]
 

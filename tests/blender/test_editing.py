@@ -254,14 +254,16 @@ def test_deleted_armature_turns_the_mesh_off_with_a_sentence():
     drive.remove(obj)
 
 
-def test_armature_deleted_as_in_the_window_is_let_go():
-    """Deleting in the window unlinks it from all scenes; our pointer alone must not keep it."""
+def test_armature_deleted_as_in_the_window_is_noticed():
+    """Deleting in the window unlinks it from all scenes; our pointer alone still keeps it."""
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj)
     bpy.context.scene.collection.objects.unlink(armature)
     bpy.context.scene.frame_set(6)
-    assert properties.of(obj).armature is None
-    assert "armature was deleted" in properties.of(obj).error
+    assert "was deleted" in properties.of(obj).error
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.ops.sinew.rebind()
+    assert_follows(obj)
 
 
 def test_deleted_mesh_is_forgotten():

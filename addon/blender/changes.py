@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender says changed in an update."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+
+
+@dataclass
+class Changes:
+    """The data touched since the last update, by session_uid.
+
+    objects    whose geometry was touched
+    meshes     whose geometry was touched: points, weights, topology, shape keys
+    armatures  whose bones may differ
+    structure  objects may have come, gone or been hidden
+    frame      this is a change of frame
+    """
+
+    objects: set[int] = field(default_factory=set)
+    meshes: set[int] = field(default_factory=set)
+    armatures: set[int] = field(default_factory=set)
+    structure: bool = False
+    frame: bool = False
+
+    @classmethod
+    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
+        changes = cls(frame=frame)
+        for update in depsgraph.updates:
+            what = update.id
+            if isinstance(what, bpy.types.Object):
+                if update.is_updated_geometry:
+                    changes.objects.add(what.original.session_uid)
+            elif isinstance(what, bpy.types.Mesh):
+                if update.is_updated_geometry:
+                    changes.meshes.add(what.original.session_uid)
+            elif isinstance(what, bpy.types.Armature):
+                changes.armatures.add(what.original.session_uid)
+            elif isinstance(what, bpy.types.Scene | bpy.types.Collection):
+                changes.structure = True
+        return changes
