@@ -47,6 +47,11 @@ def update(
     Raises SinewError with a sentence for the user where it can not be driven.
     """
     settings = properties.of(obj)
+    if obj.library is not None or obj.data.library is not None:
+        raise SinewError(
+            f"{obj.name} is linked from another file: its Armature modifier deforms it; make it local to use "
+            "Sinew here"
+        )
     drive.adopt_pointer(obj)
     if obj.mode in MODES_THAT_NEED_THE_POINTER:
         drive.give_back_pointer(obj)
@@ -116,7 +121,8 @@ def _check_stack(obj: bpy.types.Object, changes: Changes) -> None:
     """Raises SinewError where the modifiers that Sinew works with are gone or in the wrong order."""
     if drive.armature_modifier(obj) is None:
         raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
-    if drive.sinew_modifier(obj) is None:
+    nodes = drive.sinew_modifier(obj)
+    if nodes is None or nodes.node_group is None:
         raise SinewError(f"{obj.name}: its Sinew modifier was deleted; press Remove, then Add Sinew")
     if obj.session_uid in changes.objects:
         drive.check_in_front(obj)

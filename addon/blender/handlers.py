@@ -188,6 +188,13 @@ def register() -> None:
         getattr(bpy.app.handlers, event).extend(functions)
 
 
+def adopt_open_file() -> None:
+    """Takes over the driven objects of a file that was open before Sinew was registered."""
+    # While Blender starts, its data is out of reach, and loading the first file takes care of it.
+    if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
+        refresh(bpy.context)
+
+
 def unregister() -> None:
     for event, functions in _HANDLERS.items():
         registered = getattr(bpy.app.handlers, event)

@@ -25,6 +25,7 @@ def register() -> None:
     _register_classes((properties.SinewSettings, *operators.CLASSES, *panels.CLASSES))
     bpy.types.Object.sinew = bpy.props.PointerProperty(type=properties.SinewSettings)
     handlers.register()
+    handlers.adopt_open_file()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
     # handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5.
     atexit.register(unregister)

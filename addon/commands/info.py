@@ -47,11 +47,14 @@ def describe_file(path: Path) -> list[dict[str, object]]:
     files.open_file(path)
     meshes = []
     for obj in drive.deformed_meshes(list(bpy.data.objects)):
+        armature = drive.armature_of(obj)
+        if armature is None:
+            raise SinewError(f"{path}: {obj.name} was driven by Sinew, and its armature is gone")
         facts = survey.describe_undriven(obj)
         meshes.append(
             {
                 "object": obj.name,
-                "armature": drive.armature_of(obj).name,
+                "armature": armature.name,
                 "vertices": facts.vertices,
                 "bones": facts.bones,
                 "bones_with_weights": facts.weighted_bones,

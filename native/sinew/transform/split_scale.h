@@ -16,23 +16,50 @@ struct ScaleSplit {
     bool has_scale = false;
 };
 
+/// Unit quaternion that Blender reads from `axes`, whose columns are of unit length or zero.
+///
+/// For a rotation it is the rotation's. With zero columns it is nobody's, and kept for what follows from it:
+/// the place of vertices that share a bone of no width with another.
+template <class T>
+[[nodiscard]] Quat<T> quat_of_columns(const Mat3<T>& axes) noexcept {
+    // Which of the four components is computed first decides the result where the columns are no rotation.
+    int first = 3;
+    if (axes[2][2] < T(0)) {
+        first = axes[0][0] > axes[1][1] ? 0 : 1;
+    } else if (axes[0][0] < -axes[1][1]) {
+        first = 2;
+    }
+    const Vec3<T> turn(axes[1][2] - axes[2][1], axes[2][0] - axes[0][2], axes[0][1] - axes[1][0]);
+    if (first == 3) {
+        const T s = T(2) * std::sqrt(T(1) + axes[0][0] + axes[1][1] + axes[2][2]);
+        return glm::normalize(Quat<T>(s / T(4), turn.x / s, turn.y / s, turn.z / s));
+    }
+    const int second = (first + 1) % 3;
+    const int third = (first + 2) % 3;
+    T s = T(2) * std::sqrt(T(1) + axes[first][first] - axes[second][second] - axes[third][third]);
+    if (turn[first] < T(0)) s = -s;
+    Vec3<T> v{};
+    v[first] = s / T(4);
+    v[second] = (axes[first][second] + axes[second][first]) / s;
+    v[third] = (axes[first][third] + axes[third][first]) / s;
+    return glm::normalize(Quat<T>(turn[first] / s, v.x, v.y, v.z));
+}
+
 /// The right-handed rotation that keeps the direction of the Y column of `linear` and makes the others
 /// square to it. A mirror in `linear` is not in the rotation.
 ///
-/// Columns below 1e-6 of the longest, or as near to parallel, give no direction: those left decide, and
-/// after them the columns of the rotation `otherwise`.
+/// Columns below 1e-6 of the longest count as zero. Without Y it is the identity; where X or Z is zero, or X
+/// along Y, quat_of_columns() of what is left decides.
 template <class T>
-[[nodiscard]] Mat3<T> rotation_keeping_y(const Mat3<T>& linear, const Mat3<T>& otherwise) noexcept {
+[[nodiscard]] Mat3<T> rotation_keeping_y(const Mat3<T>& linear) noexcept {
     // Bones come as float32: what is shorter than this is their rounding.
     constexpr T kNoDirection = T(1e-6);
     const T size = std::max({glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])});
-    if (!(size > T(0))) return otherwise;
+    if (!(size > T(0))) return Mat3<T>(T(1));
     const Mat3<T> c = linear * (T(1) / size);
-
-    Vec3<T> y = c[1];
-    if (glm::length(y) <= kNoDirection) y = glm::cross(c[2], c[0]);
-    if (glm::length(y) <= kNoDirection) y = otherwise[1];
-    y = glm::normalize(y);
+    const auto is_zero = [](const Vec3<T>& v) { return glm::length(v) <= kNoDirection; };
+    if (is_zero(c[1])) return Mat3<T>(T(1));
+    const Vec3<T> y = glm::normalize(c[1]);
 
     // The odd tests against 1, with x and z not normalised and the second of x against z, are Blender's:
     // under extreme shear and scale they pick another axis, and so must we.
@@ -44,13 +71,15 @@ template <class T>
     } else {
         x = glm::cross(y, Vec3<T>(y.y, y.z, y.x));
     }
-    for (const Vec3<T>& z : {c[2], otherwise[2], otherwise[1]}) {
-        if (glm::length(x) <= kNoDirection) x = glm::cross(y, z);
-    }
+    if (is_zero(x)) return to_mat3(quat_of_columns(Mat3<T>(Vec3<T>(T(0)), y, Vec3<T>(T(0)))));
     // Twice, because a short difference of long vectors is not square to y.
     x = glm::normalize(x);
     x = glm::normalize(x - y * glm::dot(y, x));
-    return Mat3<T>(x, y, glm::cross(x, y));
+    Mat3<T> axes(x, y, glm::cross(x, y));
+    if (!is_zero(c[0]) && !is_zero(c[2])) return axes;
+    if (is_zero(c[0])) axes[0] = Vec3<T>(T(0));
+    if (is_zero(c[2])) axes[2] = Vec3<T>(T(0));
+    return to_mat3(quat_of_columns(axes));
 }
 
 /// Splits a bone's motion into a rigid motion and a scale about the bone's head along its rest axes.
@@ -59,8 +88,8 @@ template <class T>
 /// rest_bone        the bone's rest axes (Y along the bone) and head in the same space, orthonormal
 ///
 /// A motion within 1e-5 of orthonormal, unmirrored and within 1e-4 of unit size counts as rigid.
-/// Where axes vanish or are parallel those left decide, and after them the rest axes. Source: the rule that
-/// Blender's Armature modifier has for Preserve Volume.
+/// The rigid part is always a rotation, also where axes vanish. Source: the rule that Blender's Armature
+/// modifier has for Preserve Volume.
 template <class T>
 [[nodiscard]] ScaleSplit<T> split_scale(const Affine<T>& posed_from_rest,
                                         const Affine<T>& rest_bone) noexcept {
@@ -76,8 +105,7 @@ template <class T>
     if (orthonormal && glm::determinant(c) >= T(0) && glm::dot(stretch, stretch) <= T(1e-8)) {
         return {posed_from_rest, {}, false};
     }
-    const Affine<T> rigid_bone{rotation_keeping_y(posed_bone.linear, rest_bone.linear),
-                               posed_bone.translation};
+    const Affine<T> rigid_bone{rotation_keeping_y(posed_bone.linear), posed_bone.translation};
     const Affine<T> rest_from_model = inverse(rest_bone);
     return {rigid_bone * rest_from_model, rest_bone * (inverse(rigid_bone) * posed_bone) * rest_from_model,
             true};
