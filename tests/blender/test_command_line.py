@@ -231,3 +231,15 @@ def test_glb_files_are_read(real_rig, tmp_path):
     assert [mesh["object"] for mesh in report[0]["meshes"]] == ["fox"]
     run_sinew("reskin", path, "--method", "lbs", "--out", tmp_path)
     assert (tmp_path / "Fox.blend").exists()
+
+
+def test_the_method_asked_for_wins_over_keys_and_any_object_name_is_written(tmp_path):
+    obj, _armature = scenes.make_arm(name="file")
+    expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)
+    scenes.add_sinew(obj, "lbs")
+    obj.keyframe_insert("sinew.method", frame=1)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "keyed.blend"))
+    out = tmp_path / "points.npz"
+    run_sinew("points", tmp_path / "keyed.blend", "--method", "dq", "--frames", "11", "--out", out)
+    with np.load(out) as points:
+        assert scenes.worst(points["file"], expected) <= 1e-5

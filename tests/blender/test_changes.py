@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes made behind Sinew's back while it drives a character, each found by breaking it once."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import sinew_addon
+from sinew_addon.blender import drive, properties
+from test_editing import assert_follows
+
+
+@pytest.fixture
+def keyed():
+    """A driven arm with two shape keys, the second at half."""
+    obj, armature = scenes.make_arm()
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="wide")
+    key.data.foreach_set("co", (1.2 * scenes.rest_points(obj)).ravel())
+    key.value = 0.5
+    scenes.add_sinew(obj)
+    scenes.shapes(obj, [1, 6])
+    return obj, armature
+
+
+def test_weights_of_a_mesh_with_shape_keys(keyed):
+    obj, _armature = keyed
+    obj.vertex_groups[0].add(list(range(100, 140)), 1.0, "REPLACE")
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+
+
+def test_a_shape_key_edited_added_and_removed(keyed):
+    obj, _armature = keyed
+    keys = obj.data.shape_keys
+    keys.key_blocks["wide"].data[7].co.z += 0.3
+    obj.data.update_tag()
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+    obj.shape_key_add(name="another").value = 1.0
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+    obj.shape_key_remove(keys.key_blocks["wide"])
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+
+
+def test_a_slider_moved_and_weights_after_it(keyed):
+    obj, _armature = keyed
+    obj.data.shape_keys.key_blocks["wide"].value = 0.9
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+    obj.vertex_groups[1].add(list(range(60, 90)), 0.2, "REPLACE")
+    bpy.context.view_layer.update()
+    assert_follows(obj)
+
+
+def test_first_shape_keys_of_a_driven_mesh():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    scenes.shapes(obj, [1, 6])
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="lifted").data[3].co.z += 1.0
+    obj.data.shape_keys.key_blocks["lifted"].value = 1.0
+    assert_follows(obj)
+
+
+@pytest.mark.parametrize("mute", [False, True])
+def test_a_pinned_shape_key(keyed, mute):
+    obj, _armature = keyed
+    obj.active_shape_key_index = 1
+    obj.data.shape_keys.key_blocks["wide"].mute = mute
+    obj.show_only_shape_key = True
+    assert_follows(obj)
+    obj.show_only_shape_key = False
+    assert_follows(obj)
+
+
+def test_hidden_armature_after_off_and_on():
+    obj, armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, [11], preserve_volume=False)[0]
+    scenes.add_sinew(obj)
+    properties.of(obj).enabled = False
+    properties.of(obj).enabled = True
+    armature.hide_viewport = armature.hide_render = True
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.frame_set(11)
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5
+
+
+def test_swapped_bone_names_swap_the_groups():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bones = armature.data.bones
+    bones["bone.0"].name = "x"
+    bones["bone.1"].name = "bone.0"
+    bones["x"].name = "bone.1"
+    bpy.context.view_layer.update()
+    assert [group.name for group in obj.vertex_groups] == ["bone.1", "bone.0"]
+    assert_follows(obj)
+
+
+def test_a_bone_renamed_and_another_made_in_one_edit():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.update()
+    armature.data.edit_bones["bone.1"].name = "forearm"
+    extra = armature.data.edit_bones.new("extra")
+    extra.head, extra.tail = (0, 0, 1), (0, 0, 2)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [group.name for group in obj.vertex_groups] == ["bone.0", "forearm"]
+    assert_follows(obj)
+    assert obj.modifiers["Armature"].object is None
+
+
+def test_bones_are_edited_on_the_rest_shape():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(11)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_follows(obj)
+
+
+def test_weight_painting_finds_the_armature():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(5)
+    assert obj.find_armature() == armature
+    assert_follows(obj)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.scene.frame_set(4)
+    assert obj.modifiers["Armature"].object is None
+
+
+def test_a_deleted_attribute_is_written_again():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(11)
+    expected = scenes.final_points(obj)
+    obj.data.attributes.remove(obj.data.attributes[properties.of(obj).attribute])
+    bpy.context.view_layer.update()
+    assert np.array_equal(scenes.final_points(obj), expected)
+
+
+@pytest.mark.parametrize("what", ["modifier", "node group"])
+def test_deleted_parts_of_ours_are_said_and_removed(what):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    if what == "modifier":
+        obj.modifiers.remove(obj.modifiers["Sinew"])
+    else:
+        bpy.data.node_groups.remove(obj.modifiers["Sinew"].node_group)
+    bpy.context.scene.frame_set(6)
+    assert "Sinew modifier was deleted" in properties.of(obj).error
+    drive.remove(obj)
+    assert [modifier.type for modifier in obj.modifiers] == ["ARMATURE"]
+    assert obj.modifiers["Armature"].show_viewport
+
+
+def test_one_user_of_a_shared_mesh_in_edit_mode():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.scene.frame_set(3)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.scene.frame_set(6)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_follows(obj)
+    assert_follows(other)
+
+
+def test_an_armature_of_no_size_for_a_frame():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    armature.scale = (0.0, 0.0, 0.0)
+    bpy.context.scene.frame_set(3)
+    assert not properties.of(obj).error
+    armature.scale = (1.0, 1.0, 1.0)
+    assert_follows(obj)
+
+
+def test_what_the_artist_switched_while_off_stays():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    properties.of(obj).enabled = False
+    obj.modifiers["Armature"].show_render = False
+    properties.of(obj).enabled = True
+    drive.remove(obj)
+    assert obj.modifiers["Armature"].show_viewport
+    assert not obj.modifiers["Armature"].show_render
+
+
+def test_no_attribute_stays_after_a_linked_duplicate_is_made_single():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.scene.frame_set(3)
+    other.data = other.data.copy()
+    for each in (obj, other):
+        drive.remove(each)
+        assert not [a.name for a in each.data.attributes if a.name.startswith("sinew")]
+
+
+def test_linked_characters_say_so_and_keep_moving(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (_source, target):
+        target.objects = ["Arm", "Arm Rig"]
+    for linked in target.objects:
+        bpy.context.scene.collection.objects.link(linked)
+    obj = bpy.data.objects["Arm"]
+    moved = scenes.shapes(obj, [1, 11])
+    assert "linked from another file" in properties.of(obj).error
+    assert scenes.worst(moved[0], moved[1]) > 0.05
+
+
+def test_registered_with_a_driven_file_open():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    sinew_addon.unregister()
+    bpy.context.scene.frame_set(11)
+    sinew_addon.register()
+    bpy.context.view_layer.update()
+    shown = scenes.final_points(obj)
+    bpy.context.scene.frame_set(3)
+    bpy.context.scene.frame_set(11)
+    assert scenes.worst(shown, scenes.final_points(obj)) <= 1e-6
