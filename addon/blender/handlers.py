@@ -27,6 +27,11 @@ class Session:
     driven: dict[int, Driven] = field(default_factory=dict)
     updating: bool = False
 
+    @property
+    def idle(self) -> bool:
+        """Nothing is driven, and nothing has come since that was seen."""
+        return self.objects == [] and self.object_count == len(bpy.data.objects)
+
     def forget(self) -> None:
         self.objects = None
         self.driven.clear()
@@ -45,6 +50,7 @@ def refresh(context: bpy.types.Context) -> None:
     if session.updating:
         # A handler turned an object off: asking for another evaluation now could be from a render's thread.
         return
+    session.objects = None
     depsgraph = context.evaluated_depsgraph_get()
     _update(depsgraph, Changes())
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
@@ -127,12 +133,14 @@ def _turn_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: 
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _update(depsgraph, Changes.read(depsgraph, frame=True))
+    if not session.idle:
+        _update(depsgraph, Changes.read(depsgraph, frame=True))
 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _update(depsgraph, Changes.read(depsgraph, frame=False))
+    if not session.idle:
+        _update(depsgraph, Changes.read(depsgraph, frame=False))
 
 
 @persistent
