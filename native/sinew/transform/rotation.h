@@ -53,8 +53,8 @@ template <class T>
     const Quat<T> near = q.w < T(0) ? -q : q;
     const Vec3<T> v = vector_part(near);
     const T length = safe_length(v);
-    // 2 atan(x) / x = 2 to the last digit below this; above, atan2 is exact at both ends, acos(w) at neither.
-    const T factor = length < T(1e-9) ? T(2) / near.w : T(2) * atan2(length, near.w) / length;
+    // The factor is 2 to the last digit below this; above, atan2 is exact at both ends, acos(w) at neither.
+    const T factor = length < T(1e-9) ? T(2) : T(2) * atan2(length, near.w) / length;
     return factor * v;
 }
 
