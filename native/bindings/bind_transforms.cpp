@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "broadcast.h"
 #include "module.h"
-#include "sinew/transform/distance.h"
+#include "sinew/transform/rigid_distance.h"
 
 namespace sinew::bindings {
 namespace {
@@ -47,8 +47,8 @@ void bind_representation(py::module_& m) {
                  [](const auto& a, const auto& vector) { return transform_vector(a, vector); });
     def<X, Vec3>(m, "transform_normal", {"a", "normals"},
                  [](const auto& a, const auto& normal) { return transform_normal(a, normal); });
-    def<X, X>(m, "distance", {"a", "b"}, [](const auto& a, const auto& b) {
-        const auto apart = distance(a, b);
+    def<X, X>(m, "rigid_distance", {"a", "b"}, [](const auto& a, const auto& b) {
+        const auto apart = rigid_distance(a, b);
         return std::tuple(apart.angle, apart.translation);
     });
 }

@@ -21,7 +21,6 @@ __all__ = [
     "combined_conjugate",
     "compose",
     "conjugate",
-    "distance",
     "dual_conjugate",
     "exp",
     "from_axis_angle",
@@ -36,6 +35,7 @@ __all__ = [
     "norm",
     "normalized",
     "power",
+    "rigid_distance",
     "to_affine",
     "to_quat_vec",
     "to_screw",
@@ -157,12 +157,12 @@ def transform_normal(a: NDArray[Float], normals: NDArray[Float]) -> NDArray[Floa
     return _native.transform_normal(a, normals)
 
 
-def distance(a: NDArray[Float], b: NDArray[Float]) -> Distance[Float]:
+def rigid_distance(a: NDArray[Float], b: NDArray[Float]) -> Distance[Float]:
     """Angle of the turn from `a` to `b`, 0 to pi, and distance between where they take the origin; both [..].
 
     The same for compose(x, a) and compose(x, b), x rigid.
     """
-    return Distance(*_native.distance(a, b))
+    return Distance(*_native.rigid_distance(a, b))
 
 
 def conjugate(a: NDArray[Float]) -> NDArray[Float]:

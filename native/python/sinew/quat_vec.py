@@ -18,7 +18,6 @@ from ._types import Distance, Float, Number, Screw
 
 __all__ = [
     "compose",
-    "distance",
     "from_axis_angle",
     "from_rotation_matrix",
     "from_screw",
@@ -28,6 +27,7 @@ __all__ = [
     "identity",
     "inverse",
     "normalized",
+    "rigid_distance",
     "to_affine",
     "to_dual_quat",
     "to_screw",
@@ -149,9 +149,9 @@ def transform_normal(a: NDArray[Float], normals: NDArray[Float]) -> NDArray[Floa
     return _native.transform_normal(a, normals)
 
 
-def distance(a: NDArray[Float], b: NDArray[Float]) -> Distance[Float]:
+def rigid_distance(a: NDArray[Float], b: NDArray[Float]) -> Distance[Float]:
     """Angle of the turn from `a` to `b`, 0 to pi, and distance between where they take the origin; both [..].
 
     The same for compose(x, a) and compose(x, b), x rigid.
     """
-    return Distance(*_native.distance(a, b))
+    return Distance(*_native.rigid_distance(a, b))

@@ -17,18 +17,18 @@ struct RigidDistance {
 ///
 /// Rotations of unit length; the signs of quaternions do not matter.
 template <class T>
-[[nodiscard]] RigidDistance<T> distance(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
+[[nodiscard]] RigidDistance<T> rigid_distance(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
     return {angle_between(a.rotation, b.rotation), safe_length(b.translation - a.translation)};
 }
 
 template <class T>
-[[nodiscard]] RigidDistance<T> distance(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
-    return distance(to_quat_vec(a), to_quat_vec(b));
+[[nodiscard]] RigidDistance<T> rigid_distance(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
+    return rigid_distance(to_quat_vec(a), to_quat_vec(b));
 }
 
 template <class T>
-[[nodiscard]] RigidDistance<T> distance(const Affine<T>& a, const Affine<T>& b) noexcept {
-    return distance(to_quat_vec(a), to_quat_vec(b));
+[[nodiscard]] RigidDistance<T> rigid_distance(const Affine<T>& a, const Affine<T>& b) noexcept {
+    return rigid_distance(to_quat_vec(a), to_quat_vec(b));
 }
 
 }  // namespace sinew
