@@ -85,9 +85,10 @@ template <class T>
     const Vec3<T> axis = v / sine;
     const T shift = glm::dot(axis, translation(near));
     // From the dual part: sin(angle/2) moment + (shift/2) cos(angle/2) axis.
-    Vec3<T> moment = vector_part(near.dual) / sine;
-    moment -= axis * glm::dot(axis, moment);
-    return {axis, moment, T(2) * atan2(sine, near.real.w), shift};
+    Vec3<T> moment = vector_part(near.dual);
+    // Twice: what is left of a long vector by the first is square to the axis only to its rounding.
+    for (int pass = 0; pass < 2; ++pass) moment -= axis * glm::dot(axis, moment);
+    return {axis, moment / sine, T(2) * atan2(sine, near.real.w), shift};
 }
 
 template <class T>
