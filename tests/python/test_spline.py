@@ -139,7 +139,9 @@ PARENTS = np.int32([-1, 0, 1, 1])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_skeleton_interpolates_each_bone(method, dtype):
     name = LAYOUT_OF[method]
-    keys = np.stack([layout(rigid(np.random.default_rng(i), 4), name, dtype) for i in range(5)])
+    motions = rigid(np.random.default_rng(9), 4)
+    step = RigidTransform.from_exp_coords([0.3, -0.4, 0.8, 1.0, 2.0, 3.0])
+    keys = np.stack([layout(motions * step**i, name, dtype) for i in range(5)])
     skeleton = sinew.Skeleton(PARENTS)
     bones, defined = skeleton.interpolate(keys[0], keys[1], 0.3, method)
     assert bones.dtype == dtype
@@ -171,7 +173,7 @@ def test_interpolating_after_combining_tears_the_elbow(method):
     name, arm = LAYOUT_OF[method], sinew.Skeleton(np.int32([-1, 0]))
 
     def pose(degrees):
-        turn = Rotation.from_euler("z", [degrees, degrees], degrees=True)
+        turn = Rotation.from_rotvec([[0, 0, degrees], [0, 0, degrees]], degrees=True)
         return layout(RigidTransform.from_components([[0, 0, 0], [1, 0, 0]], turn), name)
 
     def gap(bones):

@@ -28,6 +28,9 @@ def catmull_rom(
     """Blend form: the keys blended by `method` with the weights of the spline (Smith 2013, section 3.2.2).
 
     Rigid for every method but matrix_linear. keys: in the layout of the method.
+
+    With keys more than about 100 degrees apart the negative weights keep the iterations of qv_slerp and dib
+    from settling here and there: not defined, finite, and likely to jump.
     """
     return Blended(*_native.catmull_rom(keys, times, at, method))
 

@@ -82,7 +82,8 @@ template <class Transform, class T>
 /// Blend form: the keys' blend by Method with the weights of the spline, rigid for every method but
 /// MatrixLinear (Smith 2013, section 3.2.2).
 ///
-/// Not defined as spline_vector(), and where the blend is not.
+/// Not defined as spline_vector(), and where the blend is not: with keys more than about 100 degrees apart
+/// the negative weights keep the iterations of QvSlerp and Sclerp from settling here and there.
 template <class Method, class Transform, class T>
 [[nodiscard]] Blended<Transform> spline_blend(const SplineSpan<T>& span,
                                               const std::array<Transform, 4>& keys) noexcept {
