@@ -1,12 +1,120 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "arrays.h"
+#include "interpolations.h"
 #include "module.h"
 #include "sinew/skeleton/forward_kinematics.h"
+#include "sinew/skeleton/keyframes.h"
 
 namespace sinew::bindings {
+namespace {
+
+// [bones, ..] of one representation, one for each bone.
+template <class Transform, class T>
+std::vector<Transform> checked_bones(const Skeleton& skeleton, const py::object& value,
+                                     const char* argument) {
+    const auto input = checked_input<T, Transform>(value, argument);
+    if (input.lead.size() != 1) fail(argument, "one axis of bones", describe(value));
+    if (input.lead[0] != static_cast<py::ssize_t>(skeleton.bone_count())) {
+        fail(argument, std::to_string(skeleton.bone_count()) + " bones", std::to_string(input.lead[0]));
+    }
+    return items_of<Transform>(input);
+}
+
+template <class Transform>
+py::object as_array(const std::vector<Transform>& bones) {
+    Output<Transform> output({static_cast<py::ssize_t>(bones.size())});
+    for (std::size_t bone = 0; bone < bones.size(); ++bone) {
+        output.write(static_cast<py::ssize_t>(bone), bones[bone]);
+    }
+    return output.take();
+}
+
+template <class T>
+T checked_scalar(const py::object& value, const char* argument) {
+    const auto input = checked_input<T, T>(value, argument);
+    if (!input.lead.empty()) fail(argument, "a number", describe(value));
+    return *input.data;
+}
+
+py::object relative_to_root(const Skeleton& skeleton, const py::object& transforms) {
+    return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
+        return with_element(transforms, "transforms", "", [&]<class T>(T) {
+            using Transform = typename Row::template Transform<T>;
+            auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
+            root_relative<Transform>(skeleton, {}, bones, bones);
+            return as_array(bones);
+        });
+    });
+}
+
+py::object interpolate(const Skeleton& skeleton, const py::object& a, const py::object& b,
+                       const py::object& t, const std::string& method) {
+    return with_method(method, [&]<class Method>(Method) {
+        const char* shape = Item<typename Method::template Transform<double>>::kShape;
+        return with_element(a, "a", shape, [&]<class T>(T) -> py::object {
+            using Transform = typename Method::template Transform<T>;
+            const auto from = checked_bones<Transform, T>(skeleton, a, "a");
+            const auto onto = checked_bones<Transform, T>(skeleton, b, "b");
+            std::vector<Transform> bones(from.size());
+            const bool are_defined =
+                interpolate_keyframes<Method, T>(skeleton, from, onto, checked_scalar<T>(t, "t"), bones);
+            return py::make_tuple(as_array(bones), are_defined);
+        });
+    });
+}
+
+// run(keyframes, times, time, bones) on checked arrays.
+template <class Transform, class T, class Run>
+py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
+                        const py::object& time, Run run) {
+    const auto input = checked_input<T, Transform>(keyframes, "keyframes");
+    const auto bone_count = static_cast<py::ssize_t>(skeleton.bone_count());
+    if (input.lead.size() != 2 || input.lead[0] == 0 || input.lead[1] != bone_count) {
+        fail("keyframes", "one key or more of " + std::to_string(bone_count) + " bones", describe(keyframes));
+    }
+    const std::vector<Transform> keys = items_of<Transform>(input);
+    const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
+    std::vector<Transform> bones(skeleton.bone_count());
+    const bool are_defined = run(std::span<const Transform>(keys), std::span<const T>(key_times),
+                                 checked_scalar<T>(time, "time"), std::span<Transform>(bones));
+    return py::make_tuple(as_array(bones), are_defined);
+}
+
+py::object spline(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
+                  const py::object& time, const std::string& method) {
+    return with_method(method, [&]<class Method>(Method) {
+        const char* shape = Item<typename Method::template Transform<double>>::kShape;
+        return with_element(keyframes, "keyframes", shape, [&]<class T>(T) {
+            return spline_bones<typename Method::template Transform<T>, T>(
+                skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
+                    return spline_keyframes<Method, T>(skeleton, keys, at, now, bones);
+                });
+        });
+    });
+}
+
+py::object spline_vector_form(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
+                              const py::object& time) {
+    return with_representation(keyframes, "keyframes", "keys, bones", [&]<class Row>(Row) {
+        return with_element(keyframes, "keyframes", "", [&]<class T>(T) {
+            using Transform = typename Row::template Transform<T>;
+            return spline_bones<Transform, T>(
+                skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
+                    return spline_keyframes_vector<Transform, T>(skeleton, keys, at, now, bones);
+                });
+        });
+    });
+}
+
+}  // namespace
 
 void bind_skeleton(py::module_& m) {
-    py::class_<Skeleton>(m, "Skeleton", "A hierarchy of bones; parents come before their children.")
+    py::class_<Skeleton>(m, "Skeleton",
+                         "A hierarchy of bones; parents come before their children.\n\n"
+                         "Its methods take each bone relative to its parent, float32 or float64 (the result "
+                         "has the same), in\n"
+                         "any representation, layouts as in sinew.affine, sinew.quat_vec and "
+                         "sinew.dual_quat. They raise\n"
+                         "ValueError that names the argument, what was wanted and what came.")
         .def(py::init([](const py::object& parents) {
                  const auto array = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
                  return Skeleton({array.data(), static_cast<std::size_t>(array.size())});
@@ -15,34 +123,28 @@ void bind_skeleton(py::module_& m) {
              "parents: int32 [bones], the index of each bone's parent, -1 for a root.\n\n"
              "Raises ValueError where a parent does not come before its child.")
         .def_property_readonly("bone_count", &Skeleton::bone_count)
-        .def(
-            "root_relative",
-            [](const Skeleton& skeleton, const py::object& transforms) {
-                auto bones = checked_affines(transforms, "transforms");
-                if (bones.size() != skeleton.bone_count()) {
-                    fail("transforms", std::to_string(skeleton.bone_count()) + " bones",
-                         std::to_string(bones.size()));
-                }
-                root_relative<Affine<float>>(skeleton, {}, bones, bones);
-                py::array_t<float> result(
-                    {static_cast<py::ssize_t>(bones.size()), py::ssize_t{4}, py::ssize_t{4}});
-                auto out = result.mutable_unchecked<3>();
-                for (py::ssize_t bone = 0; bone < out.shape(0); ++bone) {
-                    const Affine<float>& a = bones[static_cast<std::size_t>(bone)];
-                    for (int row = 0; row < 3; ++row) {
-                        for (int column = 0; column < 3; ++column)
-                            out(bone, row, column) = a.linear[column][row];
-                        out(bone, row, 3) = a.translation[row];
-                        out(bone, 3, row) = 0.0f;
-                    }
-                    out(bone, 3, 3) = 1.0f;
-                }
-                return result;
-            },
-            py::arg("transforms"),
-            "Each bone relative to the root, float32 [bones, 4, 4] (Smith 2013, algorithm 1).\n\n"
-            "transforms: float32 [bones, 4, 4] or [bones, 3, 4], each bone relative to its parent.\n\n"
-            "Raises ValueError for another shape, element type or number of bones, NaN or infinity.");
+        .def("root_relative", &relative_to_root, py::arg("transforms"),
+             "Each bone relative to the root, in the representation that came (Smith 2013, algorithm 1).\n\n"
+             "transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].")
+        .def("interpolate", &interpolate, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
+             "(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).\n\n"
+             "a, b: [bones, ..] in the representation of the method, at t = 0 and t = 1.\n"
+             "t: a number; outside 0 to 1 the motion goes on.\n"
+             "method: one of sinew.interpolate.METHODS.\n"
+             "is_defined: False where a bone has no one in-between; it then has what "
+             "sinew.interpolate.between\n"
+             "    gives there.")
+        .def("spline", &spline, py::arg("keyframes"), py::arg("times"), py::arg("time"),
+             py::arg("method") = "dlb",
+             "(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, blend form\n"
+             "(Smith 2013, algorithm 3 and section 3.2.2).\n\n"
+             "keyframes: [keys, bones, ..] in the representation of the method, one key or more.\n"
+             "times: [keys], not decreasing; keys of equal time are a cut.\n"
+             "time: a number; before the first key and after the last it is that key.\n"
+             "method: one of sinew.interpolate.METHODS.")
+        .def("spline_vector", &spline_vector_form, py::arg("keyframes"), py::arg("times"), py::arg("time"),
+             "The same in vector form (Smith 2013, algorithm 3): not rigid between the keys.\n\n"
+             "keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].");
 }
 
 }  // namespace sinew::bindings

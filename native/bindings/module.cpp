@@ -6,5 +6,7 @@ PYBIND11_MODULE(_native, m) {
     m.attr("__version__") = SINEW_VERSION;
     sinew::bindings::bind_methods(m);
     sinew::bindings::bind_skeleton(m);
+    sinew::bindings::bind_transforms(m);
+    sinew::bindings::bind_interpolate(m);
     sinew::bindings::bind_deformer(m);
 }

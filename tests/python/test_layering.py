@@ -14,7 +14,7 @@ LIBRARY = ROOT / "native" / "sinew"
 MAY_INCLUDE = {
     "transform": {"transform"},
     "interpolate": {"transform", "interpolate"},
-    "skeleton": {"transform", "skeleton"},
+    "skeleton": {"transform", "interpolate", "skeleton"},
     "skinning": {"transform", "interpolate", "skeleton", "skinning"},
     "deform": {"transform", "interpolate", "skeleton", "skinning", "deform"},
     "motion": {"transform", "interpolate", "skeleton", "motion"},

@@ -1,6 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skinning in native code: bind a mesh to bones once, deform it at any pose. Numpy in, numpy out."""
+"""Skinning in native code: bind a mesh to bones once, deform it at any pose. Numpy in, numpy out.
 
+Rigid transforms, and what lies between them: sinew.affine, sinew.quat_vec, sinew.dual_quat,
+sinew.interpolate, sinew.spline.
+"""
+
+from . import affine, dual_quat, interpolate, quat_vec, spline
 from ._native import Deformer, Method, Skeleton, __version__, methods
 
-__all__ = ["Deformer", "Method", "Skeleton", "__version__", "methods"]
+__all__ = [
+    "Deformer",
+    "Method",
+    "Skeleton",
+    "__version__",
+    "affine",
+    "dual_quat",
+    "interpolate",
+    "methods",
+    "quat_vec",
+    "spline",
+]

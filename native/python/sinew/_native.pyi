@@ -1,9 +1,19 @@
+from types import ModuleType
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._types import Float
+
 __version__: str
+
+# Typed and described in the modules of the package that have these names.
+affine: ModuleType
+dual_quat: ModuleType
+interpolate: ModuleType
+quat_vec: ModuleType
+spline: ModuleType
 
 @final
 class Method:
@@ -24,7 +34,16 @@ class Skeleton:
     def __init__(self, parents: NDArray[np.int32]) -> None: ...
     @property
     def bone_count(self) -> int: ...
-    def root_relative(self, transforms: NDArray[np.float32]) -> NDArray[np.float32]: ...
+    def root_relative(self, transforms: NDArray[Float]) -> NDArray[Float]: ...
+    def interpolate(
+        self, a: NDArray[Float], b: NDArray[Float], t: float, method: str = "dlb"
+    ) -> tuple[NDArray[Float], bool]: ...
+    def spline(
+        self, keyframes: NDArray[Float], times: NDArray[Float], time: float, method: str = "dlb"
+    ) -> tuple[NDArray[Float], bool]: ...
+    def spline_vector(
+        self, keyframes: NDArray[Float], times: NDArray[Float], time: float
+    ) -> tuple[NDArray[Float], bool]: ...
 
 @final
 class Deformer:

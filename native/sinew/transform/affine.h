@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "sinew/transform/quat.h"
+#include "sinew/transform/nearest_rotation.h"
+#include "sinew/transform/rotation.h"
 
 namespace sinew {
 
@@ -33,6 +34,24 @@ template <class T>
 template <class T>
 [[nodiscard]] Vec3<T> transform_vector(const Affine<T>& a, const Vec3<T>& vector) noexcept {
     return a.linear * vector;
+}
+
+/// The unit normal of a surface with normal `normal` after `a`: along the inverse transpose of its linear
+/// part (Turkowski 1990). A linear part that flattens the surface to a line gives (0, 0, 0).
+template <class T>
+[[nodiscard]] Vec3<T> transform_normal(const Affine<T>& a, const Vec3<T>& normal) noexcept {
+    const Vec3<T> yz = glm::cross(a.linear[1], a.linear[2]);
+    // The cofactors are the inverse transpose times the determinant, and exist where it is 0.
+    const Mat3<T> cofactors(yz, glm::cross(a.linear[2], a.linear[0]), glm::cross(a.linear[0], a.linear[1]));
+    const Vec3<T> turned = unit(cofactors * normal, Vec3<T>(T(0)));
+    return glm::dot(a.linear[0], yz) < T(0) ? -turned : turned;
+}
+
+/// The rigid transform nearest to `a`: its linear part becomes nearest_rotation(). One that has no
+/// direction left (zero, or all of it on one line) gives any of the nearest.
+template <class T>
+[[nodiscard]] Affine<T> normalized(const Affine<T>& a) noexcept {
+    return {to_mat3(nearest_rotation(a.linear).rotation), a.translation};
 }
 
 }  // namespace sinew

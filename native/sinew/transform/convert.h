@@ -10,6 +10,21 @@ namespace sinew {
 // From an Affine: its linear part must be a rotation; split_scale() makes it one.
 
 template <class T>
+[[nodiscard]] Affine<T> to_affine(const Affine<T>& a) noexcept {
+    return a;
+}
+
+template <class T>
+[[nodiscard]] QuatVec<T> to_quat_vec(const QuatVec<T>& a) noexcept {
+    return a;
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> to_dual_quat(const DualQuat<T>& a) noexcept {
+    return a;
+}
+
+template <class T>
 [[nodiscard]] QuatVec<T> to_quat_vec(const Affine<T>& a) noexcept {
     return {to_quat(a.linear), a.translation};
 }

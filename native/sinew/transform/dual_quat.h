@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "sinew/transform/quat.h"
+#include "sinew/transform/dual.h"
+#include "sinew/transform/rotation.h"
 
 namespace sinew {
 
@@ -19,17 +20,63 @@ template <class T>
     return {a.real * b.real, a.real * b.dual + a.dual * b.real};
 }
 
-/// The transform that undoes the unit dual quaternion `a`: both parts conjugated.
 template <class T>
-[[nodiscard]] DualQuat<T> inverse(const DualQuat<T>& a) noexcept {
+[[nodiscard]] DualQuat<T> operator+(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
+    return {a.real + b.real, a.dual + b.dual};
+}
+
+/// The same motion as the unit dual quaternion `a`.
+template <class T>
+[[nodiscard]] DualQuat<T> operator-(const DualQuat<T>& a) noexcept {
+    return {-a.real, -a.dual};
+}
+
+/// The product with a dual number; its order does not matter.
+template <class T>
+[[nodiscard]] DualQuat<T> operator*(const Dual<T>& factor, const DualQuat<T>& a) noexcept {
+    return {factor.real * a.real, factor.real * a.dual + factor.dual * a.real};
+}
+
+/// real* + e dual*: the quaternion conjugate, which turns products round. It undoes a unit `a`.
+template <class T>
+[[nodiscard]] DualQuat<T> conjugate(const DualQuat<T>& a) noexcept {
     return {glm::conjugate(a.real), glm::conjugate(a.dual)};
 }
 
-/// The unit dual quaternion nearest to the direction of `a`: divided by |real|, and the part of `dual`
-/// along `real` taken off. Requires |real| > 0.
+/// real - e dual: the dual conjugate.
+template <class T>
+[[nodiscard]] DualQuat<T> dual_conjugate(const DualQuat<T>& a) noexcept {
+    return {a.real, -a.dual};
+}
+
+/// real* - e dual*: both at once. A point 1 + e p moves to a (1 + e p) times this (Smith 2013, section
+/// 2.2.3).
+template <class T>
+[[nodiscard]] DualQuat<T> combined_conjugate(const DualQuat<T>& a) noexcept {
+    return {glm::conjugate(a.real), -glm::conjugate(a.dual)};
+}
+
+/// sqrt(a a*), a dual number: |real| + e dot(real, dual) / |real|. A real part of length 0 gives 0.
+template <class T>
+[[nodiscard]] Dual<T> norm(const DualQuat<T>& a) noexcept {
+    const T length = glm::length(a.real);
+    if (!(length > T(0))) return {};
+    return {length, glm::dot(a.real, a.dual) / length};
+}
+
+/// The transform that undoes the unit dual quaternion `a`: its quaternion conjugate.
+template <class T>
+[[nodiscard]] DualQuat<T> inverse(const DualQuat<T>& a) noexcept {
+    return conjugate(a);
+}
+
+/// The unit dual quaternion `a` / norm(a): divided by |real|, and the part of `dual` along `real` taken
+/// off. A real part of length 0 gives the identity.
 template <class T>
 [[nodiscard]] DualQuat<T> normalized(const DualQuat<T>& a) noexcept {
-    const T scale = T(1) / glm::length(a.real);
+    const T length = glm::length(a.real);
+    if (!(length > T(0))) return {};
+    const T scale = T(1) / length;
     const Quat<T> real = a.real * scale;
     const Quat<T> dual = a.dual * scale;
     return {real, dual - real * glm::dot(real, dual)};
@@ -49,6 +96,12 @@ template <class T>
 template <class T>
 [[nodiscard]] Vec3<T> transform_vector(const DualQuat<T>& a, const Vec3<T>& vector) noexcept {
     return rotate(a.real, vector);
+}
+
+/// `normal` turned and brought to unit length; (0, 0, 0) stays.
+template <class T>
+[[nodiscard]] Vec3<T> transform_normal(const DualQuat<T>& a, const Vec3<T>& normal) noexcept {
+    return rotate(a.real, unit(normal, Vec3<T>(T(0))));
 }
 
 }  // namespace sinew

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "sinew/transform/quat.h"
+#include "sinew/transform/rotation.h"
 
 namespace sinew {
 
@@ -34,6 +34,20 @@ template <class T>
 template <class T>
 [[nodiscard]] Vec3<T> transform_vector(const QuatVec<T>& a, const Vec3<T>& vector) noexcept {
     return rotate(a.rotation, vector);
+}
+
+/// `normal` turned and brought to unit length; (0, 0, 0) stays.
+template <class T>
+[[nodiscard]] Vec3<T> transform_normal(const QuatVec<T>& a, const Vec3<T>& normal) noexcept {
+    return rotate(a.rotation, unit(normal, Vec3<T>(T(0))));
+}
+
+/// `a` with its rotation at unit length. A rotation of length 0 gives that of the identity.
+template <class T>
+[[nodiscard]] QuatVec<T> normalized(const QuatVec<T>& a) noexcept {
+    const T length = glm::length(a.rotation);
+    if (!(length > T(0))) return {Quat<T>(T(1), T(0), T(0), T(0)), a.translation};
+    return {a.rotation / length, a.translation};
 }
 
 }  // namespace sinew

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include "arrays.h"
+#include "items.h"
+
+namespace sinew::bindings {
+
+using Shape = std::vector<py::ssize_t>;
+
+/// "[2, 3]".
+std::string text_of(const Shape& shape);
+
+/// An argument as items of T side by side: `lead` are the axes before those of an item.
+template <class T>
+struct Input {
+    const char* argument;
+    py::array_t<T> array;
+    const T* data;
+    Shape lead;
+    py::ssize_t item_size;
+    Shape steps{};  ///< of each axis of the common shape, in numbers; 0 where the argument is repeated
+
+    [[nodiscard]] const T* at(py::ssize_t index, const Shape& common) const {
+        py::ssize_t offset = 0;
+        for (std::size_t axis = common.size(); axis-- > 0;) {
+            offset += (index % common[axis]) * steps[axis];
+            index /= common[axis];
+        }
+        return data + offset;
+    }
+};
+
+/// Whether `value`, an array, holds float64 and not float32. ValueError that names `wanted` for anything
+/// else.
+bool is_double(const py::handle& value, const char* argument, const std::string& wanted);
+
+/// A number of Python or numpy. ValueError for anything else.
+double checked_number(const py::handle& value, const char* argument, const std::string& wanted);
+
+/// "float64 " or "float32 ".
+template <class T>
+std::string element_name() {
+    return std::is_same_v<T, double> ? "float64 " : "float32 ";
+}
+
+template <class T>
+void check_finite(const T* numbers, std::size_t count, const char* argument, py::ssize_t index) {
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!std::isfinite(numbers[i])) {
+            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(index));
+        }
+    }
+}
+
+/// `value` as items of `Value`, finite, of element type T exactly; a number alone stands for a scalar.
+template <class T, class Value>
+Input<T> checked_input(const py::handle& value, const char* argument) {
+    const std::string wanted = element_name<T>() + Item<Value>::kShape;
+    if constexpr (std::is_same_v<Value, T>) {
+        if (!py::isinstance<py::array>(value)) {
+            py::array_t<T> number(Shape{});
+            *number.mutable_data() = static_cast<T>(checked_number(value, argument, "a number or " + wanted));
+            check_finite(number.data(), 1, argument, 0);
+            return {argument, number, number.data(), {}, 1};
+        }
+    }
+    const std::string any = std::string("float32 or float64 ") + Item<Value>::kShape;
+    if (is_double(value, argument, any) != std::is_same_v<T, double>) fail(argument, wanted, describe(value));
+    const auto array = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(value);
+    const auto axes = static_cast<py::ssize_t>(Item<Value>::kDimensions.size());
+    bool fits = array.ndim() >= axes;
+    py::ssize_t item_size = 1;
+    for (py::ssize_t axis = 0; fits && axis < axes; ++axis) {
+        const py::ssize_t length = array.shape(array.ndim() - axes + axis);
+        const auto full = static_cast<py::ssize_t>(Item<Value>::kDimensions[static_cast<std::size_t>(axis)]);
+        const bool may_lack_row = std::is_same_v<Value, Affine<T>> && axis == 0;
+        fits = length == full || (may_lack_row && length == full - 1);
+        item_size *= length;
+    }
+    if (!fits) fail(argument, wanted, describe(value));
+    const Shape lead(array.shape(), array.shape() + (array.ndim() - axes));
+    const py::ssize_t count = array.size() / item_size;
+    for (py::ssize_t i = 0; i < count; ++i) {
+        check_finite(array.data() + i * item_size, Item<Value>::kSize, argument, i);
+    }
+    return {argument, array, array.data(), lead, item_size};
+}
+
+/// The shape that `inputs` have together by numpy's rule, and each one's steps in it. ValueError that names
+/// the first argument that does not fit those before it.
+template <class T>
+Shape broadcast(std::span<Input<T>> inputs) {
+    Shape common;
+    for (const Input<T>& input : inputs) {
+        const Shape before = common;
+        if (input.lead.size() > common.size()) {
+            common.insert(common.begin(), input.lead.size() - common.size(), 1);
+        }
+        const std::size_t shift = common.size() - input.lead.size();
+        for (std::size_t axis = 0; axis < input.lead.size(); ++axis) {
+            const py::ssize_t length = input.lead[axis];
+            py::ssize_t& joint = common[shift + axis];
+            if (length != joint && length != 1 && joint != 1) {
+                fail(input.argument, "leading axes that broadcast with " + text_of(before),
+                     text_of(input.lead));
+            }
+            if (joint == 1) joint = length;
+        }
+    }
+    for (Input<T>& input : inputs) {
+        input.steps.assign(common.size(), 0);
+        py::ssize_t step = input.item_size;
+        for (std::size_t axis = input.lead.size(); axis-- > 0;) {
+            if (input.lead[axis] != 1) input.steps[common.size() - input.lead.size() + axis] = step;
+            step *= input.lead[axis];
+        }
+    }
+    return common;
+}
+
+/// The result in the making: an array of items, or a tuple of such.
+template <class Value>
+struct Output {
+    using Element = typename Item<Value>::Element;
+    py::array_t<Element> array;
+    Element* data;
+    std::size_t item_size = 1;
+
+    explicit Output(Shape shape) {
+        for (const std::size_t length : Item<Value>::kDimensions) {
+            shape.push_back(static_cast<py::ssize_t>(length));
+            item_size *= length;
+        }
+        array = py::array_t<Element>(shape);
+        data = array.mutable_data();
+    }
+    void write(py::ssize_t index, const Value& value) {
+        Item<Value>::write(value, data + static_cast<std::size_t>(index) * item_size);
+    }
+    /// An array of no axes as the number it is.
+    py::object take() { return array.ndim() > 0 ? py::object(array) : array[py::tuple()]; }
+};
+
+template <class... Values>
+struct Output<std::tuple<Values...>> {
+    std::tuple<Output<Values>...> parts;
+
+    explicit Output(const Shape& shape) : parts(Output<Values>(shape)...) {}
+    void write(py::ssize_t index, const std::tuple<Values...>& values) {
+        [&]<std::size_t... I>(std::index_sequence<I...>) {
+            (std::get<I>(parts).write(index, std::get<I>(values)), ...);
+        }
+        (std::index_sequence_for<Values...>{});
+    }
+    py::object take() {
+        return std::apply([](auto&... part) -> py::object { return py::make_tuple(part.take()...); }, parts);
+    }
+};
+
+inline py::ssize_t count_of(const Shape& shape) {
+    py::ssize_t count = 1;
+    for (const py::ssize_t length : shape) count *= length;
+    return count;
+}
+
+/// `f` of every item of the arguments broadcast together.
+template <class T, template <class> class... In, class F, std::size_t... I>
+py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
+                     const std::array<py::object, sizeof...(In)>& values, F f, std::index_sequence<I...>) {
+    std::array<Input<T>, sizeof...(In)> inputs{checked_input<T, In<T>>(values[I], arguments[I])...};
+    const Shape common = broadcast(std::span<Input<T>>(inputs));
+    using Result = decltype(f(std::declval<const In<T>&>()...));
+    Output<Result> output(common);
+    const py::ssize_t count = count_of(common);
+    {
+        const py::gil_scoped_release release;
+        for (py::ssize_t i = 0; i < count; ++i) {
+            output.write(i, f(Item<In<T>>::read(inputs[I].at(i, common))...));
+        }
+    }
+    return output.take();
+}
+
+/// The same in the element type of the first argument, which is no scalar; all have it.
+template <template <class> class... In, class F>
+py::object map(const std::array<const char*, sizeof...(In)>& arguments,
+               const std::array<py::object, sizeof...(In)>& values, F f) {
+    const std::array<const char*, sizeof...(In)> shapes{Item<In<double>>::kShape...};
+    const std::string wanted = std::string("float32 or float64 ") + shapes[0];
+    constexpr std::index_sequence_for<Item<In<double>>...> kIndices;
+    if (is_double(values[0], arguments[0], wanted)) {
+        return map_items<double, In...>(arguments, values, f, kIndices);
+    }
+    return map_items<float, In...>(arguments, values, f, kIndices);
+}
+
+template <template <class> class>
+struct ObjectFor {
+    using type = const py::object&;
+};
+
+/// A function of the module whose arguments are arrays of the items `In`.
+template <template <class> class... In, class F>
+void def(py::module_& m, const char* name, const std::array<const char*, sizeof...(In)>& arguments, F f) {
+    const auto function = [arguments, f](typename ObjectFor<In>::type... values) {
+        return map<In...>(arguments, {values...}, f);
+    };
+    std::apply([&](auto... argument) { m.def(name, function, py::arg(argument)...); }, arguments);
+}
+
+}  // namespace sinew::bindings

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "broadcast.h"
+#include "sinew/interpolate/methods.h"
+
+namespace sinew::bindings {
+
+/// f(Method{}) for the row of Interpolations called `name`. ValueError for a name it does not have.
+template <class F>
+py::object with_method(const std::string& name, F f) {
+    py::object result;
+    std::string names;
+    const auto try_row = [&](auto row) {
+        if (row.name == name) result = f(row);
+        names += (names.empty() ? "" : ", ") + std::string(row.name);
+    };
+    std::apply([&](auto... row) { (try_row(row), ...); }, Interpolations{});
+    if (!result) fail("method", "one of " + names, "'" + name + "'");
+    return result;
+}
+
+template <template <class> class X>
+struct Representation {
+    template <class T>
+    using Transform = X<T>;
+};
+
+/// f(Representation{}) for the one whose items end with the last axis of `value`: 4, 7 or 8.
+template <class F>
+py::object with_representation(const py::object& value, const char* argument, const std::string& axes, F f) {
+    const std::string wanted = "float32 or float64 [" + axes + ", 4, 4], [" + axes + ", 3, 4], [" + axes +
+                               ", 7] or [" + axes + ", 8]";
+    is_double(value, argument, wanted);
+    const auto array = py::reinterpret_borrow<py::array>(value);
+    const py::ssize_t last = array.ndim() > 0 ? array.shape(array.ndim() - 1) : 0;
+    if (last == 4) return f(Representation<Affine>{});
+    if (last == 7) return f(Representation<QuatVec>{});
+    if (last == 8) return f(Representation<DualQuat>{});
+    fail(argument, wanted, describe(value));
+}
+
+/// f(T{}) with the element type of `value`.
+template <class F>
+py::object with_element(const py::object& value, const char* argument, const char* shape, F f) {
+    if (is_double(value, argument, std::string("float32 or float64 ") + shape)) return f(double{});
+    return f(float{});
+}
+
+/// The items of an input whose every axis counts, copied out.
+template <class Value, class T>
+std::vector<Value> items_of(const Input<T>& input) {
+    std::vector<Value> items;
+    const py::ssize_t count = count_of(input.lead);
+    items.reserve(static_cast<std::size_t>(count));
+    for (py::ssize_t i = 0; i < count; ++i)
+        items.push_back(Item<Value>::read(input.data + i * input.item_size));
+    return items;
+}
+
+/// [keys], one for each of `keys`, not decreasing.
+template <class T>
+std::vector<T> checked_times(const py::object& value, py::ssize_t keys) {
+    const auto input = checked_input<T, T>(value, "times");
+    const std::string wanted = element_name<T>() + text_of({keys}) + ", one for each key";
+    if (input.lead.size() != 1 || input.lead[0] != keys) fail("times", wanted, describe(value));
+    for (py::ssize_t i = 1; i < keys; ++i) {
+        if (input.data[i] < input.data[i - 1]) {
+            fail("times", "times that do not decrease", "a smaller one at index " + std::to_string(i));
+        }
+    }
+    return items_of<T>(input);
+}
+
+}  // namespace sinew::bindings

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "sinew/transform/dual.h"
+#include "sinew/transform/make.h"
+
+namespace sinew::bindings {
+
+/// How one value of the library lies in the last axes of an array:
+///   kShape   those axes as text        kSize    numbers read
+///   dimensions  of an output           read, write
+template <class Value>
+struct Item;
+
+template <class T>
+using Scalar = T;
+
+template <class T>
+struct PlainItem {
+    using Element = T;
+    static constexpr const char* kShape = "[..]";
+    static constexpr std::size_t kSize = 1;
+    static constexpr std::array<std::size_t, 0> kDimensions{};
+    static T read(const T* from) { return *from; }
+    static void write(T value, T* to) { *to = value; }
+};
+
+template <>
+struct Item<float> : PlainItem<float> {};
+template <>
+struct Item<double> : PlainItem<double> {};
+template <>
+struct Item<bool> : PlainItem<bool> {};
+
+template <class T>
+struct Item<Vec3<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 3]";
+    static constexpr std::size_t kSize = 3;
+    static constexpr std::array<std::size_t, 1> kDimensions{3};
+    static Vec3<T> read(const T* from) { return {from[0], from[1], from[2]}; }
+    static void write(const Vec3<T>& v, T* to) {
+        for (int i = 0; i < 3; ++i) to[i] = v[i];
+    }
+};
+
+template <class T>
+struct Item<Mat3<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 3, 3]";
+    static constexpr std::size_t kSize = 9;
+    static constexpr std::array<std::size_t, 2> kDimensions{3, 3};
+    static Mat3<T> read(const T* from) {
+        Mat3<T> m;
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) m[column][row] = from[3 * row + column];
+        }
+        return m;
+    }
+};
+
+/// Read from three rows or four, of which the fourth is not read; written with four.
+template <class T>
+struct Item<Affine<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 4, 4] or [.., 3, 4]";
+    static constexpr std::size_t kSize = 12;
+    static constexpr std::array<std::size_t, 2> kDimensions{4, 4};
+    static Affine<T> read(const T* from) {
+        Affine<T> a;
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) a.linear[column][row] = from[4 * row + column];
+            a.translation[row] = from[4 * row + 3];
+        }
+        return a;
+    }
+    static void write(const Affine<T>& a, T* to) {
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) to[4 * row + column] = a.linear[column][row];
+            to[4 * row + 3] = a.translation[row];
+            to[12 + row] = T(0);
+        }
+        to[15] = T(1);
+    }
+};
+
+template <class T>
+Quat<T> read_quat(const T* from) {
+    return Quat<T>(from[0], from[1], from[2], from[3]);
+}
+
+template <class T>
+void write_quat(const Quat<T>& q, T* to) {
+    to[0] = q.w;
+    to[1] = q.x;
+    to[2] = q.y;
+    to[3] = q.z;
+}
+
+template <class T>
+struct Item<QuatVec<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 7]";
+    static constexpr std::size_t kSize = 7;
+    static constexpr std::array<std::size_t, 1> kDimensions{7};
+    static QuatVec<T> read(const T* from) { return {read_quat(from), Item<Vec3<T>>::read(from + 4)}; }
+    static void write(const QuatVec<T>& a, T* to) {
+        write_quat(a.rotation, to);
+        Item<Vec3<T>>::write(a.translation, to + 4);
+    }
+};
+
+template <class T>
+struct Item<DualQuat<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 8]";
+    static constexpr std::size_t kSize = 8;
+    static constexpr std::array<std::size_t, 1> kDimensions{8};
+    static DualQuat<T> read(const T* from) { return {read_quat(from), read_quat(from + 4)}; }
+    static void write(const DualQuat<T>& a, T* to) {
+        write_quat(a.real, to);
+        write_quat(a.dual, to + 4);
+    }
+};
+
+template <class T>
+struct Item<Twist<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 6]";
+    static constexpr std::size_t kSize = 6;
+    static constexpr std::array<std::size_t, 1> kDimensions{6};
+    static Twist<T> read(const T* from) { return {Item<Vec3<T>>::read(from), Item<Vec3<T>>::read(from + 3)}; }
+    static void write(const Twist<T>& a, T* to) {
+        Item<Vec3<T>>::write(a.angular, to);
+        Item<Vec3<T>>::write(a.linear, to + 3);
+    }
+};
+
+template <class T>
+struct Item<Dual<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 2]";
+    static constexpr std::size_t kSize = 2;
+    static constexpr std::array<std::size_t, 1> kDimensions{2};
+    static Dual<T> read(const T* from) { return {from[0], from[1]}; }
+    static void write(const Dual<T>& a, T* to) {
+        to[0] = a.real;
+        to[1] = a.dual;
+    }
+};
+
+}  // namespace sinew::bindings

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the typed modules share."""
+
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = TypeVar("Float", np.float32, np.float64)
+
+# An array [..] of the call's element type, or one number.
+Number = float | NDArray[np.float32] | NDArray[np.float64]
+
+
+class Screw(NamedTuple, Generic[Float]):
+    """axis and moment [.., 3]; angle (radians), translation along the axis and pitch [..]."""
+
+    axis: NDArray[Float]
+    moment: NDArray[Float]
+    angle: NDArray[Float]
+    translation: NDArray[Float]
+    pitch: NDArray[Float]
+
+
+class Distance(NamedTuple, Generic[Float]):
+    """angle (radians) and translation (length), [..]."""
+
+    angle: NDArray[Float]
+    translation: NDArray[Float]
+
+
+class Blended(NamedTuple, Generic[Float]):
+    """The transforms, and whether each is what the method defines; where not, the method says what it is."""
+
+    transforms: NDArray[Float]
+    is_defined: NDArray[np.bool_] | Any

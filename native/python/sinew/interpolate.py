@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In-betweens of two transforms and blends of many, by every method of METHODS.
+
+method         layout     between two                        of many
+matrix_linear  affine     component by component: not rigid  the same (Smith 2013, sections 2.2.2, 2.3.1)
+matrix_polar   affine     the same, made rigid: the nearest rotation (Shoemake and Duff 1992)
+matrix_log     affine     sum of logarithms in se(3)         the same (Alexa 2002): not the shortest path
+qv_nlerp       quat_vec   normalised sum, mean translation   the same (Smith 2013, sections 2.2.1, 3.6.1)
+qv_slerp       quat_vec   slerp, mean translation            mean on the sphere (Buss and Fillmore 2001)
+dlb            dual_quat  normalised sum                     the same (Kavan et al. 2008, eq. 4)
+sclerp, dib    dual_quat  ScLERP: the screw at constant      DIB (Kavan et al. 2008, algorithm 3)
+                          pace (section 3.4)
+
+Quaternions are first brought to one side, of the first of two or of the heaviest of many: the shorter way.
+Only dlb, sclerp and dib do not depend on where the origin is.
+
+Each result says whether it is defined. Not defined, and then:
+  rotations half a turn from the first or the heaviest (qv_*, dlb, sclerp, dib): the signs as given decide;
+  half a turn from the identity (matrix_log): one of the two directions of the axis;
+  a sum that cancels: the heaviest transform (qv_nlerp, qv_slerp, matrix_polar: its rotation, and the mean of
+    the translations);
+  weights whose sum is not above 0: the heaviest transform;
+  an iteration that does not settle (qv_slerp, dib): where it has come to.
+No result is NaN.
+"""
+
+from typing import Final, Literal
+
+from numpy.typing import NDArray
+
+from ._native import interpolate as _native
+from ._types import Blended, Float, Number
+
+__all__ = ["METHODS", "Blended", "Method", "between", "blend"]
+
+Method = Literal[
+    "matrix_linear", "matrix_polar", "matrix_log", "qv_nlerp", "qv_slerp", "dlb", "sclerp", "dib"
+]
+
+METHODS: Final[tuple[Method, ...]] = _native.METHODS
+
+
+def between(a: NDArray[Float], b: NDArray[Float], t: Number, method: Method = "dlb") -> Blended[Float]:
+    """From `a` at t = 0 to `b` at t = 1; other t go on beyond. Leading axes of a, b and t broadcast.
+
+    a, b: in the layout of the method, rotations of unit length, one element type; so is the result.
+    t: [..] or a number.
+
+    Raises ValueError that names the argument, what was wanted and what came.
+    """
+    return Blended(*_native.between(a, b, t, method))
+
+
+def blend(transforms: NDArray[Float], weights: NDArray[Float], method: Method = "dlb") -> Blended[Float]:
+    """The blend of the n transforms along the last leading axis; the axes before it broadcast.
+
+    transforms: [.., n, 7] and so on, in the layout of the method, n >= 1, rotations of unit length.
+    weights: [.., n], of any sign; brought to sum 1. Of two equal the first is the heavier.
+
+    Raises ValueError that names the argument, what was wanted and what came.
+    """
+    return Blended(*_native.blend(transforms, weights, method))

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <span>
+
+#include "sinew/transform/convert.h"
+
+namespace sinew {
+
+/// What interpolating gives. `is_defined` is false where the method has no one answer for this input, or
+/// where rounding would decide which: the transform is then the one that the method's header names, finite.
+template <class Transform>
+struct Blended {
+    Transform transform;
+    bool is_defined = true;
+};
+
+/// What a blend does with the free signs of quaternions.
+enum class Signs {
+    kToHeaviest,  ///< flips each to the side of the term of largest weight: the shortest path
+    kAsGiven,     ///< leaves them
+};
+
+/// Weights brought to sum 1 by `scale`, and the index of the largest, the first of equals.
+template <class T>
+struct Shares {
+    std::size_t heaviest = 0;
+    T scale = T(1);
+    bool is_defined = true;
+};
+
+/// weights  [n], n >= 1, of any sign. A sum not above kDegenerateBlend times the largest is not defined.
+template <class T>
+[[nodiscard]] Shares<T> shares(std::span<const T> weights) noexcept {
+    assert(!weights.empty());
+    const auto largest = std::max_element(weights.begin(), weights.end());
+    T sum = T(0);
+    for (const T weight : weights) sum += weight;
+    const bool is_defined = sum > T(kDegenerateBlend) * *largest && *largest > T(0);
+    return {static_cast<std::size_t>(largest - weights.begin()), is_defined ? T(1) / sum : T(1), is_defined};
+}
+
+/// `q` or -q, whichever is on the side of `pivot`.
+template <class T>
+[[nodiscard]] Quat<T> aligned(const Quat<T>& q, const Quat<T>& pivot) noexcept {
+    return glm::dot(q, pivot) < T(0) ? -q : q;
+}
+
+template <class T>
+[[nodiscard]] QuatVec<T> aligned(const QuatVec<T>& a, const QuatVec<T>& pivot) noexcept {
+    return {aligned(a.rotation, pivot.rotation), a.translation};
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> aligned(const DualQuat<T>& a, const DualQuat<T>& pivot) noexcept {
+    return glm::dot(a.real, pivot.real) < T(0) ? -a : a;
+}
+
+/// A matrix has no free sign.
+template <class T>
+[[nodiscard]] Affine<T> aligned(const Affine<T>& a, const Affine<T>& /*pivot*/) noexcept {
+    return a;
+}
+
+/// Whether the shorter way from `a` to `b` is decided by rounding: half a turn lies between.
+template <class T>
+[[nodiscard]] bool is_half_turn_apart(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
+    return is_half_turn_apart(a.rotation, b.rotation);
+}
+
+template <class T>
+[[nodiscard]] bool is_half_turn_apart(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
+    return is_half_turn_apart(a.real, b.real);
+}
+
+/// Matrices are not brought to one side, so nothing is decided.
+template <class T>
+[[nodiscard]] bool is_half_turn_apart(const Affine<T>& /*a*/, const Affine<T>& /*b*/) noexcept {
+    return false;
+}
+
+template <class T>
+[[nodiscard]] Affine<T> scaled(T factor, const Affine<T>& a) noexcept {
+    return {factor * a.linear, factor * a.translation};
+}
+
+template <class T>
+[[nodiscard]] QuatVec<T> scaled(T factor, const QuatVec<T>& a) noexcept {
+    return {factor * a.rotation, factor * a.translation};
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> scaled(T factor, const DualQuat<T>& a) noexcept {
+    return {factor * a.real, factor * a.dual};
+}
+
+template <class T>
+[[nodiscard]] Affine<T> sum(const Affine<T>& a, const Affine<T>& b) noexcept {
+    return {a.linear + b.linear, a.translation + b.translation};
+}
+
+template <class T>
+[[nodiscard]] QuatVec<T> sum(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
+    return {a.rotation + b.rotation, a.translation + b.translation};
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> sum(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
+    return a + b;
+}
+
+/// The sum of the components, 12, 7 or 8 of them, each times its weight times `scale`: no rigid transform
+/// (Smith 2013, section 3.2.2). Signs::kToHeaviest is not defined where a transform of weight other than 0
+/// is half a turn from the heaviest.
+template <Signs signs, class Transform, class T>
+[[nodiscard]] Blended<Transform> weighted_sum(std::span<const Transform> transforms,
+                                              std::span<const T> weights, const Shares<T>& share) noexcept {
+    const Transform& pivot = transforms[share.heaviest];
+    Blended<Transform> total{scaled(T(0), pivot), true};
+    for (std::size_t i = 0; i < transforms.size(); ++i) {
+        if (weights[i] == T(0)) continue;
+        const T weight = share.scale * weights[i];
+        if constexpr (signs == Signs::kToHeaviest) {
+            if (is_half_turn_apart(transforms[i], pivot)) total.is_defined = false;
+            total.transform = sum(total.transform, scaled(weight, aligned(transforms[i], pivot)));
+        } else {
+            total.transform = sum(total.transform, scaled(weight, transforms[i]));
+        }
+    }
+    return total;
+}
+
+}  // namespace sinew

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "sinew/interpolate/spherical.h"
+#include "sinew/transform/twist.h"
+
+namespace sinew {
+
+/// Between two: the screw from one to the other at constant pace, the shorter way (ScLERP; Kavan et al.
+/// 2008, section 3.4; Smith 2013, section 2.2.3). Of n: DIB, dual quaternion iterative blending, which is
+/// ScLERP for n = 2 and does not depend on the order (Kavan et al. 2008, algorithm 3). Neither depends on
+/// the origin: x a, x b gives x times the result, and a x, b x the result times x.
+///
+/// Not defined where two are half a turn apart (the signs as given then decide), and of n as Dlb, where the
+/// iteration does not settle, or where a rotation is half a turn from its result.
+struct Sclerp {
+    static constexpr std::string_view name = "sclerp";
+    template <class T>
+    using Transform = DualQuat<T>;
+
+    template <class T>
+    [[nodiscard]] static Blended<DualQuat<T>> between(const DualQuat<T>& a, const DualQuat<T>& b,
+                                                      T t) noexcept {
+        const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
+        return {normalized(a * power(inverse(a) * b, t)), is_defined};
+    }
+
+    template <Signs signs = Signs::kToHeaviest, class T>
+    [[nodiscard]] static Blended<DualQuat<T>> blend(std::span<const DualQuat<T>> transforms,
+                                                    std::span<const T> weights) noexcept {
+        using std::max;
+        const Shares<T> share = shares(weights);
+        Blended<DualQuat<T>> mean = Dlb::blend<signs, T>(transforms, weights);
+        if (!mean.is_defined) return mean;
+        // Translations are known to within rounding of the longest.
+        const T rounding = T(8) * std::numeric_limits<T>::epsilon();
+        T longest = T(0);
+        for (const DualQuat<T>& transform : transforms) {
+            longest = max(longest, T(2) * glm::length(transform.dual));
+        }
+        for (int step = 0; step < kBlendSteps; ++step) {
+            Twist<T> correction;
+            bool is_half_turn = false;
+            for (std::size_t i = 0; i < transforms.size(); ++i) {
+                if (weights[i] == T(0)) continue;
+                is_half_turn = is_half_turn || is_half_turn_apart(mean.transform, transforms[i]);
+                const DualQuat<T> turn = inverse(mean.transform) * transforms[i];
+                correction = correction + (share.scale * weights[i]) * to_twist(turn);
+            }
+            mean.transform = normalized(mean.transform * to_dual_quat(correction));
+            if (safe_length(correction.angular) <= rounding &&
+                safe_length(correction.linear) <= rounding * longest) {
+                mean.is_defined = !is_half_turn;
+                return mean;
+            }
+        }
+        mean.is_defined = false;
+        return mean;
+    }
+};
+
+/// Sclerp by the name that its blend of n has.
+struct Dib : Sclerp {
+    static constexpr std::string_view name = "dib";
+};
+
+}  // namespace sinew

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "sinew/interpolate/blended.h"
+
+namespace sinew {
+
+// Each method is a type with a name, the representation it works on, and
+//   between(a, b, t)             from `a` at t = 0 to `b` at t = 1; other t go on beyond
+//   blend(transforms, weights)   of n >= 1; weights of any sign, brought to sum 1
+// All rotations are of unit length. Where the weights' sum is not above 0 the blend is not defined and is
+// the heaviest transform. Of two equal weights the first is the heavier.
+
+/// blend() of `a` and `b`, `b` first brought to the side of `a`.
+template <class Method, class Transform, class T>
+[[nodiscard]] Blended<Transform> blend_of_two(const Transform& a, const Transform& b, T t) noexcept {
+    const std::array<Transform, 2> ends{a, aligned(b, a)};
+    const std::array<T, 2> weights{T(1) - t, t};
+    Blended<Transform> result = Method::template blend<Signs::kAsGiven, T>(ends, weights);
+    if (t != T(0) && t != T(1) && is_half_turn_apart(a, b)) result.is_defined = false;
+    return result;
+}
+
+/// The matrices' sum, component by component: not rigid between different rotations, and between opposite
+/// ones flat (Smith 2013, section 2.2.2). No sign, so no shortest path to choose; always defined.
+struct MatrixLinear {
+    static constexpr std::string_view name = "matrix_linear";
+    template <class T>
+    using Transform = Affine<T>;
+
+    template <class T>
+    [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
+        return blend_of_two<MatrixLinear>(a, b, t);
+    }
+
+    template <Signs signs = Signs::kToHeaviest, class T>
+    [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
+                                                  std::span<const T> weights) noexcept {
+        const Shares<T> share = shares(weights);
+        if (!share.is_defined) return {transforms[share.heaviest], false};
+        return weighted_sum<signs>(transforms, weights, share);
+    }
+};
+
+/// MatrixLinear made rigid again: the rotation nearest to the sum (polar decomposition; Shoemake and Duff
+/// 1992). Between two it takes the shorter way, not at constant pace: the nearer to half a turn, the more of
+/// it happens about t = 1/2. Depends on the origin.
+///
+/// Not defined where several rotations are as near (half a turn at equal weights): the linear part is then
+/// the heaviest transform's.
+struct MatrixPolar {
+    static constexpr std::string_view name = "matrix_polar";
+    template <class T>
+    using Transform = Affine<T>;
+
+    template <class T>
+    [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
+        return blend_of_two<MatrixPolar>(a, b, t);
+    }
+
+    template <Signs signs = Signs::kToHeaviest, class T>
+    [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
+                                                  std::span<const T> weights) noexcept {
+        const Shares<T> share = shares(weights);
+        if (!share.is_defined) return {transforms[share.heaviest], false};
+        const Affine<T> total = weighted_sum<signs>(transforms, weights, share).transform;
+        const NearestRotation<T> nearest = nearest_rotation(total.linear);
+        if (nearest.gap < T(kDegenerateBlend)) {
+            return {{transforms[share.heaviest].linear, total.translation}, false};
+        }
+        return {{to_mat3(nearest.rotation), total.translation}, true};
+    }
+};
+
+/// Rotations by normalised sum, translations by mean (Smith 2013, sections 2.2.1 and 3.6.1, direct
+/// quaternion blending). Between two: the shorter way, not at constant pace. Depends on the origin.
+///
+/// Not defined where a rotation is half a turn from the heaviest (its sign as given then decides), or where
+/// the sum cancels: the rotation is then the heaviest's.
+struct QvNlerp {
+    static constexpr std::string_view name = "qv_nlerp";
+    template <class T>
+    using Transform = QuatVec<T>;
+
+    template <class T>
+    [[nodiscard]] static Blended<QuatVec<T>> between(const QuatVec<T>& a, const QuatVec<T>& b, T t) noexcept {
+        return blend_of_two<QvNlerp>(a, b, t);
+    }
+
+    template <Signs signs = Signs::kToHeaviest, class T>
+    [[nodiscard]] static Blended<QuatVec<T>> blend(std::span<const QuatVec<T>> transforms,
+                                                   std::span<const T> weights) noexcept {
+        const Shares<T> share = shares(weights);
+        if (!share.is_defined) return {transforms[share.heaviest], false};
+        const auto [total, is_defined] = weighted_sum<signs>(transforms, weights, share);
+        const T length = glm::length(total.rotation);
+        if (length < T(kDegenerateBlend)) {
+            return {{transforms[share.heaviest].rotation, total.translation}, false};
+        }
+        return {{total.rotation / length, total.translation}, is_defined};
+    }
+};
+
+/// Unit dual quaternion along the weighted sum (DLB; Kavan et al. 2008, eq. 4; Smith 2013, sections 2.2.3
+/// and 2.3.1). Between two: the screw of Sclerp, not at constant pace. Does not depend on the origin.
+///
+/// Not defined where a rotation is half a turn from the heaviest (its sign as given then decides), or where
+/// the sum of the real parts cancels: the result is then the heaviest.
+struct Dlb {
+    static constexpr std::string_view name = "dlb";
+    template <class T>
+    using Transform = DualQuat<T>;
+
+    template <class T>
+    [[nodiscard]] static Blended<DualQuat<T>> between(const DualQuat<T>& a, const DualQuat<T>& b,
+                                                      T t) noexcept {
+        return blend_of_two<Dlb>(a, b, t);
+    }
+
+    template <Signs signs = Signs::kToHeaviest, class T>
+    [[nodiscard]] static Blended<DualQuat<T>> blend(std::span<const DualQuat<T>> transforms,
+                                                    std::span<const T> weights) noexcept {
+        const Shares<T> share = shares(weights);
+        if (!share.is_defined) return {transforms[share.heaviest], false};
+        const auto [total, is_defined] = weighted_sum<signs>(transforms, weights, share);
+        if (glm::length(total.real) < T(kDegenerateBlend)) return {transforms[share.heaviest], false};
+        return {normalized(total), is_defined};
+    }
+};
+
+}  // namespace sinew

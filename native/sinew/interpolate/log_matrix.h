@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/interpolate/linear.h"
+#include "sinew/transform/twist.h"
+
+namespace sinew {
+
+/// Exponential of the weighted sum of logarithms in se(3) (Alexa 2002; Smith 2013, sections 2.2.2 and
+/// 2.3.1). Rigid; not the shortest path, as every logarithm is taken from the identity: the result depends
+/// on the orientation of the axes, and constant pace holds only from or to the identity.
+///
+/// Not defined where a matrix is half a turn from the identity to within rounding: the axis of its
+/// logarithm then has the sign that makes to_quat() of it.
+struct MatrixLog {
+    static constexpr std::string_view name = "matrix_log";
+    template <class T>
+    using Transform = Affine<T>;
+
+    template <class T>
+    [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
+        return blend_of_two<MatrixLog>(a, b, t);
+    }
+
+    template <Signs signs = Signs::kToHeaviest, class T>
+    [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
+                                                  std::span<const T> weights) noexcept {
+        const Shares<T> share = shares(weights);
+        if (!share.is_defined) return {transforms[share.heaviest], false};
+        Twist<T> total;
+        bool is_defined = true;
+        for (std::size_t i = 0; i < transforms.size(); ++i) {
+            if (weights[i] == T(0)) continue;
+            const QuatVec<T> rigid = to_quat_vec(transforms[i]);
+            // Below this the sign of w, and with it that of the axis, is rounding.
+            const bool is_half_turn = rigid.rotation.w < T(kDegenerateBlend);
+            // A matrix of weight 1 is the result whichever logarithm it has.
+            if (is_half_turn && share.scale * weights[i] != T(1)) is_defined = false;
+            total = total + (share.scale * weights[i]) * to_twist(rigid);
+        }
+        return {to_affine(total), is_defined};
+    }
+};
+
+}  // namespace sinew

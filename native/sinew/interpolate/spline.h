@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <span>
+
+#include "sinew/interpolate/blended.h"
+
+namespace sinew {
+
+/// Where a time lies in a Catmull-Rom spline: four keys (at an end one of them twice) and their weights,
+/// of sum 1 and partly negative.
+template <class T>
+struct SplineSpan {
+    std::array<std::size_t, 4> keys{};
+    std::array<T, 4> weights{T(0), T(1), T(0), T(0)};
+};
+
+/// The keys and weights at `time` (Catmull and Rom 1974; Smith 2013, section 2.3.2, the tangents scaled to
+/// the interval as its text says; in its algorithm 3 the signs printed as 2t^3 0 3t^2 + 1 and t^3 + t^2 are
+/// 2t^3 - 3t^2 + 1 and t^3 - t^2).
+///
+/// times  [n], n >= 1, not decreasing, finite
+///
+/// The tangent at the first and the last key is that of the straight way to its neighbour. Before the first
+/// time the first key, after the last the last. Keys of equal time are a cut: the curve ends at the first of
+/// them and begins anew at the last, which is the value at that time.
+template <class T>
+[[nodiscard]] SplineSpan<T> spline_span(std::span<const T> times, T time) noexcept {
+    assert(!times.empty());
+    const std::size_t last = times.size() - 1;
+    const auto after = std::upper_bound(times.begin(), times.end(), time);
+    if (after == times.begin()) return {{0, 0, 0, 0}};
+    if (after == times.end()) return {{last, last, last, last}};
+    const auto next = static_cast<std::size_t>(after - times.begin());
+    const std::size_t key = next - 1;
+    const std::size_t before = key > 0 && times[key - 1] < times[key] ? key - 1 : key;
+    const std::size_t beyond = next < last && times[next] < times[next + 1] ? next + 1 : next;
+
+    const T length = times[next] - times[key];
+    const T u = (time - times[key]) / length;
+    const T u2 = u * u;
+    const T u3 = u2 * u;
+    const T leave = (u3 - T(2) * u2 + u) * (length / (times[next] - times[before]));
+    const T arrive = (u3 - u2) * (length / (times[beyond] - times[key]));
+    const T onto = T(3) * u2 - T(2) * u3;
+    return {{before, key, next, beyond}, {-leave, T(1) - onto - arrive, onto + leave, arrive}};
+}
+
+/// The four keys of a span with their signs brought to one side along the chain, from the second outwards:
+/// each step of the curve takes the shorter way, and no sign changes within it. Whether all steps of weight
+/// other than 0 are clear of half a turn.
+template <class Transform, class T>
+[[nodiscard]] Blended<std::array<Transform, 4>> along_chain(const SplineSpan<T>& span,
+                                                            const std::array<Transform, 4>& keys) noexcept {
+    const Transform& key = keys[1];
+    const Transform next = aligned(keys[2], key);
+    Blended<std::array<Transform, 4>> chain{{aligned(keys[0], key), key, next, aligned(keys[3], next)}};
+    const auto& w = span.weights;
+    const bool is_tie = (w[0] != T(0) && is_half_turn_apart(keys[0], key)) ||
+                        ((w[2] != T(0) || w[3] != T(0)) && is_half_turn_apart(key, next)) ||
+                        (w[3] != T(0) && is_half_turn_apart(next, keys[3]));
+    chain.is_defined = !is_tie;
+    return chain;
+}
+
+/// Vector form: the weighted sum of the components, which passes through the keys and is rigid only there;
+/// normalized() makes it rigid (Smith 2013, algorithm 3). The sign is that of the second key.
+///
+/// Not defined where neighbours are half a turn apart (quaternions): signs as given then decide.
+template <class Transform, class T>
+[[nodiscard]] Blended<Transform> spline_vector(const SplineSpan<T>& span,
+                                               const std::array<Transform, 4>& keys) noexcept {
+    const auto chain = along_chain(span, keys);
+    const std::span<const Transform> terms(chain.transform);
+    const std::span<const T> weights(span.weights);
+    return {weighted_sum<Signs::kAsGiven>(terms, weights, {1, T(1), true}).transform, chain.is_defined};
+}
+
+/// Blend form: the keys' blend by Method with the weights of the spline, rigid for every method but
+/// MatrixLinear (Smith 2013, section 3.2.2).
+///
+/// Not defined as spline_vector(), and where the blend is not: with keys more than about 100 degrees apart
+/// the negative weights keep the iterations of QvSlerp and Sclerp from settling here and there.
+template <class Method, class Transform, class T>
+[[nodiscard]] Blended<Transform> spline_blend(const SplineSpan<T>& span,
+                                              const std::array<Transform, 4>& keys) noexcept {
+    const auto chain = along_chain(span, keys);
+    Blended<Transform> result = Method::template blend<Signs::kAsGiven, T>(chain.transform, span.weights);
+    if (!chain.is_defined) result.is_defined = false;
+    return result;
+}
+
+/// The four of `keys` that `span` names.
+template <class Transform, class T>
+[[nodiscard]] std::array<Transform, 4> keys_of(const SplineSpan<T>& span,
+                                               std::span<const Transform> keys) noexcept {
+    return {keys[span.keys[0]], keys[span.keys[1]], keys[span.keys[2]], keys[span.keys[3]]};
+}
+
+/// The Catmull-Rom spline through `keys` at `time`, blend form.
+///
+/// keys   [n] in a representation of Method
+/// times  [n], n >= 1, not decreasing
+template <class Method, class T>
+[[nodiscard]] auto catmull_rom(std::span<const typename Method::template Transform<T>> keys,
+                               std::span<const T> times, T time) noexcept {
+    const SplineSpan<T> span = spline_span(times, time);
+    return spline_blend<Method>(span, keys_of(span, keys));
+}
+
+/// The same in vector form: not rigid between the keys.
+template <class Transform, class T>
+[[nodiscard]] Blended<Transform> catmull_rom_vector(std::span<const Transform> keys, std::span<const T> times,
+                                                    T time) noexcept {
+    const SplineSpan<T> span = spline_span(times, time);
+    return spline_vector(span, keys_of(span, keys));
+}
+
+}  // namespace sinew

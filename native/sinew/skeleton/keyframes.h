@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cassert>
+#include <span>
+
+#include "sinew/interpolate/spline.h"
+#include "sinew/skeleton/skeleton.h"
+
+namespace sinew {
+
+// Keyframes hold each bone relative to its parent, and the in-betweens are made there; root_relative()
+// comes after. Made from root-relative transforms, bones would turn about other centres and leave their
+// parents' ends (Smith 2013, figure 3.3).
+
+/// The skeleton between two keyframes (Smith 2013, algorithm 2), each bone by Method::between().
+///
+/// from, onto        [bones] parent_from_bone at t = 0 and at t = 1, in a representation of Method
+/// parent_from_bone  [bones] the result; may be the same memory as either
+///
+/// Returns whether every bone's is defined; one that is not has what Method says.
+template <class Method, class T>
+bool interpolate_keyframes(const Skeleton& skeleton,
+                           std::span<const typename Method::template Transform<T>> from,
+                           std::span<const typename Method::template Transform<T>> onto, T t,
+                           std::span<typename Method::template Transform<T>> parent_from_bone) noexcept {
+    assert(from.size() == skeleton.bone_count());
+    assert(onto.size() == skeleton.bone_count());
+    assert(parent_from_bone.size() == skeleton.bone_count());
+    bool are_defined = true;
+    for (std::size_t bone = 0; bone < skeleton.bone_count(); ++bone) {
+        const auto between = Method::between(from[bone], onto[bone], t);
+        parent_from_bone[bone] = between.transform;
+        are_defined = are_defined && between.is_defined;
+    }
+    return are_defined;
+}
+
+namespace detail {
+
+template <class Transform, class T, class Combine>
+bool spline_bones(const Skeleton& skeleton, std::span<const Transform> keyframes, std::span<const T> times,
+                  T time, std::span<Transform> parent_from_bone, Combine combine) noexcept {
+    const std::size_t bones = skeleton.bone_count();
+    assert(keyframes.size() == bones * times.size());
+    assert(parent_from_bone.size() == bones);
+    const SplineSpan<T> span = spline_span(times, time);
+    bool are_defined = true;
+    for (std::size_t bone = 0; bone < bones; ++bone) {
+        const auto key = [&](std::size_t i) { return keyframes[span.keys[i] * bones + bone]; };
+        const Blended<Transform> value = combine(span, std::array{key(0), key(1), key(2), key(3)});
+        parent_from_bone[bone] = value.transform;
+        are_defined = are_defined && value.is_defined;
+    }
+    return are_defined;
+}
+
+}  // namespace detail
+
+/// The skeleton on a Catmull-Rom spline through keyframes (Smith 2013, algorithm 3), blend form:
+/// spline_blend() of each bone.
+///
+/// keyframes         [keys * bones] parent_from_bone, key after key, in a representation of Method
+/// times             [keys], keys >= 1, not decreasing
+/// parent_from_bone  [bones] the result
+///
+/// Returns whether every bone's is defined.
+template <class Method, class T>
+bool spline_keyframes(const Skeleton& skeleton,
+                      std::span<const typename Method::template Transform<T>> keyframes,
+                      std::span<const T> times, T time,
+                      std::span<typename Method::template Transform<T>> parent_from_bone) noexcept {
+    using Transform = typename Method::template Transform<T>;
+    return detail::spline_bones<Transform, T>(
+        skeleton, keyframes, times, time, parent_from_bone,
+        [](const auto& span, const auto& keys) { return spline_blend<Method>(span, keys); });
+}
+
+/// The same in vector form, as algorithm 3 is printed: not rigid between the keys.
+template <class Transform, class T>
+bool spline_keyframes_vector(const Skeleton& skeleton, std::span<const Transform> keyframes,
+                             std::span<const T> times, T time,
+                             std::span<Transform> parent_from_bone) noexcept {
+    return detail::spline_bones<Transform, T>(
+        skeleton, keyframes, times, time, parent_from_bone,
+        [](const auto& span, const auto& keys) { return spline_vector(span, keys); });
+}
+
+}  // namespace sinew

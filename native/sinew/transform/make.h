@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/transform/convert.h"
+#include "sinew/transform/screw.h"
+#include "sinew/transform/twist.h"
+
+namespace sinew {
+
+// One function for the three representations: from_translation<DualQuat>(v). The identity is what each has
+// as its default: DualQuat<double>{}.
+
+/// `source`, any representation or a Screw or a Twist, as the representation named: to<DualQuat>(affine).
+template <template <class> class Target, template <class> class Source, class T>
+[[nodiscard]] Target<T> to(const Source<T>& source) noexcept {
+    if constexpr (requires(Target<T> target) { target.linear; }) {
+        return to_affine(source);
+    } else if constexpr (requires(Target<T> target) { target.rotation; }) {
+        return to_quat_vec(source);
+    } else {
+        return to_dual_quat(source);
+    }
+}
+
+/// The turn by `angle` radians about `axis`, of any length, through the origin. An axis of length 0 gives
+/// the identity.
+template <template <class> class Target, class T>
+[[nodiscard]] Target<T> from_axis_angle(const Vec3<T>& axis, T angle) noexcept {
+    return to<Target>(QuatVec<T>{quat_from_axis_angle(axis, angle), Vec3<T>(T(0))});
+}
+
+/// The turn of `rotation`. Requires orthonormal columns and determinant +1 to within rounding.
+template <template <class> class Target, class T>
+[[nodiscard]] Target<T> from_rotation_matrix(const Mat3<T>& rotation) noexcept {
+    return to<Target>(Affine<T>{rotation, Vec3<T>(T(0))});
+}
+
+template <template <class> class Target, class T>
+[[nodiscard]] Target<T> from_translation(const Vec3<T>& translation) noexcept {
+    return to<Target>(QuatVec<T>{Quat<T>(T(1), T(0), T(0), T(0)), translation});
+}
+
+}  // namespace sinew

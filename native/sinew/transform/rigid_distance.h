@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/transform/convert.h"
+
+namespace sinew {
+
+/// How far apart two rigid transforms are; two numbers, as radians and lengths have no common unit.
+template <class T>
+struct RigidDistance {
+    T angle = T(0);
+    T translation = T(0);
+};
+
+/// The angle of the turn from `a` to `b`, 0 to pi, and the distance of the images of the origin. The same
+/// for x a and x b, for any rigid x; the angle is also the same for a x and b x.
+///
+/// Rotations of unit length; the signs of quaternions do not matter.
+template <class T>
+[[nodiscard]] RigidDistance<T> rigid_distance(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
+    return {angle_between(a.rotation, b.rotation), safe_length(b.translation - a.translation)};
+}
+
+template <class T>
+[[nodiscard]] RigidDistance<T> rigid_distance(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
+    return rigid_distance(to_quat_vec(a), to_quat_vec(b));
+}
+
+template <class T>
+[[nodiscard]] RigidDistance<T> rigid_distance(const Affine<T>& a, const Affine<T>& b) noexcept {
+    return rigid_distance(to_quat_vec(a), to_quat_vec(b));
+}
+
+}  // namespace sinew

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cmath>
+
+#include "sinew/transform/quat.h"
+
+namespace sinew {
+
+/// sin(x) / x, 1 at 0.
+template <class T>
+[[nodiscard]] T sinc(T x) noexcept {
+    using std::abs;
+    using std::sin;
+    return abs(x) < T(1e-4) ? T(1) - x * x / T(6) : sin(x) / x;
+}
+
+/// `v` at length 1. One of length 0 gives `otherwise`.
+template <class T>
+[[nodiscard]] Vec3<T> unit(const Vec3<T>& v, const Vec3<T>& otherwise) noexcept {
+    using std::abs;
+    using std::max;
+    // By the largest component first: the square of a short vector is 0 long before the vector is.
+    const T largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
+    return largest > T(0) ? glm::normalize(v / largest) : otherwise;
+}
+
+/// The length of `v`, where the squares of its components may be below the smallest number.
+template <class T>
+[[nodiscard]] T safe_length(const Vec3<T>& v) noexcept {
+    using std::hypot;
+    return hypot(v.x, v.y, v.z);
+}
+
+/// Unit quaternion of the turn by `angle` radians about `axis`, of any length. An axis of length 0 gives
+/// the identity.
+template <class T>
+[[nodiscard]] Quat<T> quat_from_axis_angle(const Vec3<T>& axis, T angle) noexcept {
+    using std::cos;
+    using std::sin;
+    const Vec3<T> direction = unit(axis, Vec3<T>(T(0)));
+    if (direction == Vec3<T>(T(0))) return Quat<T>(T(1), T(0), T(0), T(0));
+    const T half = angle * T(0.5);
+    const Vec3<T> v = sin(half) * direction;
+    return Quat<T>(cos(half), v.x, v.y, v.z);
+}
+
+/// Axis times angle of the unit quaternion `q`, radians, of length 0 to pi: the shorter of the two ways
+/// that q and -q stand for. Where both are half a turn (w = 0) the signs of `q` decide.
+template <class T>
+[[nodiscard]] Vec3<T> rotation_vector(const Quat<T>& q) noexcept {
+    using std::atan2;
+    const Quat<T> near = q.w < T(0) ? -q : q;
+    const Vec3<T> v = vector_part(near);
+    const T length = safe_length(v);
+    // The factor is 2 to the last digit below this; above, atan2 is exact at both ends, acos(w) at neither.
+    const T factor = length < T(1e-9) ? T(2) : T(2) * atan2(length, near.w) / length;
+    return factor * v;
+}
+
+/// Unit quaternion of a rotation vector of any length; undoes rotation_vector() up to sign.
+template <class T>
+[[nodiscard]] Quat<T> quat_from_rotation_vector(const Vec3<T>& rotation) noexcept {
+    using std::cos;
+    const T half = safe_length(rotation) * T(0.5);
+    const Vec3<T> v = (T(0.5) * sinc(half)) * rotation;
+    return Quat<T>(cos(half), v.x, v.y, v.z);
+}
+
+/// The angle of the turn from `a` to `b`, both of unit length and either sign: 0 to pi.
+template <class T>
+[[nodiscard]] T angle_between(const Quat<T>& a, const Quat<T>& b) noexcept {
+    using std::abs;
+    using std::atan2;
+    const Quat<T> turn = glm::conjugate(a) * b;
+    return T(2) * atan2(safe_length(vector_part(turn)), abs(turn.w));
+}
+
+/// Whether two unit quaternions are half a turn apart to within rounding, so that neither way round is
+/// the shorter one.
+template <class T>
+[[nodiscard]] bool is_half_turn_apart(const Quat<T>& a, const Quat<T>& b) noexcept {
+    using std::abs;
+    return abs(glm::dot(a, b)) < T(kDegenerateBlend);
+}
+
+}  // namespace sinew

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <limits>
+
+#include "sinew/transform/convert.h"
+
+namespace sinew {
+
+/// A turn about a line and a shift along it: every rigid transform is one (Chasles 1830).
+///
+/// axis         unit direction of the line
+/// moment       point x axis, for any point on the line
+/// angle        radians, right-handed
+/// translation  along the axis
+template <class T>
+struct Screw {
+    Vec3<T> axis{T(0), T(0), T(1)};
+    Vec3<T> moment{T(0)};
+    T angle = T(0);
+    T translation = T(0);
+
+    /// Translation for each radian; infinite for a translation alone, 0 for the identity.
+    [[nodiscard]] T pitch() const noexcept {
+        if (angle != T(0)) return translation / angle;
+        if (translation == T(0)) return T(0);
+        const T infinity = std::numeric_limits<T>::infinity();
+        return translation < T(0) ? -infinity : infinity;
+    }
+};
+
+/// The screw about the line through `point` along `axis`, of any length but 0.
+template <class T>
+[[nodiscard]] Screw<T> screw_about(const Vec3<T>& axis, const Vec3<T>& point, T angle,
+                                   T translation) noexcept {
+    const Vec3<T> direction = unit(axis, Vec3<T>(T(0), T(0), T(1)));
+    return {direction, glm::cross(point, direction), angle, translation};
+}
+
+/// Unit dual quaternion of `screw` (Daniilidis 1999, eq. 13; Kavan et al. 2008, section 3.3).
+///
+/// Axis and moment are Pluecker coordinates: both are divided by the length of the axis, and a part of the
+/// moment along the axis is left out. An axis of length 0 gives the identity.
+template <class T>
+[[nodiscard]] DualQuat<T> to_dual_quat(const Screw<T>& screw) noexcept {
+    using std::cos;
+    using std::sin;
+    const T length = safe_length(screw.axis);
+    if (!(length > T(0))) return {};
+    const Vec3<T> axis = unit(screw.axis, screw.axis);
+    Vec3<T> moment = screw.moment / length;
+    moment -= axis * glm::dot(axis, moment);
+    const T half = screw.angle * T(0.5);
+    const T shift = screw.translation * T(0.5);
+    const Vec3<T> turn = sin(half) * axis;
+    const Vec3<T> dual = sin(half) * moment + (shift * cos(half)) * axis;
+    return {Quat<T>(cos(half), turn.x, turn.y, turn.z), Quat<T>(-shift * sin(half), dual.x, dual.y, dual.z)};
+}
+
+template <class T>
+[[nodiscard]] QuatVec<T> to_quat_vec(const Screw<T>& screw) noexcept {
+    return to_quat_vec(to_dual_quat(screw));
+}
+
+template <class T>
+[[nodiscard]] Affine<T> to_affine(const Screw<T>& screw) noexcept {
+    return to_affine(to_dual_quat(screw));
+}
+
+/// The screw of the unit dual quaternion `a`, its angle 0 to pi (Kavan et al. 2008, section 3.3).
+///
+/// A turn that moves nothing beyond rounding counts as none: the axis is then that of the translation, the
+/// moment 0, the translation >= 0; for the identity the axis is z. At half a turn the signs of `a` decide
+/// between the two directions of the axis. The moment grows as 1 / angle for small turns.
+template <class T>
+[[nodiscard]] Screw<T> to_screw(const DualQuat<T>& a) noexcept {
+    using std::atan2;
+    const DualQuat<T> near = a.real.w < T(0) ? -a : a;
+    const Vec3<T> v = vector_part(near.real);
+    const T sine = safe_length(v);
+    if (sine <= std::numeric_limits<T>::epsilon()) {
+        const Vec3<T> shift = translation(near);
+        return {unit(shift, Vec3<T>(T(0), T(0), T(1))), Vec3<T>(T(0)), T(0), safe_length(shift)};
+    }
+    const Vec3<T> axis = v / sine;
+    const T shift = glm::dot(axis, translation(near));
+    // From the dual part: sin(angle/2) moment + (shift/2) cos(angle/2) axis.
+    Vec3<T> moment = vector_part(near.dual);
+    // Twice: what is left of a long vector by the first is square to the axis only to its rounding.
+    for (int pass = 0; pass < 2; ++pass) moment -= axis * glm::dot(axis, moment);
+    return {axis, moment / sine, T(2) * atan2(sine, near.real.w), shift};
+}
+
+template <class T>
+[[nodiscard]] Screw<T> to_screw(const QuatVec<T>& a) noexcept {
+    return to_screw(to_dual_quat(a));
+}
+
+template <class T>
+[[nodiscard]] Screw<T> to_screw(const Affine<T>& a) noexcept {
+    return to_screw(to_dual_quat(a));
+}
+
+}  // namespace sinew

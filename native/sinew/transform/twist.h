@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "sinew/transform/convert.h"
+
+namespace sinew {
+
+/// The logarithm of a rigid transform, in se(3): the constant velocity that reaches it in unit time.
+/// The matrix [[angular]x, linear; 0, 0]. The default is that of the identity.
+template <class T>
+struct Twist {
+    Vec3<T> angular{T(0)};
+    Vec3<T> linear{T(0)};
+};
+
+template <class T>
+[[nodiscard]] Twist<T> operator+(const Twist<T>& a, const Twist<T>& b) noexcept {
+    return {a.angular + b.angular, a.linear + b.linear};
+}
+
+template <class T>
+[[nodiscard]] Twist<T> operator*(T factor, const Twist<T>& a) noexcept {
+    return {factor * a.angular, factor * a.linear};
+}
+
+/// The logarithm of `a`, its angle 0 to pi. At half a turn the two signs of the axis are both logarithms,
+/// and those of a.rotation decide (Murray, Li, Sastry 1994, section 2.3.3).
+template <class T>
+[[nodiscard]] Twist<T> to_twist(const QuatVec<T>& a) noexcept {
+    using std::cos;
+    using std::sin;
+    const Vec3<T> angular = rotation_vector(a.rotation);
+    const T half = safe_length(angular) * T(0.5);
+    // (1 - x cot x) / 4 x^2, which stays finite to 360 degrees; its series where the difference cancels.
+    const T x2 = half * half;
+    const T factor = half < T(1e-2) ? T(1) / T(12) + x2 * (T(1) / T(180) + x2 / T(1890))
+                                    : (T(1) - half * cos(half) / sin(half)) / (T(4) * x2);
+    const Vec3<T> sideways = glm::cross(angular, a.translation);
+    return {angular, a.translation - T(0.5) * sideways + factor * glm::cross(angular, sideways)};
+}
+
+template <class T>
+[[nodiscard]] Twist<T> to_twist(const Affine<T>& a) noexcept {
+    return to_twist(to_quat_vec(a));
+}
+
+template <class T>
+[[nodiscard]] Twist<T> to_twist(const DualQuat<T>& a) noexcept {
+    return to_twist(to_quat_vec(a));
+}
+
+/// The exponential of `twist`, of any angle: undoes to_twist().
+template <class T>
+[[nodiscard]] QuatVec<T> to_quat_vec(const Twist<T>& twist) noexcept {
+    using std::sin;
+    const T angle = safe_length(twist.angular);
+    const T x2 = angle * angle;
+    const T half_sinc = sinc(angle * T(0.5));
+    // (x - sin x) / x^3.
+    const T factor = angle < T(1e-2) ? T(1) / T(6) - x2 * (T(1) / T(120) - x2 / T(5040))
+                                     : (angle - sin(angle)) / (angle * x2);
+    const Vec3<T> sideways = glm::cross(twist.angular, twist.linear);
+    return {quat_from_rotation_vector(twist.angular), twist.linear +
+                                                          (T(0.5) * half_sinc * half_sinc) * sideways +
+                                                          factor * glm::cross(twist.angular, sideways)};
+}
+
+template <class T>
+[[nodiscard]] Affine<T> to_affine(const Twist<T>& twist) noexcept {
+    return to_affine(to_quat_vec(twist));
+}
+
+template <class T>
+[[nodiscard]] DualQuat<T> to_dual_quat(const Twist<T>& twist) noexcept {
+    return to_dual_quat(to_quat_vec(twist));
+}
+
+/// The logarithm of the unit dual quaternion `a`, half its twist in the vector parts and 0 in the scalar
+/// parts. Of a and -a, one motion, the one with real.w >= 0 is taken (Kavan et al. 2008, section 3.4).
+template <class T>
+[[nodiscard]] DualQuat<T> log(const DualQuat<T>& a) noexcept {
+    const Twist<T> half = T(0.5) * to_twist(a);
+    return {pure(half.angular), pure(half.linear)};
+}
+
+/// The unit dual quaternion whose logarithm is `a`. The scalar parts of `a` are not read.
+template <class T>
+[[nodiscard]] DualQuat<T> exp(const DualQuat<T>& a) noexcept {
+    return to_dual_quat(T(2) * Twist<T>{vector_part(a.real), vector_part(a.dual)});
+}
+
+/// `a`, unit, done `exponent` times: the same screw with angle and translation times `exponent`, the
+/// shorter way round (Kavan et al. 2008, section 3.4).
+template <class T>
+[[nodiscard]] DualQuat<T> power(const DualQuat<T>& a, T exponent) noexcept {
+    return to_dual_quat(exponent * to_twist(a));
+}
+
+}  // namespace sinew

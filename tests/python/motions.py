@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random transforms in the three layouts, from scipy: what sinew's mathematics is measured against."""
+
+import numpy as np
+import sinew
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import RigidTransform, Rotation
+
+# One profile for every property: the same cases on every machine, on every run.
+settings.register_profile(
+    "sinew",
+    derandomize=True,
+    deadline=None,
+    max_examples=60,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("sinew")
+
+LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
+
+LAYOUT_OF = {
+    "matrix_linear": "affine",
+    "matrix_polar": "affine",
+    "matrix_log": "affine",
+    "qv_nlerp": "quat_vec",
+    "qv_slerp": "quat_vec",
+    "dlb": "dual_quat",
+    "sclerp": "dual_quat",
+    "dib": "dual_quat",
+}
+
+# Turns and shifts where quotients of small numbers, or signs, go wrong first.
+ANGLES = [0.0, 1e-30, 1e-12, 1e-7, 1e-4, 0.0199, 0.0201, 1.0, 3.0, np.pi - 1e-5, np.pi]
+
+
+def rigid(rng, count=None, extent=2.0):
+    """scipy's RigidTransform, one or `count`."""
+    shift = rng.uniform(-extent, extent, 3 if count is None else (count, 3))
+    return RigidTransform.from_components(shift, Rotation.random(count, rng=rng))
+
+
+def layout(transform, name, dtype=np.float64):
+    """scipy's RigidTransform in a layout of sinew, without sinew."""
+    if name == "affine":
+        array = transform.as_matrix()
+    elif name == "quat_vec":
+        array = np.concatenate(
+            [transform.rotation.as_quat(scalar_first=True), transform.translation], axis=-1
+        )
+    else:
+        array = transform.as_dual_quat(scalar_first=True)
+    return np.asarray(array, dtype)
+
+
+def matrix(array, name):
+    """float64 [.., 4, 4] of a layout of sinew, by scipy; what is not rigid in it is made so by scipy."""
+    array = np.asarray(array, np.float64)
+    if name == "affine":
+        return array
+    flat = array.reshape(-1, array.shape[-1])
+    if name == "quat_vec":
+        rotation = Rotation.from_quat(flat[:, :4], scalar_first=True)
+        result = RigidTransform.from_components(flat[:, 4:], rotation).as_matrix()
+    else:
+        result = RigidTransform.from_dual_quat(flat, scalar_first=True).as_matrix()
+    return result.reshape(*array.shape[:-1], 4, 4)
+
+
+def hat(twist):
+    """The 4x4 matrix of se(3)."""
+    x, y, z, *linear = twist
+    result = np.zeros((4, 4))
+    result[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
+    result[:3, 3] = linear
+    return result
+
+
+def edge_motions():
+    """RigidTransform of every angle of ANGLES about five axes, each with two shifts and without."""
+    rotations, shifts = [], []
+    for angle in ANGLES:
+        for axis in ([1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, -0.8, 0], [0.48, 0.6, -0.64]):
+            for shift in ([0, 0, 0], [1, 2, 3], [0.96, 1.2, -1.28]):
+                rotations.append(angle * np.array(axis, np.float64))
+                shifts.append(shift)
+    return RigidTransform.from_components(np.array(shifts, np.float64), Rotation.from_rotvec(rotations))
+
+
+def numbers(extent):
+    return st.floats(-extent, extent, allow_subnormal=False)
+
+
+@st.composite
+def rigid_motions(draw, angle=np.pi):
+    """RigidTransform of up to `angle`."""
+    axis = np.array([draw(numbers(1.0)) for _ in range(3)])
+    length = np.linalg.norm(axis)
+    axis = axis / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
+    shift = np.array([draw(numbers(3.0)) for _ in range(3)])
+    turn = draw(st.floats(0.0, angle, allow_subnormal=False))
+    return RigidTransform.from_components(shift, Rotation.from_rotvec(turn * axis))
