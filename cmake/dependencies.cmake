@@ -7,6 +7,18 @@ if(NOT TARGET glm::glm)
   FetchContent_MakeAvailable(glm)
 endif()
 
+# Highway's headers alone: Debian has its library as a shared one only, which a wheel can not count on, and
+# kernels.cpp chooses among the instruction sets itself.
+add_library(hwy_headers INTERFACE)
+find_path(HWY_INCLUDE_DIR hwy/foreach_target.h)
+if(NOT HWY_INCLUDE_DIR)
+  FetchContent_Declare(highway GIT_REPOSITORY https://github.com/google/highway.git GIT_TAG 1.2.0
+    SOURCE_SUBDIR none)
+  FetchContent_MakeAvailable(highway)
+  set(HWY_INCLUDE_DIR "${highway_SOURCE_DIR}")
+endif()
+target_include_directories(hwy_headers SYSTEM INTERFACE "${HWY_INCLUDE_DIR}")
+
 find_package(Threads REQUIRED)
 
 if(SINEW_BUILD_TESTS)

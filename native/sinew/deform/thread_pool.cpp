@@ -18,12 +18,9 @@ namespace {
 
 using Work = std::function<void(std::size_t, std::size_t)>;
 
-// Small enough to even out threads of unequal speed, large enough that taking one costs nothing.
-constexpr std::size_t kPiece = 4096;
-
 class Pool {
 public:
-    void run(std::size_t count, std::size_t threads, const Work& work) {
+    void run(std::size_t count, std::size_t threads, const Work& work, std::size_t piece) {
         // A flag, not a mutex: a nested call asks on the thread that has the turn, which std::mutex forbids.
         if (busy_.exchange(true, std::memory_order_acquire)) {
             work(0, count);
@@ -34,13 +31,14 @@ public:
             const std::lock_guard<std::mutex> lock(mutex_);
             work_ = &work;
             count_ = count;
+            piece_ = piece;
             next_.store(0, std::memory_order_relaxed);
             seats_ = helpers;
             running_ = helpers;
             ++job_;
         }
         wake_.notify_all();
-        take_pieces(work, count);
+        take_pieces(work, count, piece);
         std::unique_lock<std::mutex> lock(mutex_);
         // Workers that have not woken yet would find no pieces left: give their seats back.
         running_ -= seats_;
@@ -74,18 +72,19 @@ private:
             --seats_;
             const Work& work = *work_;
             const std::size_t count = count_;
+            const std::size_t piece = piece_;
             lock.unlock();
-            take_pieces(work, count);
+            take_pieces(work, count, piece);
             lock.lock();
             if (--running_ == 0) done_.notify_one();
         }
     }
 
-    void take_pieces(const Work& work, std::size_t count) {
+    void take_pieces(const Work& work, std::size_t count, std::size_t piece) {
         for (;;) {
-            const std::size_t begin = next_.fetch_add(kPiece, std::memory_order_relaxed);
+            const std::size_t begin = next_.fetch_add(piece, std::memory_order_relaxed);
             if (begin >= count) return;
-            work(begin, std::min(begin + kPiece, count));
+            work(begin, std::min(begin + piece, count));
         }
     }
 
@@ -95,6 +94,7 @@ private:
     std::condition_variable done_;
     const Work* work_ = nullptr;
     std::size_t count_ = 0;
+    std::size_t piece_ = 1;
     std::atomic<std::size_t> next_{0};
     std::size_t seats_ = 0;
     std::size_t running_ = 0;
@@ -125,12 +125,12 @@ std::size_t hardware_threads() noexcept {
     return std::max<std::size_t>(1, std::thread::hardware_concurrency());
 }
 
-void parallel_for(std::size_t count, std::size_t threads, const Work& work) {
-    const std::size_t useful = std::min(threads, (count + kPiece - 1) / kPiece);
+void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t piece) {
+    const std::size_t useful = std::min(threads, (count + piece - 1) / piece);
     if (useful <= 1) {
         if (count > 0) work(0, count);
     } else {
-        the_pool().run(count, useful, work);
+        the_pool().run(count, useful, work, piece);
     }
 }
 

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Each method on lanes, agreeing with skinning/: compiled once for each instruction set, see kernels.cpp.
+//
+// Weighted sums of a palette's rows come first (kRow numbers a bone), `finish` makes points of them. The
+// rigid methods need no case for blends that cancel: a term never points against the sum before it, so
+// |sum|^2 >= the sum of squared weights >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
+#if defined(SINEW_DEFORM_METHODS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SINEW_DEFORM_METHODS_INL_H_
+#undef SINEW_DEFORM_METHODS_INL_H_
+#else
+#define SINEW_DEFORM_METHODS_INL_H_
+#endif
+
+#include "sinew/deform/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+/// The weighted sum of a row's numbers.
+template <class D, std::size_t kRow>
+struct Sum {
+    Vec<D> value[kRow];
+};
+
+template <class D, std::size_t kRow>
+HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin, std::size_t end,
+                        Sum<D, kRow>& sum) {
+    for (std::size_t i = begin; i < end; ++i) {
+        sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
+    }
+}
+
+/// `weight`, negative where the quaternion of `row` points away from that of `sum`.
+///
+/// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
+/// must decide a tie alike.
+template <class D>
+HWY_INLINE Vec<D> on_the_side_of(D d, const Sum<D, 8>& sum, const float* row, Vec<D> weight) {
+    const Vec<D> dot = hn::Add(
+        hn::Add(hn::Mul(hn::Set(d, row[0]), sum.value[0]), hn::Mul(hn::Set(d, row[2]), sum.value[2])),
+        hn::Add(hn::Mul(hn::Set(d, row[1]), sum.value[1]), hn::Mul(hn::Set(d, row[3]), sum.value[3])));
+    return hn::IfThenElse(hn::Lt(dot, hn::Zero(d)), hn::Neg(weight), weight);
+}
+
+struct LbsKernel {
+    static constexpr std::size_t kQuads = 3;
+    static constexpr std::size_t kSignedQuads = 0;
+
+    template <class D>
+    static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
+                               const Points<D>& /*rest*/, Sum<D, 12>& sum) {
+        add_row(d, weight, palette.bones[kQuads * bone].value.data(), 0, 12, sum);
+    }
+
+    template <class D>
+    static HWY_INLINE Points<D> finish(D /*d*/, const Sum<D, 12>& sum, const Points<D>& p) {
+        const auto row = [&sum, &p](std::size_t i) HWY_ATTR {
+            return hn::MulAdd(
+                sum.value[i], p.x,
+                hn::MulAdd(sum.value[i + 1], p.y, hn::MulAdd(sum.value[i + 2], p.z, sum.value[i + 3])));
+        };
+        return {hn::Add(p.x, row(0)), hn::Add(p.y, row(4)), hn::Add(p.z, row(8))};
+    }
+};
+
+struct DqKernel {
+    static constexpr std::size_t kQuads = 2;
+    static constexpr std::size_t kSignedQuads = 2;
+
+    template <class D>
+    static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
+                               const Points<D>& rest, Sum<D, 8>& sum) {
+        const float* const row = palette.bones[kQuads * bone].value.data();
+        weight = on_the_side_of(d, sum, row, weight);
+        add_row(d, weight, row, 0, 8, sum);
+        if (palette.has_scale.empty() || palette.has_scale[bone] == 0) return;
+        // The dual part that also moves by the scale: + 1/2 real * displacement.
+        const Points<D> by = displacement(d, palette.scales[kDisplacementQuads * bone].value.data(), rest);
+        const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
+        const Points<D> turned = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
+        const Vec<D> half = hn::Mul(weight, hn::Set(d, 0.5f));
+        const Vec<D> along = hn::MulAdd(axis.x, by.x, hn::MulAdd(axis.y, by.y, hn::Mul(axis.z, by.z)));
+        sum.value[4] = hn::NegMulAdd(half, along, sum.value[4]);
+        sum.value[5] = hn::MulAdd(half, turned.x, sum.value[5]);
+        sum.value[6] = hn::MulAdd(half, turned.y, sum.value[6]);
+        sum.value[7] = hn::MulAdd(half, turned.z, sum.value[7]);
+    }
+
+    /// Division by the squared norm replaces the square root, as in skinning/dq.h.
+    template <class D>
+    static HWY_INLINE Points<D> finish(D d, const Sum<D, 8>& sum, const Points<D>& p) {
+        const Vec<D>* const real = sum.value;
+        const Vec<D>* const dual = sum.value + 4;
+        const Vec<D> squared_norm =
+            hn::MulAdd(real[0], real[0],
+                       hn::MulAdd(real[1], real[1], hn::MulAdd(real[2], real[2], hn::Mul(real[3], real[3]))));
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+        const Points<D> axis{real[1], real[2], real[3]};
+        const Points<D> shift{dual[1], dual[2], dual[3]};
+        Points<D> inner = add_scaled<D>(cross<D>(axis, p), real[0], p);
+        inner = {hn::Add(inner.x, shift.x), hn::Add(inner.y, shift.y), hn::Add(inner.z, shift.z)};
+        Points<D> moved = add_scaled<D>(cross<D>(axis, inner), real[0], shift);
+        moved = {hn::NegMulAdd(dual[0], axis.x, moved.x), hn::NegMulAdd(dual[0], axis.y, moved.y),
+                 hn::NegMulAdd(dual[0], axis.z, moved.z)};
+        return add_scaled<D>(p, scale, moved);
+    }
+};
+
+struct QvKernel {
+    static constexpr std::size_t kQuads = 2;
+    static constexpr std::size_t kSignedQuads = 1;
+
+    template <class D>
+    static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
+                               const Points<D>& rest, Sum<D, 8>& sum) {
+        const float* const row = palette.bones[kQuads * bone].value.data();
+        add_row(d, on_the_side_of(d, sum, row, weight), row, 0, 4, sum);
+        add_row(d, weight, row, 4, 7, sum);
+        if (palette.has_scale.empty() || palette.has_scale[bone] == 0) return;
+        const Points<D> by = displacement(d, palette.scales[kDisplacementQuads * bone].value.data(), rest);
+        const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
+        const Points<D> inner = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
+        const Points<D> turned = add_scaled<D>(by, hn::Set(d, 2.0f), cross<D>(axis, inner));
+        sum.value[4] = hn::MulAdd(weight, turned.x, sum.value[4]);
+        sum.value[5] = hn::MulAdd(weight, turned.y, sum.value[5]);
+        sum.value[6] = hn::MulAdd(weight, turned.z, sum.value[6]);
+    }
+
+    template <class D>
+    static HWY_INLINE Points<D> finish(D d, const Sum<D, 8>& sum, const Points<D>& p) {
+        const Vec<D>* const q = sum.value;
+        const Vec<D> squared_norm =
+            hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
+        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+        const Points<D> axis{q[1], q[2], q[3]};
+        const Points<D> inner = add_scaled<D>(cross<D>(axis, p), q[0], p);
+        const Points<D> turned = add_scaled<D>(p, scale, cross<D>(axis, inner));
+        return {hn::Add(turned.x, q[4]), hn::Add(turned.y, q[5]), hn::Add(turned.z, q[6])};
+    }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#endif
