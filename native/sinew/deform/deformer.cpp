@@ -138,8 +138,8 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     std::array<Quad, kDisplacementQuads> back;
     if (method_ != MethodId::lbs && !is_identity(options.bones_from_model)) {
         const auto bones_from_model = cast<double>(options.bones_from_model);
-        write_displacement(bones_from_model, there.data());
-        write_displacement(inverse(bones_from_model), back.data());
+        there = displacement_quads(bones_from_model);
+        back = displacement_quads(inverse(bones_from_model));
         frame.bones_from_model = there.data();
         frame.model_from_bones = back.data();
     }

@@ -61,6 +61,14 @@ HWY_INLINE Points<D> cross(const Points<D>& a, const Points<D>& b) {
             hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 
+/// a + b x c
+template <class D>
+HWY_INLINE Points<D> add_cross(const Points<D>& a, const Points<D>& b, const Points<D>& c) {
+    return {hn::NegMulAdd(b.z, c.y, hn::MulAdd(b.y, c.z, a.x)),
+            hn::NegMulAdd(b.x, c.z, hn::MulAdd(b.z, c.x, a.y)),
+            hn::NegMulAdd(b.y, c.x, hn::MulAdd(b.x, c.y, a.z))};
+}
+
 /// a + scale * b
 template <class D>
 HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D>& b) {
@@ -70,17 +78,27 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
 template <class D>
 HWY_INLINE void store_points(D d, const Frame& frame, std::size_t b, std::size_t lane, const Points<D>& p) {
+    const Block& block = frame.mesh->blocks[b];
     const std::int32_t* const place = frame.mesh->vertices[b].lane.data() + lane;
     if constexpr (hn::MaxLanes(D()) == 1) {
         frame.points[*place] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
-    } else if (frame.mesh->blocks[b].consecutive) {
-        hn::StoreInterleaved3(p.x, p.y, p.z, d, &frame.points[*place].x);
+    } else if (block.consecutive) {
+        hn::StoreInterleaved3(p.x, p.y, p.z, d,
+                              &frame.points[static_cast<std::size_t>(block.first_vertex) + lane].x);
     } else {
         alignas(64) float buffer[4 * hn::MaxLanes(D())];
         hn::StoreInterleaved4(p.x, p.y, p.z, p.z, d, buffer);
         for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
             std::memcpy(&frame.points[place[i]], buffer + 4 * i, sizeof(Vec3<float>));
         }
+    }
+}
+
+inline void keep_block(const Frame& frame, std::size_t b) {
+    const Full d;
+    const Block& block = frame.mesh->blocks[b];
+    for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
+        store_points(d, frame, b, lane, load_points(d, &frame.mesh->rows[block.first_row], lane));
     }
 }
 

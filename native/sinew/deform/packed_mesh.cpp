@@ -164,7 +164,8 @@ private:
         const bool consecutive =
             !mixed && vertices.size() == kLanes && vertices.back() - vertices.front() == kLanes - 1;
         mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences),
-                                static_cast<std::uint8_t>(vertices.size()), mixed, consecutive});
+                                places.lane[0], static_cast<std::uint8_t>(vertices.size()), mixed,
+                                consecutive});
         mesh_.vertices.push_back(places);
         row_count_ += static_cast<std::uint32_t>(3 + influences);
     }

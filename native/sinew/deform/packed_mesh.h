@@ -26,6 +26,7 @@ struct Block {
     std::uint32_t first_row;   // of PackedMesh::rows: x, y, z, then the weights of each influence
     std::uint32_t first_bone;  // of PackedMesh::bones: [influences], or if mixed [kLanes][influences]
     std::uint32_t influences;
+    std::int32_t first_vertex;
     std::uint8_t vertices;
     bool mixed;        // every lane has bones of its own; fewer influences are filled up with weight 0
     bool consecutive;  // kLanes vertices that also follow each other in the mesh

@@ -8,10 +8,29 @@
 namespace sinew {
 namespace {
 
-// All in double: a few hundred bones, against the rounding of every vertex.
+// In double, but for a single subtraction: a few hundred bones, against the rounding of every vertex.
 
-Quad quad(double a, double b, double c, double d) {
+template <class T>
+Quad quad(T a, T b, T c, T d) {
     return {{static_cast<float>(a), static_cast<float>(b), static_cast<float>(c), static_cast<float>(d)}};
+}
+
+// Without the identity a vertex far from the origin keeps its digits, and the rest pose every bit.
+void write_displacement(const Affine<double>& a, Quad* quads) {
+    const Mat3<double>& m = a.linear;
+    const Vec3<double>& shift = a.translation;
+    quads[0] = quad(m[0].x - 1.0, m[1].x, m[2].x, shift.x);
+    quads[1] = quad(m[0].y, m[1].y - 1.0, m[2].y, shift.y);
+    quads[2] = quad(m[0].z, m[1].z, m[2].z - 1.0, shift.z);
+}
+
+template <class T>
+void write_columns(const Affine<T>& a, Quad* quads) {
+    const Mat3<T>& m = a.linear;
+    quads[0] = quad(m[0].x - T(1), m[0].y, m[0].z, T(0));
+    quads[1] = quad(m[1].x, m[1].y - T(1), m[1].z, T(0));
+    quads[2] = quad(m[2].x, m[2].y, m[2].z - T(1), T(0));
+    quads[3] = quad(a.translation.x, a.translation.y, a.translation.z, T(0));
 }
 
 Quad quad(const Quat<double>& q) { return quad(q.w, q.x, q.y, q.z); }
@@ -51,9 +70,12 @@ void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<floa
     const Affine<double> back = inverse(there);
     for (const std::int32_t index : used) {
         const auto bone = static_cast<std::size_t>(index);
-        const auto motion = cast<double>(posed_from_rest[bone]);
-        write_displacement(same_space ? motion : back * motion * there,
-                           &palette.bones[kDisplacementQuads * bone]);
+        Quad* const quads = &palette.bones[kLbsQuads * bone];
+        if (same_space) {
+            write_columns(posed_from_rest[bone], quads);
+        } else {
+            write_columns(back * cast<double>(posed_from_rest[bone]) * there, quads);
+        }
     }
 }
 
@@ -73,17 +95,14 @@ void prepare(MethodId method, std::span<const std::int32_t> used,
     }
 }
 
-void write_displacement(const Affine<double>& a, Quad* quads) noexcept {
-    // Without the identity a vertex far from the origin keeps its digits, and the rest pose every bit.
-    for (int row = 0; row < 3; ++row) {
-        quads[row] =
-            quad(a.linear[0][row] - (row == 0 ? 1.0 : 0.0), a.linear[1][row] - (row == 1 ? 1.0 : 0.0),
-                 a.linear[2][row] - (row == 2 ? 1.0 : 0.0), a.translation[row]);
-    }
-}
-
 bool is_identity(const Affine<float>& a) noexcept {
     return a.linear == Mat3<float>(1.0f) && a.translation == Vec3<float>(0.0f);
+}
+
+std::array<Quad, kDisplacementQuads> displacement_quads(const Affine<double>& a) noexcept {
+    std::array<Quad, kDisplacementQuads> quads;
+    write_displacement(a, quads.data());
+    return quads;
 }
 
 }  // namespace sinew

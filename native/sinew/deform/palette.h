@@ -18,12 +18,14 @@ struct alignas(16) Quad {
 /// The rows x, y, z of an affine transform without the identity: what it adds to a point.
 inline constexpr std::size_t kDisplacementQuads = 3;
 
+inline constexpr std::size_t kLbsQuads = 4;
+
 /// Quads of a bone in Palette::bones:
-/// lbs  the displacement from rest to pose
+/// lbs  the columns x, y, z and shift of the displacement from rest to pose, each filled up with 0
 /// dq   (w, x, y, z) of the real and of the dual part
 /// qv   (w, x, y, z) of the rotation, then (x, y, z, 0) of the translation
 [[nodiscard]] constexpr std::size_t bone_quads(MethodId method) noexcept {
-    return method == MethodId::lbs ? kDisplacementQuads : 2;
+    return method == MethodId::lbs ? kLbsQuads : 2;
 }
 
 /// The bones of one frame as a kernel reads them, indexed as in the mesh.
@@ -41,8 +43,7 @@ void prepare(MethodId method, std::span<const std::int32_t> used,
              std::span<const Affine<float>> posed_from_rest, std::span<const Affine<float>> rest_bones,
              const Affine<float>& bones_from_model, Palette& palette);
 
-/// Writes kDisplacementQuads quads.
-void write_displacement(const Affine<double>& a, Quad* quads) noexcept;
+[[nodiscard]] std::array<Quad, kDisplacementQuads> displacement_quads(const Affine<double>& a) noexcept;
 
 [[nodiscard]] bool is_identity(const Affine<float>& a) noexcept;
 

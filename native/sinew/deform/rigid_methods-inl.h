@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each method on lanes, agreeing with skinning/: compiled once for each instruction set, see kernels.cpp.
+// The rigid methods on lanes, agreeing with skinning/: compiled once for each instruction set, see
+// kernels.cpp.
 //
-// Weighted sums of a palette's rows come first (kRow numbers a bone), `finish` makes points of them. The
-// rigid methods need no case for blends that cancel: a term never points against the sum before it, so
-// |sum|^2 >= the sum of squared weights >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
-#if defined(SINEW_DEFORM_METHODS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef SINEW_DEFORM_METHODS_INL_H_
-#undef SINEW_DEFORM_METHODS_INL_H_
+// `add` sums a bone's row by weight, `finish` makes points of the sums. There is no case for blends that
+// cancel: a term never points against the sum before it, so |sum|^2 >= the sum of squared weights
+// >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
+#if defined(SINEW_DEFORM_RIGID_METHODS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SINEW_DEFORM_RIGID_METHODS_INL_H_
+#undef SINEW_DEFORM_RIGID_METHODS_INL_H_
 #else
-#define SINEW_DEFORM_METHODS_INL_H_
+#define SINEW_DEFORM_RIGID_METHODS_INL_H_
 #endif
 
 #include "sinew/deform/lanes-inl.h"
@@ -17,15 +18,18 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// The weighted sum of a row's numbers.
-template <class D, std::size_t kRow>
+/// Numbers of a bone's row: two quads.
+inline constexpr std::size_t kRow = 8;
+
+/// The weighted sum of rows.
+template <class D>
 struct Sum {
     Vec<D> value[kRow];
 };
 
-template <class D, std::size_t kRow>
+template <class D>
 HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin, std::size_t end,
-                        Sum<D, kRow>& sum) {
+                        Sum<D>& sum) {
     for (std::size_t i = begin; i < end; ++i) {
         sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
     }
@@ -36,42 +40,20 @@ HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin,
 /// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
 /// must decide a tie alike.
 template <class D>
-HWY_INLINE Vec<D> on_the_side_of(D d, const Sum<D, 8>& sum, const float* row, Vec<D> weight) {
+HWY_INLINE Vec<D> on_the_side_of(D d, const Sum<D>& sum, const float* row, Vec<D> weight) {
     const Vec<D> dot = hn::Add(
         hn::Add(hn::Mul(hn::Set(d, row[0]), sum.value[0]), hn::Mul(hn::Set(d, row[2]), sum.value[2])),
         hn::Add(hn::Mul(hn::Set(d, row[1]), sum.value[1]), hn::Mul(hn::Set(d, row[3]), sum.value[3])));
     return hn::IfThenElse(hn::Lt(dot, hn::Zero(d)), hn::Neg(weight), weight);
 }
 
-struct LbsKernel {
-    static constexpr std::size_t kQuads = 3;
-    static constexpr std::size_t kSignedQuads = 0;
-
-    template <class D>
-    static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
-                               const Points<D>& /*rest*/, Sum<D, 12>& sum) {
-        add_row(d, weight, palette.bones[kQuads * bone].value.data(), 0, 12, sum);
-    }
-
-    template <class D>
-    static HWY_INLINE Points<D> finish(D /*d*/, const Sum<D, 12>& sum, const Points<D>& p) {
-        const auto row = [&sum, &p](std::size_t i) HWY_ATTR {
-            return hn::MulAdd(
-                sum.value[i], p.x,
-                hn::MulAdd(sum.value[i + 1], p.y, hn::MulAdd(sum.value[i + 2], p.z, sum.value[i + 3])));
-        };
-        return {hn::Add(p.x, row(0)), hn::Add(p.y, row(4)), hn::Add(p.z, row(8))};
-    }
-};
-
 struct DqKernel {
-    static constexpr std::size_t kQuads = 2;
     static constexpr std::size_t kSignedQuads = 2;
 
     template <class D>
     static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
-                               const Points<D>& rest, Sum<D, 8>& sum) {
-        const float* const row = palette.bones[kQuads * bone].value.data();
+                               const Points<D>& rest, Sum<D>& sum) {
+        const float* const row = palette.bones[2 * bone].value.data();
         weight = on_the_side_of(d, sum, row, weight);
         add_row(d, weight, row, 0, 8, sum);
         if (palette.has_scale.empty() || palette.has_scale[bone] == 0) return;
@@ -89,7 +71,7 @@ struct DqKernel {
 
     /// Division by the squared norm replaces the square root, as in skinning/dq.h.
     template <class D>
-    static HWY_INLINE Points<D> finish(D d, const Sum<D, 8>& sum, const Points<D>& p) {
+    static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
         const Vec<D>* const real = sum.value;
         const Vec<D>* const dual = sum.value + 4;
         const Vec<D> squared_norm =
@@ -98,23 +80,21 @@ struct DqKernel {
         const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
         const Points<D> axis{real[1], real[2], real[3]};
         const Points<D> shift{dual[1], dual[2], dual[3]};
-        Points<D> inner = add_scaled<D>(cross<D>(axis, p), real[0], p);
-        inner = {hn::Add(inner.x, shift.x), hn::Add(inner.y, shift.y), hn::Add(inner.z, shift.z)};
-        Points<D> moved = add_scaled<D>(cross<D>(axis, inner), real[0], shift);
-        moved = {hn::NegMulAdd(dual[0], axis.x, moved.x), hn::NegMulAdd(dual[0], axis.y, moved.y),
-                 hn::NegMulAdd(dual[0], axis.z, moved.z)};
-        return add_scaled<D>(p, scale, moved);
+        const Points<D> inner = add_cross<D>(add_scaled<D>(shift, real[0], p), axis, p);
+        const Points<D> moved{hn::NegMulAdd(dual[0], axis.x, hn::Mul(real[0], shift.x)),
+                              hn::NegMulAdd(dual[0], axis.y, hn::Mul(real[0], shift.y)),
+                              hn::NegMulAdd(dual[0], axis.z, hn::Mul(real[0], shift.z))};
+        return add_scaled<D>(p, scale, add_cross<D>(moved, axis, inner));
     }
 };
 
 struct QvKernel {
-    static constexpr std::size_t kQuads = 2;
     static constexpr std::size_t kSignedQuads = 1;
 
     template <class D>
     static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
-                               const Points<D>& rest, Sum<D, 8>& sum) {
-        const float* const row = palette.bones[kQuads * bone].value.data();
+                               const Points<D>& rest, Sum<D>& sum) {
+        const float* const row = palette.bones[2 * bone].value.data();
         add_row(d, on_the_side_of(d, sum, row, weight), row, 0, 4, sum);
         add_row(d, weight, row, 4, 7, sum);
         if (palette.has_scale.empty() || palette.has_scale[bone] == 0) return;
@@ -128,7 +108,7 @@ struct QvKernel {
     }
 
     template <class D>
-    static HWY_INLINE Points<D> finish(D d, const Sum<D, 8>& sum, const Points<D>& p) {
+    static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
         const Vec<D>* const q = sum.value;
         const Vec<D> squared_norm =
             hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
