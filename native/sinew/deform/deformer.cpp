@@ -17,7 +17,7 @@ namespace sinew {
 namespace {
 
 // Below this, waking a second thread costs more than it saves.
-constexpr std::size_t kVerticesWorthAThread = 8192;
+constexpr std::size_t kVerticesWorthAThread = 32768;
 
 // 4096 vertices: small enough to even out threads of unequal speed, large enough that taking one costs
 // nothing.

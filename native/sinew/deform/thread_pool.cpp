@@ -2,6 +2,7 @@
 #include "sinew/deform/thread_pool.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -60,14 +61,17 @@ public:
         work_ = &work;
         count_ = count;
         piece_ = piece;
-        next_.store(0, std::memory_order_relaxed);
+        shares_ = helpers + 1;
+        for (std::size_t share = 0; share < shares_; ++share) {
+            next_[share].index.store(share_begin(share), std::memory_order_relaxed);
+        }
         left_.store(0, std::memory_order_relaxed);
         const std::uint64_t job = (job_of(gate_.load(std::memory_order_relaxed)) + 1) << 32;
         gate_.store(job | helpers, std::memory_order_release);
         bell_.fetch_add(1, std::memory_order_release);
         bell_.notify_all();
 
-        take_pieces(work, count, piece);
+        take_pieces(0);
         // Workers that have not come yet would find no pieces left: close their seats.
         const std::uint64_t unused = gate_.exchange(job, std::memory_order_acq_rel) & kSeats;
         const auto came = static_cast<std::uint32_t>(helpers - unused);
@@ -90,7 +94,7 @@ private:
     std::size_t start_workers(std::size_t wanted) {
         while (worker_count_ < wanted) {
             try {
-                std::thread([this] { serve(); }).detach();
+                std::thread([this, self = worker_count_ + 1] { serve(self); }).detach();
             } catch (const std::system_error&) {
                 break;
             }
@@ -99,12 +103,12 @@ private:
         return std::min(worker_count_, wanted);
     }
 
-    void serve() {
+    void serve(std::size_t self) {
         std::uint64_t last_job = 0;
         for (;;) {
             const std::uint32_t heard = bell_.load(std::memory_order_acquire);
             if (take_seat(last_job)) {
-                take_pieces(*work_, count_, piece_);
+                take_pieces(self);
                 // The caller may be gone as soon as this is seen, but the pool never is.
                 left_.fetch_add(1, std::memory_order_release);
                 left_.notify_one();
@@ -128,23 +132,41 @@ private:
         return false;
     }
 
-    void take_pieces(const Work& work, std::size_t count, std::size_t piece) {
-        for (;;) {
-            const std::size_t begin = next_.fetch_add(piece, std::memory_order_relaxed);
-            if (begin >= count) return;
-            work(begin, std::min(begin + piece, count));
+    /// Where share `share` of the pieces starts.
+    [[nodiscard]] std::size_t share_begin(std::size_t share) const {
+        const std::size_t pieces = (count_ + piece_ - 1) / piece_;
+        return std::min(pieces * share / shares_ * piece_, count_);
+    }
+
+    /// First the same share in every job, as what it reads and writes is still in this core's cache (with
+    /// pieces dealt out at random two threads took 0.74 of the time of one, not 0.5), then what others have
+    /// left.
+    void take_pieces(std::size_t self) {
+        for (std::size_t turn = 0; turn < shares_; ++turn) {
+            const std::size_t share = (self + turn) % shares_;
+            const std::size_t end = share_begin(share + 1);
+            std::atomic<std::size_t>& next = next_[share].index;
+            while (next.load(std::memory_order_relaxed) < end) {
+                const std::size_t begin = next.fetch_add(piece_, std::memory_order_relaxed);
+                if (begin < end) (*work_)(begin, std::min(begin + piece_, end));
+            }
         }
     }
+
+    struct alignas(64) Next {
+        std::atomic<std::size_t> index{0};
+    };
 
     std::atomic<bool> busy_{false};
     const Work* work_ = nullptr;
     std::size_t count_ = 0;
     std::size_t piece_ = 1;
+    std::size_t shares_ = 1;
     std::size_t worker_count_ = 0;
     // Apart, as all threads write them while they read the ones above.
     alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, then its free seats
     std::atomic<std::uint32_t> bell_{0};              // changes with every job; what workers sleep on
-    alignas(64) std::atomic<std::size_t> next_{0};
+    std::array<Next, kMostThreads> next_;  // first piece of each share that nobody has
     alignas(64) std::atomic<std::uint32_t> left_{0};  // workers that are done with the job
 };
 
