@@ -87,7 +87,8 @@ Scene make_scene(Kind kind, std::size_t vertices) {
     if (kind == Kind::shuffled) {
         for (std::size_t i = 0; i < vertices; i += 4096) {
             const auto begin = order.begin() + static_cast<std::ptrdiff_t>(i);
-            std::shuffle(begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4096, vertices - i)),
+            std::shuffle(begin,
+                         begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4096, vertices - i)),
                          engine);
         }
     }
@@ -137,9 +138,9 @@ Scene& scene_of(Kind kind, std::size_t vertices) {
 }
 
 void count_vertices(benchmark::State& state, std::size_t vertices) {
-    state.counters["vertex"] = benchmark::Counter(static_cast<double>(vertices),
-                                                  benchmark::Counter::kIsIterationInvariantRate |
-                                                      benchmark::Counter::kInvert);
+    state.counters["vertex"] =
+        benchmark::Counter(static_cast<double>(vertices),
+                           benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
 void ours(benchmark::State& state, MethodId method, Kind kind, std::size_t vertices, std::size_t threads) {
@@ -185,7 +186,9 @@ void new_rest_points(benchmark::State& state, std::size_t vertices) {
 
 // Two pieces of no work: what the pool itself costs.
 void pool_call(benchmark::State& state) {
-    for (auto _ : state) parallel_for(2, 2, [](std::size_t, std::size_t) {}, 1);
+    for (auto _ : state)
+        parallel_for(
+            2, 2, [](std::size_t, std::size_t) {}, 1);
 }
 
 void register_all(bool with_millions) {
@@ -204,14 +207,16 @@ void register_all(bool with_millions) {
                         name("sinew" + std::to_string(threads), row.name, kind, vertices).c_str(),
                         [=](benchmark::State& s) { ours(s, method, kind, vertices, threads); });
                 }
-                benchmark::RegisterBenchmark(name("plain", row.name, kind, vertices).c_str(),
-                                             [=](benchmark::State& s) { plain_loop(s, method, kind, vertices); });
+                benchmark::RegisterBenchmark(
+                    name("plain", row.name, kind, vertices).c_str(),
+                    [=](benchmark::State& s) { plain_loop(s, method, kind, vertices); });
             }
         }
         benchmark::RegisterBenchmark(name("bind", "dq", kind, 100'000).c_str(),
                                      [=](benchmark::State& s) { bind(s, kind, 100'000); });
     }
-    benchmark::RegisterBenchmark("rest/dq/chain/100000", [](benchmark::State& s) { new_rest_points(s, 100'000); });
+    benchmark::RegisterBenchmark("rest/dq/chain/100000",
+                                 [](benchmark::State& s) { new_rest_points(s, 100'000); });
     benchmark::RegisterBenchmark("pool", pool_call)->UseRealTime();
 }
 

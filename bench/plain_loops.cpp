@@ -29,8 +29,8 @@ void dq(const Mesh& mesh, const std::vector<glm::dualquat>& palette, glm::vec3* 
     }
 }
 
-void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations,
-        const std::vector<glm::vec3>& translations, glm::vec3* points) {
+void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations, const std::vector<glm::vec3>& translations,
+        glm::vec3* points) {
     for (std::size_t v = 0; v < mesh.rest_points.size(); ++v) {
         const glm::u16vec4 bones = mesh.bones[v];
         const glm::vec4 weights = mesh.weights[v];

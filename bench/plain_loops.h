@@ -18,7 +18,7 @@ struct Mesh {
 
 void lbs(const Mesh& mesh, const std::vector<glm::mat4>& palette, glm::vec3* points);
 void dq(const Mesh& mesh, const std::vector<glm::dualquat>& palette, glm::vec3* points);
-void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations,
-        const std::vector<glm::vec3>& translations, glm::vec3* points);
+void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations, const std::vector<glm::vec3>& translations,
+        glm::vec3* points);
 
 }  // namespace plain
