@@ -7,6 +7,18 @@ if(NOT TARGET glm::glm)
   FetchContent_MakeAvailable(glm)
 endif()
 
+# Highway's headers alone: Debian has its library as a shared one only, which a wheel can not count on, and
+# kernels.cpp chooses among the instruction sets itself.
+add_library(hwy_headers INTERFACE)
+find_path(HWY_INCLUDE_DIR hwy/foreach_target.h)
+if(NOT HWY_INCLUDE_DIR)
+  FetchContent_Declare(highway GIT_REPOSITORY https://github.com/google/highway.git GIT_TAG 1.2.0
+    SOURCE_SUBDIR none)
+  FetchContent_MakeAvailable(highway)
+  set(HWY_INCLUDE_DIR "${highway_SOURCE_DIR}")
+endif()
+target_include_directories(hwy_headers SYSTEM INTERFACE "${HWY_INCLUDE_DIR}")
+
 find_package(Threads REQUIRED)
 
 if(SINEW_BUILD_TESTS)
@@ -14,5 +26,14 @@ if(SINEW_BUILD_TESTS)
   if(NOT TARGET GTest::gtest_main)
     FetchContent_Declare(googletest GIT_REPOSITORY https://github.com/google/googletest.git GIT_TAG v1.15.2)
     FetchContent_MakeAvailable(googletest)
+  endif()
+endif()
+
+if(SINEW_BUILD_BENCH)
+  find_package(benchmark QUIET)
+  if(NOT TARGET benchmark::benchmark)
+    set(BENCHMARK_ENABLE_TESTING OFF)
+    FetchContent_Declare(benchmark GIT_REPOSITORY https://github.com/google/benchmark.git GIT_TAG v1.9.0)
+    FetchContent_MakeAvailable(benchmark)
   endif()
 endif()

@@ -1,111 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <functional>
-#include <ostream>
 #include <stdexcept>
 #include <string>
 
 #include "sinew/deform/deformer.h"
-#include "sinew/skinning/dq.h"
-#include "sinew/skinning/lbs.h"
-#include "sinew/skinning/qv.h"
-#include "support.h"
+#include "scene.h"
 
 namespace sinew {
-
-// Found by argument: without it GoogleTest names each test by the bytes of its row, addresses included.
-static void PrintTo(const Method& method, std::ostream* stream) { *stream << method.name; }
-
 namespace {
 
 using test::about;
+using test::deformed;
 using test::distance;
-using test::Random;
+using test::in_double;
+using test::kTolerance;
+using test::random_scene;
 using test::same_bits;
 using test::scaling;
-
-/// A mesh and a pose that own what BindData points at.
-struct Scene {
-    std::vector<Vec3<float>> rest_points;
-    std::vector<std::int32_t> offsets{0};
-    std::vector<std::int32_t> bones;
-    std::vector<float> weights;
-    std::vector<Affine<float>> rest_bones;
-    std::vector<Affine<float>> posed_from_rest;
-
-    BindData data() const { return {rest_points, offsets, bones, weights, rest_bones}; }
-
-    void add_vertex(const Vec3<float>& rest, const std::vector<Influence<float>>& influences) {
-        rest_points.push_back(rest);
-        for (const Influence<float>& influence : influences) {
-            bones.push_back(influence.bone);
-            weights.push_back(influence.weight);
-        }
-        offsets.push_back(static_cast<std::int32_t>(bones.size()));
-    }
-};
-
-/// Bones 2, 5, ... are stretched along their own axes, every second of those mirrored; 1 to 8 influences.
-Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent) {
-    Random random(seed);
-    Scene scene;
-    constexpr int kBones = 12;
-    for (int bone = 0; bone < kBones; ++bone) {
-        const Affine<double> rest = to_affine(random.motion(extent));
-        Affine<double> motion = to_affine(random.motion(extent));
-        if (bone % 3 == 2) {
-            const double mirror = bone % 2 == 0 ? 1.0 : -1.0;
-            const Affine<double> scale =
-                scaling<double>({mirror * random.uniform(0.4, 2.0), random.uniform(0.4, 2.0), 1.0});
-            motion = motion * rest * scale * inverse(rest);
-        }
-        scene.rest_bones.push_back(cast<float>(rest));
-        scene.posed_from_rest.push_back(cast<float>(motion));
-    }
-    for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
-        const auto count = static_cast<std::size_t>(1 + random.index(8));
-        scene.add_vertex(Vec3<float>(random.vector(extent)), random.influences<float>(count, kBones));
-    }
-    return scene;
-}
-
-std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
-                                  const DeformOptions& options = {}) {
-    std::vector<Vec3<float>> points(deformer.vertex_count(), Vec3<float>(-1e9f));
-    deformer.deform(scene.posed_from_rest, options, points);
-    return points;
-}
-
-template <class Method>
-std::vector<Vec3<double>> in_double(const Scene& scene) {
-    std::vector<typename Method::template Bone<double>> palette;
-    for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
-        palette.push_back(
-            Method::prepare(cast<double>(scene.posed_from_rest[bone]), cast<double>(scene.rest_bones[bone])));
-    }
-    std::vector<Vec3<double>> points;
-    for (std::size_t vertex = 0; vertex < scene.rest_points.size(); ++vertex) {
-        std::vector<Influence<double>> influences;
-        double sum = 0.0;
-        for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
-             i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
-            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i])});
-            sum += influences.back().weight;
-        }
-        for (Influence<double>& influence : influences) influence.weight /= sum;
-        points.push_back(Method::template deform_vertex<double>(palette, influences,
-                                                                Vec3<double>(scene.rest_points[vertex])));
-    }
-    return points;
-}
-
-std::vector<Vec3<double>> in_double(MethodId method, const Scene& scene) {
-    switch (method) {
-        case MethodId::lbs: return in_double<Lbs>(scene);
-        case MethodId::qv: return in_double<Qv>(scene);
-        case MethodId::dq: return in_double<Dq>(scene);
-    }
-    return {};
-}
+using test::Scene;
 
 class Deform : public testing::TestWithParam<Method> {
 protected:
@@ -114,10 +26,6 @@ protected:
 
 INSTANTIATE_TEST_SUITE_P(every, Deform, testing::ValuesIn(kMethods),
                          [](const auto& info) { return std::string(info.param.name); });
-
-// kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The shift of a
-// dual quaternion is a product of two numbers of that size, so it grows with the size and no faster.
-constexpr double kTolerance = 2e-6;
 
 TEST_P(Deform, agrees_with_skinning_in_double) {
     double worst = 0.0;

@@ -2,6 +2,7 @@
 #include "sinew/deform/deformer.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -10,12 +11,17 @@
 
 #include "sinew/deform/kernels.h"
 #include "sinew/deform/thread_pool.h"
+#include "sinew/transform/convert.h"
 
 namespace sinew {
 namespace {
 
 // Below this, waking a second thread costs more than it saves.
-constexpr std::size_t kVerticesWorthAThread = 8192;
+constexpr std::size_t kVerticesWorthAThread = 32768;
+
+// 4096 vertices: small enough to even out threads of unequal speed, large enough that taking one costs
+// nothing.
+constexpr std::size_t kBlocksOfAPiece = 256;
 
 [[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got) {
     throw std::invalid_argument(argument + ": expected " + wanted + ", got " + got);
@@ -77,7 +83,7 @@ void check(const BindData& data) {
 
 Deformer::Deformer(MethodId method, const BindData& data) : method_(method) {
     check(data);
-    rest_points_.assign(data.rest_points.begin(), data.rest_points.end());
+    vertex_count_ = data.rest_points.size();
     for (const std::int32_t bone : data.influence_bones) {
         bone_count_ = std::max(bone_count_, static_cast<std::size_t>(bone) + 1);
     }
@@ -88,10 +94,11 @@ Deformer::Deformer(MethodId method, const BindData& data) : method_(method) {
     rest_bones_.assign(data.rest_bones.begin(), data.rest_bones.end());
     rest_bones_.resize(std::max(rest_bones_.size(), bone_count_));
 
-    offsets_.reserve(data.rest_points.size() + 1);
-    offsets_.push_back(0);
-    influences_.reserve(data.influence_bones.size());
-    for (std::size_t vertex = 0; vertex < data.rest_points.size(); ++vertex) {
+    std::vector<std::uint32_t> offsets{0};
+    std::vector<Influence<float>> influences;
+    offsets.reserve(vertex_count_ + 1);
+    influences.reserve(data.influence_bones.size());
+    for (std::size_t vertex = 0; vertex < vertex_count_; ++vertex) {
         const auto begin = static_cast<std::size_t>(data.influence_offsets[vertex]);
         const auto end = static_cast<std::size_t>(data.influence_offsets[vertex + 1]);
         double sum = 0.0;
@@ -99,33 +106,50 @@ Deformer::Deformer(MethodId method, const BindData& data) : method_(method) {
         for (std::size_t i = begin; i < end; ++i) {
             const float weight = data.influence_weights[i];
             if (weight > 0.0f) {
-                influences_.push_back(
+                influences.push_back(
                     {data.influence_bones[i], static_cast<float>(static_cast<double>(weight) / sum)});
             }
         }
-        offsets_.push_back(static_cast<std::uint32_t>(influences_.size()));
+        offsets.push_back(static_cast<std::uint32_t>(influences.size()));
     }
+    influence_count_ = influences.size();
+    mesh_ = pack(data.rest_points, offsets, influences);
 }
 
 void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
-    if (rest_points.size() != rest_points_.size()) {
-        fail("rest_points", std::to_string(rest_points_.size()) + " points",
-             std::to_string(rest_points.size()));
+    if (rest_points.size() != vertex_count_) {
+        fail("rest_points", std::to_string(vertex_count_) + " points", std::to_string(rest_points.size()));
     }
     check_points(rest_points);
-    std::copy(rest_points.begin(), rest_points.end(), rest_points_.begin());
+    repack_points(mesh_, rest_points);
 }
 
 void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                       std::span<Vec3<float>> points) const noexcept {
     assert(posed_from_rest.size() >= bone_count_);
-    assert(points.size() == rest_points_.size());
-    const MeshView mesh{rest_points_, offsets_, influences_};
-    const std::size_t threads =
-        options.threads > 0 ? options.threads
-                            : std::min(hardware_threads(), 1 + rest_points_.size() / kVerticesWorthAThread);
-    deform_mesh(method_, mesh, posed_from_rest.first(bone_count_), rest_bones_, options.bones_from_model,
-                threads, points);
+    assert(points.size() == vertex_count_);
+    // One for each thread that deforms, kept for its next frame: nothing is allocated and nothing locked.
+    thread_local Palette palette;
+    prepare(method_, mesh_.used_bones, posed_from_rest.first(bone_count_), rest_bones_,
+            options.bones_from_model, palette);
+
+    Frame frame{method_, &mesh_, &palette, nullptr, nullptr, points.data()};
+    std::array<Quad, kDisplacementQuads> there;
+    std::array<Quad, kDisplacementQuads> back;
+    if (method_ != MethodId::lbs && !is_identity(options.bones_from_model)) {
+        const auto bones_from_model = cast<double>(options.bones_from_model);
+        there = displacement_quads(bones_from_model);
+        back = displacement_quads(inverse(bones_from_model));
+        frame.bones_from_model = there.data();
+        frame.model_from_bones = back.data();
+    }
+    const std::size_t threads = options.threads > 0
+                                    ? options.threads
+                                    : std::min(hardware_threads(), 1 + vertex_count_ / kVerticesWorthAThread);
+    // By one reference: a larger capture makes std::function allocate.
+    parallel_for(
+        mesh_.blocks.size(), threads,
+        [&frame](std::size_t begin, std::size_t end) { deform_blocks(frame, begin, end); }, kBlocksOfAPiece);
 }
 
 }  // namespace sinew

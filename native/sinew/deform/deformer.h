@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "sinew/deform/packed_mesh.h"
 #include "sinew/export.h"
-#include "sinew/skinning/influence.h"
 #include "sinew/skinning/methods.h"
 #include "sinew/transform/affine.h"
 
@@ -44,8 +44,8 @@ public:
     Deformer(MethodId method, const BindData& data);
 
     [[nodiscard]] MethodId method() const noexcept { return method_; }
-    [[nodiscard]] std::size_t vertex_count() const noexcept { return rest_points_.size(); }
-    [[nodiscard]] std::size_t influence_count() const noexcept { return influences_.size(); }
+    [[nodiscard]] std::size_t vertex_count() const noexcept { return vertex_count_; }
+    [[nodiscard]] std::size_t influence_count() const noexcept { return influence_count_; }
     /// One more than the highest bone that an influence names.
     [[nodiscard]] std::size_t bone_count() const noexcept { return bone_count_; }
 
@@ -64,10 +64,10 @@ public:
 
 private:
     MethodId method_;
-    std::vector<Vec3<float>> rest_points_;
-    std::vector<std::uint32_t> offsets_;
-    std::vector<Influence<float>> influences_;
+    PackedMesh mesh_;
     std::vector<Affine<float>> rest_bones_;
+    std::size_t vertex_count_ = 0;
+    std::size_t influence_count_ = 0;
     std::size_t bone_count_ = 0;
 };
 

@@ -1,26 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
-#include "sinew/skinning/influence.h"
+#include "sinew/deform/packed_mesh.h"
+#include "sinew/deform/palette.h"
 #include "sinew/skinning/methods.h"
-#include "sinew/transform/affine.h"
 
 namespace sinew {
 
-/// A valid bound mesh: every influence has a positive weight and those of a vertex sum to 1.
-struct MeshView {
-    std::span<const Vec3<float>> rest_points;      // [vertices]
-    std::span<const std::uint32_t> offsets;        // [vertices + 1]
-    std::span<const Influence<float>> influences;  // [offsets.back()]
+/// What every block of one frame reads.
+struct Frame {
+    MethodId method;
+    const PackedMesh* mesh;
+    const Palette* palette;
+    const Quad* bones_from_model;  // displacements of points to the space of the bones and back;
+    const Quad* model_from_bones;  // null: the same space
+    Vec3<float>* points;
 };
 
-/// Deforms the whole mesh with one method; the seam at which kernels are made fast. What the method means
-/// is in skinning/, and each kernel agrees with it.
-void deform_mesh(MethodId method, const MeshView& mesh, std::span<const Affine<float>> posed_from_rest,
-                 std::span<const Affine<float>> rest_bones, const Affine<float>& bones_from_model,
-                 std::size_t threads, std::span<Vec3<float>> points);
+/// Deforms the blocks [begin, end) on the instruction set in use. What a method means is in skinning/;
+/// the kernels agree with it.
+///
+/// A vertex's result depends on its own rest point and influences and on the pose alone: not on its lane,
+/// its block or on other vertices. On other instruction sets it may differ by rounding, as only some of
+/// them multiply and add in one step.
+void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) noexcept;
 
 }  // namespace sinew

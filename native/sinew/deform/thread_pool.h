@@ -11,13 +11,14 @@ namespace sinew {
 /// Threads that this machine runs at once; at least 1.
 [[nodiscard]] SINEW_EXPORT std::size_t hardware_threads() noexcept;
 
-/// Calls `work(begin, end)` on pieces that cover [0, count), on up to `threads` threads, the caller one of
+/// Calls `work(begin, end)` on pieces of `piece` indices or less that cover [0, count), on up to `threads` threads, the caller one of
 /// them, and returns when all are done. One call at a time uses the pool; a second one made meanwhile
 /// runs on its caller alone.
 ///
 /// The threads are Sinew's own, started at first use and kept: Blender's scheduler is not touched, so a
 /// frame handler can wait here without keeping one of Blender's workers.
 SINEW_EXPORT void parallel_for(std::size_t count, std::size_t threads,
-                               const std::function<void(std::size_t, std::size_t)>& work);
+                               const std::function<void(std::size_t, std::size_t)>& work,
+                               std::size_t piece = 4096);
 
 }  // namespace sinew

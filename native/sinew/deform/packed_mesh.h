@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sinew/skinning/influence.h"
+#include "sinew/transform/affine.h"
+
+namespace sinew {
+
+/// Vertices of a block: the float lanes of the widest vector there is; narrower ones take a block in steps.
+inline constexpr std::size_t kLanes = 16;
+
+/// One number of each vertex of a block.
+template <class T>
+struct alignas(kLanes * sizeof(T)) Lanes {
+    std::array<T, kLanes> lane;
+};
+
+/// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
+struct Block {
+    std::uint32_t first_row;   // of PackedMesh::rows: x, y, z, then the weights of each influence
+    std::uint32_t first_bone;  // of PackedMesh::bones: [influences], or if mixed [kLanes][influences]
+    std::uint32_t influences;
+    std::int32_t first_vertex;
+    std::uint8_t vertices;
+    bool mixed;        // every lane has bones of its own; fewer influences are filled up with weight 0
+    bool consecutive;  // kLanes vertices that also follow each other in the mesh
+};
+
+/// A bound mesh in the order in which it is deformed: vertices with the same bones in the same order lie
+/// together, so that a bone is read once for many.
+struct PackedMesh {
+    std::vector<Block> blocks;
+    std::vector<Lanes<float>> rows;
+    std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the place of each lane in the mesh
+    std::vector<std::int32_t> bones;
+    std::vector<std::int32_t> used_bones;  // rising, each once
+};
+
+/// rest_points  [vertices]
+/// offsets      [vertices + 1] into `influences`
+/// influences   of each vertex: positive weights of sum 1, or none
+[[nodiscard]] PackedMesh pack(std::span<const Vec3<float>> rest_points,
+                              std::span<const std::uint32_t> offsets,
+                              std::span<const Influence<float>> influences);
+
+/// Other rest points [vertices] for the same influences.
+void repack_points(PackedMesh& mesh, std::span<const Vec3<float>> rest_points) noexcept;
+
+}  // namespace sinew

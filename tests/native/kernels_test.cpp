@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <tuple>
+
+#include "scene.h"
+#include "sinew/deform/simd.h"
+
+namespace sinew {
+namespace {
+
+using test::about;
+using test::deformed;
+using test::distance;
+using test::in_double;
+using test::kTolerance;
+using test::Random;
+using test::random_scene;
+using test::same_bits;
+using test::Scene;
+
+/// `sets` sets of 1 to `most` bones, each with `vertices` vertices that lie apart in the mesh.
+Scene scene_of_sets(std::uint32_t seed, std::size_t sets, std::size_t vertices, std::size_t most, bool scaled,
+                    double spread = 1.0) {
+    Random random(seed);
+    Scene scene = random_scene(seed, 0, 1.0);
+    if (!scaled) {
+        for (Affine<float>& motion : scene.posed_from_rest) {
+            const Quat<double> turn = glm::slerp(Quat<double>(1, 0, 0, 0), random.rotation(), spread);
+            motion = cast<float>(to_affine(QuatVec<double>{turn, random.vector(1.0)}));
+        }
+    }
+    std::vector<std::vector<std::int32_t>> bones(sets);
+    for (auto& set : bones) {
+        const auto count = 1 + random.index(static_cast<std::int32_t>(most));
+        const std::int32_t step = 1 + 2 * random.index(2);  // 1 or 3
+        const std::int32_t first = random.index(12);
+        for (std::int32_t k = 0; k < count; ++k) set.push_back((first + step * k) % 12);
+    }
+    for (std::size_t i = 0; i < sets * vertices; ++i) {
+        const auto& set = bones[i % sets];
+        auto influences = random.influences<float>(set.size(), 12);
+        for (std::size_t k = 0; k < set.size(); ++k) influences[k].bone = set[k];
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+    }
+    return scene;
+}
+
+std::vector<Influence<float>> influences_of(const Scene& scene, std::size_t vertex) {
+    std::vector<Influence<float>> influences;
+    for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
+         i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
+        influences.push_back({scene.bones[i], scene.weights[i]});
+    }
+    return influences;
+}
+
+/// The same vertices in another order.
+Scene reordered(const Scene& scene, const std::vector<std::size_t>& order) {
+    Scene other;
+    other.rest_bones = scene.rest_bones;
+    other.posed_from_rest = scene.posed_from_rest;
+    for (const std::size_t vertex : order) {
+        other.add_vertex(scene.rest_points[vertex], influences_of(scene, vertex));
+    }
+    return other;
+}
+
+/// How far each point is from that of skinning/ in double, rising.
+std::vector<double> errors(MethodId method, const Scene& scene, const DeformOptions& options = {}) {
+    const auto expected = in_double(method, scene);
+    const auto points = deformed(Deformer(method, scene.data()), scene, options);
+    std::vector<double> result;
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        result.push_back(distance(Vec3<double>(points[vertex]), expected[vertex]));
+    }
+    std::ranges::sort(result);
+    return result;
+}
+
+class Kernels : public testing::TestWithParam<std::tuple<std::string_view, Method>> {
+protected:
+    void SetUp() override { use_simd_target(std::get<0>(GetParam())); }
+    void TearDown() override { use_simd_target(simd_targets().front()); }
+    static MethodId method() { return std::get<1>(GetParam()).id; }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, Kernels,
+                         testing::Combine(testing::ValuesIn(simd_targets()), testing::ValuesIn(kMethods)),
+                         [](const auto& info) {
+                             return std::string(std::get<0>(info.param)) + "_" +
+                                    std::string(std::get<1>(info.param).name);
+                         });
+
+TEST_P(Kernels, agree_with_skinning_in_double) {
+    for (const double extent : {0.01, 1.0, 100.0}) {
+        for (std::uint32_t seed = 0; seed < 3; ++seed) {
+            EXPECT_LT(errors(method(), random_scene(seed, 500, extent)).back(), kTolerance * extent);
+        }
+    }
+}
+
+TEST_P(Kernels, agree_for_sets_of_every_size) {
+    for (const std::size_t vertices : {1, 2, 9, 10, 11, 15, 16, 17, 31, 33, 100}) {
+        for (const bool scaled : {false, true}) {
+            const Scene scene = scene_of_sets(static_cast<std::uint32_t>(vertices), 12, vertices, 8, scaled);
+            EXPECT_LT(errors(method(), scene).back(), kTolerance) << vertices << (scaled ? " scaled" : "");
+        }
+    }
+}
+
+// Near to each other, all bones of a set have signs that do not depend on the weights.
+TEST_P(Kernels, agree_for_bones_turned_alike) {
+    EXPECT_LT(errors(method(), scene_of_sets(1, 12, 100, 6, false, 0.2)).back(), kTolerance);
+}
+
+TEST_P(Kernels, agree_for_many_influences) {
+    for (const std::size_t most : {12, 31, 32, 33, 40, 70}) {
+        const Scene scene = scene_of_sets(2, 5, 40, most, false);
+        EXPECT_LT(errors(method(), scene).back(), 2 * kTolerance) << most;
+    }
+}
+
+TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
+    for (const bool scaled : {false, true}) {
+        Scene scene = scene_of_sets(3, 20, 37, 6, scaled);
+        const Scene more = scene_of_sets(4, 400, 1, 6, scaled);
+        for (std::size_t vertex = 0; vertex < more.rest_points.size(); ++vertex) {
+            scene.add_vertex(more.rest_points[vertex], influences_of(more, vertex));
+        }
+        const auto expected = deformed(Deformer(method(), scene.data()), scene);
+        std::vector<std::size_t> order(scene.rest_points.size());
+        std::iota(order.begin(), order.end(), std::size_t{0});
+        Random random(5);
+        for (int round = 0; round < 3; ++round) {
+            for (std::size_t i = order.size(); i > 1; --i) {
+                std::swap(order[i - 1],
+                          order[static_cast<std::size_t>(random.index(static_cast<std::int32_t>(i)))]);
+            }
+            // Ever fewer vertices, so that sets also lose vertices and change from one kernel to another.
+            order.resize(order.size() / 2);
+            const Scene other = reordered(scene, order);
+            const auto points = deformed(Deformer(method(), other.data()), other);
+            for (std::size_t i = 0; i < order.size(); ++i) {
+                ASSERT_TRUE(same_bits(points[i], expected[order[i]])) << i << (scaled ? " scaled" : "");
+            }
+        }
+    }
+}
+
+TEST_P(Kernels, threads_change_no_bit) {
+    const Scene scene = scene_of_sets(6, 700, 30, 4, true);
+    const Deformer deformer(method(), scene.data());
+    const auto expected = deformed(deformer, scene, {{}, 1});
+    for (std::size_t threads = 2; threads <= 5; ++threads) {
+        const auto points = deformed(deformer, scene, {{}, threads});
+        for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+            ASSERT_TRUE(same_bits(points[vertex], expected[vertex])) << vertex << " on " << threads;
+        }
+    }
+}
+
+TEST_P(Kernels, rest_pose_is_unchanged_to_the_bit) {
+    Scene scene = scene_of_sets(7, 30, 25, 6, false);
+    scene.posed_from_rest.assign(scene.posed_from_rest.size(), {});
+    for (Vec3<float>& point : scene.rest_points) point *= 1000.0f;
+    const auto points = deformed(Deformer(method(), scene.data()), scene);
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        ASSERT_TRUE(same_bits(points[vertex], scene.rest_points[vertex]));
+    }
+}
+
+TEST_P(Kernels, bones_from_model_goes_there_and_back) {
+    const Scene scene = scene_of_sets(8, 20, 25, 6, true);
+    const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
+    const auto points = deformed(Deformer(method(), scene.data()), scene, {bones_from_model, 0});
+    Scene there = scene;
+    for (Vec3<float>& point : there.rest_points) point = transform_point(bones_from_model, point);
+    const auto moved = in_double(method(), there);
+    const Affine<double> back = inverse(cast<double>(bones_from_model));
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        ASSERT_LT(distance(Vec3<double>(points[vertex]), transform_point(back, moved[vertex])), 1e-5);
+    }
+}
+
+TEST_P(Kernels, write_no_other_point) {
+    const Scene scene = scene_of_sets(9, 7, 23, 4, false);
+    const Deformer deformer(method(), scene.data());
+    const Vec3<float> mark(-1e9f);
+    std::vector<Vec3<float>> points(scene.rest_points.size() + 2, mark);
+    deformer.deform(scene.posed_from_rest, {}, std::span(points).subspan(1, scene.rest_points.size()));
+    EXPECT_TRUE(same_bits(points.front(), mark));
+    EXPECT_TRUE(same_bits(points.back(), mark));
+    for (std::size_t i = 1; i + 1 < points.size(); ++i) ASSERT_FALSE(same_bits(points[i], mark));
+}
+
+TEST(SimdTargets, one_is_in_use) {
+    const auto targets = simd_targets();
+    ASSERT_FALSE(targets.empty());
+    EXPECT_EQ(simd_target(), targets.front());
+    for (const std::string_view target : targets) {
+        use_simd_target(target);
+        EXPECT_EQ(simd_target(), target);
+    }
+    use_simd_target(targets.front());
+    EXPECT_THROW(use_simd_target("abacus"), std::invalid_argument);
+    EXPECT_EQ(simd_target(), targets.front());
+}
+
+}  // namespace
+}  // namespace sinew
