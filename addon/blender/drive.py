@@ -33,10 +33,10 @@ def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | Non
             return behind
         return None
     candidates = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object is not None]
-    return min(candidates, key=lambda m: not _is_on(m), default=None)
+    return min(candidates, key=lambda m: not is_on(m), default=None)
 
 
-def _is_on(modifier: bpy.types.Modifier) -> bool:
+def is_on(modifier: bpy.types.Modifier) -> bool:
     return modifier.show_viewport or modifier.show_render
 
 
@@ -93,7 +93,7 @@ def check_in_front(obj: bpy.types.Object) -> None:
     for other in obj.modifiers:
         if other == modifier:
             break
-        if _is_on(other) and other.type not in HARMLESS_IN_FRONT and not node_group.is_sinew(other):
+        if is_on(other) and other.type not in HARMLESS_IN_FRONT and not node_group.is_sinew(other):
             raise SinewError(
                 f"{obj.name}: modifier {other.name} stands in front of {modifier.name} and changes the mesh "
                 "before it; apply it or move it behind"

@@ -64,7 +64,9 @@ def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     settings = properties.of(obj)
-    if settings.enabled:
+    nodes = drive.sinew_modifier(obj)
+    # Blender calls this for every assignment, also of the value it had.
+    if settings.enabled and nodes is not None and not drive.is_on(nodes):
         drive.record_flags(obj)
     drive.switch(obj, settings.enabled)
     settings.error = ""

@@ -203,6 +203,16 @@ def test_what_the_artist_switched_while_off_stays():
     assert not obj.modifiers["Armature"].show_render
 
 
+def test_switched_on_twice_and_off_is_the_modifier():
+    obj, _armature = scenes.make_arm()
+    linear = scenes.modifier_shapes(obj, [11], preserve_volume=False)[0]
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).enabled = True
+    properties.of(obj).enabled = True
+    properties.of(obj).enabled = False
+    assert np.array_equal(scenes.final_points(obj), linear)
+
+
 def test_no_attribute_stays_after_a_linked_duplicate_is_made_single():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
