@@ -73,6 +73,20 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
     return {hn::MulAdd(scale, b.x, a.x), hn::MulAdd(scale, b.y, a.y), hn::MulAdd(scale, b.z, a.z)};
 }
 
+/// Apart from store_points, so that its stack is not that of every block.
+template <class D>
+HWY_NOINLINE void scatter_points(D d, const std::int32_t* place, Vec3<float>* points, Vec<D> x, Vec<D> y,
+                                 Vec<D> z) {
+    // Numbers one by one: turning lanes into points first costs a fifth more of the whole.
+    alignas(64) float xs[hn::MaxLanes(D())];
+    alignas(64) float ys[hn::MaxLanes(D())];
+    alignas(64) float zs[hn::MaxLanes(D())];
+    hn::Store(x, d, xs);
+    hn::Store(y, d, ys);
+    hn::Store(z, d, zs);
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) points[place[i]] = {xs[i], ys[i], zs[i]};
+}
+
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
 template <class D>
 HWY_INLINE void store_points(D d, const Frame& frame, std::size_t b, std::size_t lane, const Points<D>& p) {
@@ -84,14 +98,7 @@ HWY_INLINE void store_points(D d, const Frame& frame, std::size_t b, std::size_t
         hn::StoreInterleaved3(p.x, p.y, p.z, d,
                               &frame.points[static_cast<std::size_t>(block.first_vertex) + lane].x);
     } else {
-        // Numbers one by one: turning lanes into points first costs a fifth more of the whole.
-        alignas(64) float x[hn::MaxLanes(D())];
-        alignas(64) float y[hn::MaxLanes(D())];
-        alignas(64) float z[hn::MaxLanes(D())];
-        hn::Store(p.x, d, x);
-        hn::Store(p.y, d, y);
-        hn::Store(p.z, d, z);
-        for (std::size_t i = 0; i < hn::Lanes(d); ++i) frame.points[place[i]] = {x[i], y[i], z[i]};
+        scatter_points(d, place, frame.points, p.x, p.y, p.z);
     }
 }
 

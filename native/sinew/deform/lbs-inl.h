@@ -20,7 +20,7 @@ namespace HWY_NAMESPACE {
 /// time of a kernel that is bound by loads on AVX-512.
 template <class V>
 HWY_INLINE V in_register(V v) {
-#if HWY_ARCH_X86 && HWY_COMPILER_GCC && HWY_TARGET != HWY_SCALAR
+#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_SCALAR
     asm("" : "+v"(v.raw));
 #endif
     return v;
