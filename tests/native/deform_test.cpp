@@ -3,8 +3,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "sinew/deform/deformer.h"
 #include "scene.h"
+#include "sinew/deform/deformer.h"
 
 namespace sinew {
 namespace {

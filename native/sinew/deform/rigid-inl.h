@@ -8,6 +8,7 @@
 #endif
 
 #include <cmath>
+#include <cstring>
 
 #include "sinew/deform/rigid_methods-inl.h"
 

@@ -166,7 +166,7 @@ private:
     // Apart, as all threads write them while they read the ones above.
     alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, then its free seats
     std::atomic<std::uint32_t> bell_{0};              // changes with every job; what workers sleep on
-    std::array<Next, kMostThreads> next_;  // first piece of each share that nobody has
+    std::array<Next, kMostThreads> next_;             // first piece of each share that nobody has
     alignas(64) std::atomic<std::uint32_t> left_{0};  // workers that are done with the job
 };
 
