@@ -130,15 +130,10 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
 
 def remove(obj: bpy.types.Object) -> None:
     """Takes Sinew off: the Armature modifier is as it was, and nothing of ours stays."""
-    settings = properties.of(obj)
-    modifier = armature_modifier(obj)
-    if modifier is not None:
-        give_back(obj)
-        modifier.show_viewport = settings.show_viewport
-        modifier.show_render = settings.show_render
+    switch(obj, on=False)
     nodes = sinew_modifier(obj)
     if nodes is not None:
-        active = obj.modifiers.active if obj.modifiers.active != nodes else modifier
+        active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
         obj.modifiers.remove(nodes)
         if active is not None:
             obj.modifiers.active = active
@@ -218,12 +213,7 @@ def separate_attributes(objects: list[bpy.types.Object]) -> None:
 
 
 def _free_attribute_name(obj: bpy.types.Object) -> str:
-    used = {
-        properties.of(other).attribute
-        for other in bpy.data.objects
-        if other != obj and properties.is_driven(other) and other.data == obj.data
-    }
-    used |= {attribute.name for attribute in obj.data.attributes}
+    used = _attributes_of_others(obj) | {attribute.name for attribute in obj.data.attributes}
     name, number = ATTRIBUTE, 0
     while name in used:
         number += 1
@@ -231,14 +221,19 @@ def _free_attribute_name(obj: bpy.types.Object) -> str:
     return name
 
 
-def _remove_attributes(obj: bpy.types.Object) -> None:
-    """Takes all attributes of ours off the mesh but those of its other users: a mesh that was copied with
-    its object's settings can have more than one."""
-    used = {
+def _attributes_of_others(obj: bpy.types.Object) -> set[str]:
+    """The attributes that the mesh's other driven users hold their points in."""
+    return {
         properties.of(other).attribute
         for other in bpy.data.objects
         if other != obj and properties.is_driven(other) and other.data == obj.data
     }
+
+
+def _remove_attributes(obj: bpy.types.Object) -> None:
+    """Takes all attributes of ours off the mesh but those of its other users: a mesh that was copied with
+    its object's settings can have more than one."""
+    used = _attributes_of_others(obj)
     for name in [attribute.name for attribute in obj.data.attributes]:
         if name.startswith(ATTRIBUTE) and name not in used:
             mesh_io.remove_points(obj.data, name)

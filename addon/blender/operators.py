@@ -27,6 +27,10 @@ def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return sorted(meshes, key=lambda o: o != active)
 
 
+def _driven_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
+    return [obj for obj in targets(context) if properties.is_driven(obj)]
+
+
 def _for_each(
     operator: bpy.types.Operator,
     objects: list[bpy.types.Object],
@@ -72,7 +76,7 @@ class SINEW_OT_add(bpy.types.Operator):
 class _OnDriven:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(properties.is_driven(obj) for obj in targets(context)):
+        if _driven_targets(context):
             return True
         cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
         return False
@@ -85,7 +89,7 @@ class SINEW_OT_rebind(_OnDriven, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = [obj for obj in targets(context) if properties.is_driven(obj)]
+        objects = _driven_targets(context)
         result = _for_each(self, objects, lambda obj: handlers.rebind(obj, context), "Rebound")
         failed = [properties.of(obj).error for obj in objects if properties.of(obj).error]
         if failed:
@@ -101,7 +105,7 @@ class SINEW_OT_remove(_OnDriven, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = [obj for obj in targets(context) if properties.is_driven(obj)]
+        objects = _driven_targets(context)
         result = _for_each(self, objects, drive.remove, "Removed Sinew from")
         handlers.session.forget()
         return result

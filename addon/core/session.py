@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +30,7 @@ class Frame:
 
 
 class Binding:
-    """A mesh bound to bones. Deforms when a frame differs from the last, and says how long it took."""
+    """A mesh bound to bones. Deforms when a frame differs from the last."""
 
     def __init__(self, weighting: Weighting, mask: np.ndarray | None = None) -> None:
         """mask: float32 [vertices], the share of the deformation each vertex takes; None for all of it."""
@@ -42,7 +41,6 @@ class Binding:
         self._deformer: sinew.Deformer | None = None
         self._last: Frame | None = None
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
-        self.milliseconds = 0.0
 
     @property
     def moving_bones(self) -> list[str]:
@@ -68,7 +66,6 @@ class Binding:
         last = self._last
         if last is not None and _same(last, frame):
             return None
-        started = time.perf_counter()
         deformer = self._bound(frame)
         # In double: a bone far from the origin would lose digits in the product of two float matrices.
         posed_from_rest = frame.pose.astype(np.float64) @ self._rest_from_armature
@@ -83,7 +80,6 @@ class Binding:
             self._points *= self.mask[:, None]
             self._points += frame.rest_points
         self._last = frame
-        self.milliseconds = 1000.0 * (time.perf_counter() - started)
         return self._points
 
     def _bound(self, frame: Frame) -> sinew.Deformer:
