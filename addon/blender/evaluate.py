@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SinewError
-from . import drive, handlers, mesh_io, properties
+from . import animation, drive, handlers, mesh_io, properties
 
 # The choice beside Sinew's methods: the Armature modifier as it stands in the file.
 BLENDER = "blender"
@@ -58,9 +58,9 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
             properties.of(obj).enabled = False
         return
     drive.add(obj, method)
+    drive.use_one_method(obj, method)
     # What is asked for wins over keys in the file.
-    drive.remove_keys(obj, "sinew.method")
-    properties.of(obj).method = method
+    animation.remove_keys(obj, "sinew.method")
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
     handlers.refresh(bpy.context)

@@ -10,7 +10,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, properties
+from . import drive, driven, points, properties
 from .changes import Changes
 from .driven import Driven
 
@@ -64,10 +64,6 @@ def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     settings = properties.of(obj)
-    nodes = drive.sinew_modifier(obj)
-    # Blender calls this for every assignment, also of the value it had.
-    if settings.enabled and nodes is not None and not drive.is_on(nodes):
-        drive.record_flags(obj)
     drive.switch(obj, settings.enabled)
     settings.error = ""
     state = state_of(obj)
@@ -115,7 +111,7 @@ def _driven_objects(changes: Changes) -> list[bpy.types.Object]:
     if session.objects is None or changes.structure or len(bpy.data.objects) != session.object_count:
         session.objects = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
         session.object_count = len(bpy.data.objects)
-        drive.separate_attributes(session.objects)
+        points.separate(session.objects)
         known = {obj.session_uid for obj in session.objects}
         session.driven = {uid: state for uid, state in session.driven.items() if uid in known}
     return session.objects
@@ -168,8 +164,8 @@ def on_save(*_args: object) -> None:
 @persistent
 def on_saved(*_args: object) -> None:
     for obj in bpy.data.objects:
-        if properties.is_driven(obj) and properties.of(obj).enabled:
-            drive.clear_pointer(obj)
+        if properties.is_driven(obj) and properties.of(obj).standing_in:
+            drive.clear_pointers(obj)
             state = state_of(obj)
             if state is not None:
                 driven.hold_pose(obj, state)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.influences import GroupWeights, entries_of_bones
 from ..core.rig import Bones, Weighting
+from . import stack
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class ModifierOptions:
     use_envelopes: bool
     mask: str
     invert_mask: bool
+    multi: bool
 
     @classmethod
     def read(cls, modifier: bpy.types.ArmatureModifier) -> ModifierOptions:
@@ -28,6 +30,7 @@ class ModifierOptions:
             modifier.use_bone_envelopes,
             modifier.vertex_group,
             modifier.invert_vertex_group,
+            modifier.use_multi_modifier,
         )
 
     def weighting(self, obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
@@ -48,18 +51,17 @@ class ModifierOptions:
         return 1.0 - mask if self.invert_mask else mask
 
 
-def differences(
-    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, armature: bpy.types.Object
-) -> list[str]:
+def differences(obj: bpy.types.Object, armature: bpy.types.Object) -> list[str]:
     """A sentence for each thing that the modifier does and Sinew does not."""
     found = []
     deforming = [bone for bone in armature.data.bones if bone.use_deform]
     if any(bone.bbone_segments > 1 and bone.bbone_mapping_mode == "CURVED" for bone in deforming):
         found.append("Bendy bones with curved mapping: Sinew maps them straight")
-    others = [m for m in obj.modifiers if m.type == "ARMATURE" and m != modifier and m.object is not None]
+    driven = stack.armature_modifiers(obj)
+    others = [m for m in obj.modifiers if m.type == "ARMATURE" and m not in driven and m.object is not None]
     if others:
-        found.append(f"Further Armature modifiers stay Blender's: {', '.join(m.name for m in others)}")
-    for other in others:
-        if other.use_multi_modifier:
-            found.append(f"{other.name} is a Multi Modifier: behind Sinew it acts as a plain one")
+        found.append(
+            f"Armature modifiers apart from the first stay Blender's: {', '.join(m.name for m in others)}; "
+            "move them right behind it to have them driven"
+        )
     return found

@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import bpy
 
-# A custom property on the group, so that a renamed or copied group is still known as ours.
+# A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
+# where the group finds the points.
 MARK = "sinew_node_group"
+ATTRIBUTE, CARRIER = 1, 2
 
 
-def get_or_make() -> bpy.types.NodeTree:
+def get_or_make(kind: int) -> bpy.types.NodeTree:
+    """The group that takes points from an ATTRIBUTE or from a CARRIER."""
     for group in bpy.data.node_groups:
-        if group.get(MARK) and group.library is None:
+        if group.get(MARK) == kind and group.library is None:
             return group
-    return _make()
+    return _make_for_attribute() if kind == ATTRIBUTE else _make_for_carrier()
 
 
 def is_sinew(modifier: bpy.types.Modifier) -> bool:
@@ -27,38 +30,50 @@ def remove_unused() -> None:
         bpy.data.node_groups.remove(group)
 
 
-def set_attribute_name(modifier: bpy.types.Modifier, name: str) -> None:
-    """Tells a Sinew modifier which attribute holds its points."""
-    socket = _points_socket(modifier.node_group)
-    if hasattr(modifier, "properties"):  # Blender 5.2 moved the inputs
-        getattr(modifier.properties.inputs, socket).value = name
-    else:
-        modifier[socket] = name
+def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
+    """Gives a Sinew modifier its inputs, by name; those that it has already are left alone, as every change
+    makes Blender evaluate the object."""
+    for item in modifier.node_group.interface.items_tree:
+        if item.item_type != "SOCKET" or item.in_out != "INPUT" or item.name not in values:
+            continue
+        value = values[item.name]
+        if hasattr(modifier, "properties"):  # Blender 5.2 moved the inputs
+            holder = getattr(modifier.properties.inputs, item.identifier)
+            if holder.value != value:
+                holder.value = value
+        elif modifier.get(item.identifier) != value:
+            modifier[item.identifier] = value
 
 
-def _points_socket(group: bpy.types.NodeTree) -> str:
-    for item in group.interface.items_tree:
-        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.socket_type == "NodeSocketString":
-            return item.identifier
-    raise RuntimeError(f"node group {group.name!r} has lost its attribute input")
-
-
-def _make() -> bpy.types.NodeTree:
-    group = bpy.data.node_groups.new("Sinew", "GeometryNodeTree")
-    group[MARK] = 1
+def _new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group[MARK] = kind
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    points = group.interface.new_socket("Points", in_out="INPUT", socket_type="NodeSocketString")
-    points.description = "Attribute that holds the deformed position of each vertex"
+    for socket, (socket_type, description) in inputs.items():
+        made = group.interface.new_socket(socket, in_out="INPUT", socket_type=socket_type)
+        made.description = description
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    return group
 
-    source = group.nodes.new("NodeGroupInput")
-    named = group.nodes.new("GeometryNodeInputNamedAttribute")
-    named.data_type = "FLOAT_VECTOR"
-    place = group.nodes.new("GeometryNodeSetPosition")
-    result = group.nodes.new("NodeGroupOutput")
-    for column, node in enumerate((source, named, place, result)):
+
+def _nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
+    nodes = [group.nodes.new(kind) for kind in kinds]
+    for column, node in enumerate(nodes):
         node.location = (220 * column, 0)
+    return nodes
+
+
+def _make_for_attribute() -> bpy.types.NodeTree:
+    group = _new_group(
+        "Sinew",
+        ATTRIBUTE,
+        {"Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex")},
+    )
+    source, named, place, result = _nodes(
+        group, "NodeGroupInput", "GeometryNodeInputNamedAttribute", "GeometryNodeSetPosition", "NodeGroupOutput"
+    )
+    named.data_type = "FLOAT_VECTOR"
     group.links.new(source.outputs["Points"], named.inputs["Name"])
     group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
     group.links.new(named.outputs["Attribute"], place.inputs["Position"])
@@ -66,3 +81,62 @@ def _make() -> bpy.types.NodeTree:
     group.links.new(named.outputs["Exists"], place.inputs["Selection"])
     group.links.new(place.outputs["Geometry"], result.inputs["Geometry"])
     return group
+
+
+def _make_for_carrier() -> bpy.types.NodeTree:
+    group = _new_group(
+        "Sinew Carrier",
+        CARRIER,
+        {
+            "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
+            "Front": ("NodeSocketObject", "Object that has the modifiers in front, to be evaluated with this one"),
+        },
+    )
+    source, info, index, position, sample, place, result = _nodes(
+        group,
+        "NodeGroupInput",
+        "GeometryNodeObjectInfo",
+        "GeometryNodeInputIndex",
+        "GeometryNodeInputPosition",
+        "GeometryNodeSampleIndex",
+        "GeometryNodeSetPosition",
+        "NodeGroupOutput",
+    )
+    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
+    link = group.links.new
+    link(source.outputs["Points"], info.inputs["Object"])
+    link(info.outputs["Geometry"], sample.inputs["Geometry"])
+    link(position.outputs["Position"], _enabled(sample.inputs, "Value"))
+    link(index.outputs["Index"], sample.inputs["Index"])
+    link(_enabled(sample.outputs, "Value"), place.inputs["Position"])
+    link(source.outputs["Geometry"], place.inputs["Geometry"])
+    # Where the numbers of vertices differ, as before the first points are written, the shape is left alone.
+    link(_same_count(group, source.outputs["Geometry"], info.outputs["Geometry"]), place.inputs["Selection"])
+    # Never taken: naming the object in a node is what makes Blender evaluate it.
+    front, choice = _nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
+    choice.input_type = "GEOMETRY"
+    link(source.outputs["Front"], front.inputs["Object"])
+    link(place.outputs["Geometry"], choice.inputs["False"])
+    link(front.outputs["Geometry"], choice.inputs["True"])
+    link(choice.outputs["Output"], result.inputs["Geometry"])
+    return group
+
+
+def _same_count(
+    group: bpy.types.NodeTree, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """Whether two meshes have the same number of vertices."""
+    first, second, equal = _nodes(
+        group, "GeometryNodeAttributeDomainSize", "GeometryNodeAttributeDomainSize", "FunctionNodeCompare"
+    )
+    equal.data_type, equal.operation = "INT", "EQUAL"
+    for size, geometry, term in ((first, a, "A"), (second, b, "B")):
+        size.component = "MESH"
+        group.links.new(geometry, size.inputs["Geometry"])
+        group.links.new(size.outputs["Point Count"], _enabled(equal.inputs, term))
+    return equal.outputs["Result"]
+
+
+def _enabled(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
+    """A socket of a node that has one of that name for each type of data."""
+    return next(socket for socket in sockets if socket.name == name and socket.enabled)

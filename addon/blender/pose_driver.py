@@ -15,19 +15,18 @@ import bpy
 PATH = "sinew.pose"
 
 
-def ensure(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> None:
-    """The driver reads exactly `bones` of `armature`. All bones that move vertices must be named: Blender
+def ensure(obj: bpy.types.Object, bones: Sequence[tuple[bpy.types.Object, str]]) -> None:
+    """The driver reads exactly `bones`, each an armature and a bone's name. All bones that move vertices must be named: Blender
     evaluates those, their parents and their constraints' targets, and no others."""
     curve = _find(obj)
-    wanted = [(armature, name) for name in bones]
     if curve is not None:
         variables = curve.driver.variables
-        if [(v.targets[0].id, v.targets[0].bone_target) for v in variables] == wanted:
+        if [(v.targets[0].id, v.targets[0].bone_target) for v in variables] == list(bones):
             return
         remove(obj)
     driver = obj.driver_add(PATH).driver
     driver.type = "SUM"
-    for number, (target, name) in enumerate(wanted):
+    for number, (target, name) in enumerate(bones):
         variable = driver.variables.new()
         variable.name = f"bone{number}"
         variable.type = "TRANSFORMS"

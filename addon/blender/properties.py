@@ -23,7 +23,7 @@ class Listeners:
 listeners = Listeners()
 
 
-def _method_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+def _method_changed(settings: SinewSettings | SinewStandIn, context: bpy.types.Context) -> None:
     if listeners.method_changed is not None:
         listeners.method_changed(settings.id_data, context)
 
@@ -33,15 +33,47 @@ def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> Non
         listeners.enabled_changed(settings.id_data, context)
 
 
+# On a library override, only what is marked so is kept with the file.
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
+SAME_METHOD = "SAME"
+
+
+class SinewStandIn(bpy.types.PropertyGroup):
+    """What Sinew keeps of an Armature modifier that it stands in for, called `name`."""
+
+    armature: bpy.props.PointerProperty(
+        name="Armature",
+        description="The armature that deforms this mesh; kept here because the Armature modifier does not "
+        "point to it while Sinew is at work",
+        type=bpy.types.Object,
+        poll=lambda _self, obj: obj.type == "ARMATURE",
+        override=OVERRIDABLE,
+    )
+    # The Armature modifier's own flags, given back on removal.
+    show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How this modifier blends, where several chained Armature modifiers deform the mesh",
+        items=[
+            (SAME_METHOD, "Same Method", "The method that is chosen for the object", 0),
+            *((m.name, m.label, m.description, m.number + 1) for m in METHODS.values()),
+        ],
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
+
+
 class SinewSettings(bpy.types.PropertyGroup):
-    """How Sinew drives this object. `armature_modifier` names the modifier that it stands in for; empty
-    where the object is not driven."""
+    """How Sinew drives this object: in the place of the Armature modifiers of `stand_ins`. Without any, the
+    object is not driven."""
 
     method: bpy.props.EnumProperty(
         name="Method",
         description="How the bones' motions are blended at each vertex",
         items=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
         update=_method_changed,
+        override=OVERRIDABLE,
     )
     enabled: bpy.props.BoolProperty(
         name="On",
@@ -49,23 +81,47 @@ class SinewSettings(bpy.types.PropertyGroup):
         default=True,
         options=set(),
         update=_enabled_changed,
+        override=OVERRIDABLE,
     )
-    armature: bpy.props.PointerProperty(
-        name="Armature",
-        description="The armature that deforms this mesh; kept here because the Armature modifier does not "
-        "point to it while Sinew is at work",
-        type=bpy.types.Object,
-        poll=lambda _self, obj: obj.type == "ARMATURE",
+    stand_ins: bpy.props.CollectionProperty(
+        type=SinewStandIn, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
-    armature_modifier: bpy.props.StringProperty(options={"HIDDEN"})
-    attribute: bpy.props.StringProperty(options={"HIDDEN"})
-    # The Armature modifier's own flags, given back on removal.
-    show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True)
-    show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True)
+    standing_in: bpy.props.BoolProperty(
+        description="The Armature modifiers are switched off for Sinew's; not so while some of Blender's "
+        "tools need them",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    parent_type: bpy.props.StringProperty(
+        description="The object's parent type before Sinew made an Armature modifier of it",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    attribute: bpy.props.StringProperty(
+        description="Attribute that holds the points; empty where the carrier does",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    carrier: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
+    front: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
+    front_signature: bpy.props.StringProperty(options={"HIDDEN"})
+    helper: bpy.props.BoolProperty(
+        description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
+    )
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @property
+    def armature(self) -> bpy.types.Object | None:
+        """The armature of the first modifier that Sinew stands in for."""
+        return self.stand_ins[0].armature if self.stand_ins else None
+
+    @property
+    def armatures(self) -> list[bpy.types.Object]:
+        """All that deform the object, each once."""
+        return list(dict.fromkeys(s.armature for s in self.stand_ins if s.armature is not None))
 
 
 def of(obj: bpy.types.Object) -> SinewSettings:
@@ -74,7 +130,12 @@ def of(obj: bpy.types.Object) -> SinewSettings:
 
 def is_driven(obj: bpy.types.Object) -> bool:
     # Asking for the settings of an object that has none would leave an empty group in the file.
-    return obj.type == "MESH" and obj.is_property_set("sinew") and bool(obj.sinew.armature_modifier)
+    return obj.type == "MESH" and obj.is_property_set("sinew") and len(obj.sinew.stand_ins) > 0
+
+
+def is_helper(obj: bpy.types.Object) -> bool:
+    """Whether Sinew made this object for another one."""
+    return obj.is_property_set("sinew") and obj.sinew.helper
 
 
 def clear(obj: bpy.types.Object) -> None:

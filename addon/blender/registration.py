@@ -22,8 +22,10 @@ def register() -> None:
         return
     from . import handlers, operators, panels, properties
 
-    _register_classes((properties.SinewSettings, *operators.CLASSES, *panels.CLASSES))
-    bpy.types.Object.sinew = bpy.props.PointerProperty(type=properties.SinewSettings)
+    _register_classes((properties.SinewStandIn, properties.SinewSettings, *operators.CLASSES, *panels.CLASSES))
+    bpy.types.Object.sinew = bpy.props.PointerProperty(
+        type=properties.SinewSettings, override=properties.OVERRIDABLE
+    )
     handlers.register()
     handlers.adopt_open_file()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python

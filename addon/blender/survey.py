@@ -8,32 +8,39 @@ import numpy as np
 
 from ..core.errors import SinewError
 from ..core.rig import RigFacts, Weighting, describe_rig
-from . import armature_io, drive, mesh_io, properties
+from . import armature_io, drive, mesh_io, properties, stack
 from .modifier_options import ModifierOptions, differences
 
 
 def describe(
-    obj: bpy.types.Object, armature: bpy.types.Object, weighting: Weighting, points: np.ndarray
+    obj: bpy.types.Object,
+    armature: bpy.types.Object,
+    weighting: Weighting,
+    points: np.ndarray,
+    depsgraph: bpy.types.Depsgraph,
 ) -> RigFacts:
     """Counts, and warnings of what is missing in the rig or not reproduced.
 
-    points  [vertices, 3], rest points in armature space
+    points  [vertices, 3], rest points in object space
     """
-    facts = describe_rig(weighting, points, [group.name for group in obj.vertex_groups])
-    return facts.with_warnings(differences(obj, drive.armature_modifier(obj), armature))
+    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    if space is None:
+        space = np.identity(4)
+    there = points @ space[:3, :3].T + space[:3, 3]
+    facts = describe_rig(weighting, there, [group.name for group in obj.vertex_groups])
+    return facts.with_warnings(differences(obj, armature))
 
 
 def describe_undriven(obj: bpy.types.Object) -> RigFacts:
     """The same of a mesh object as it lies in the file, and what would keep Sinew from driving it."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     armature = drive.armature_of(obj)
-    evaluated_armature = armature.evaluated_get(depsgraph)
-    bones = armature_io.read_bones(evaluated_armature)
-    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), evaluated_armature)
-    options = ModifierOptions.read(drive.armature_modifier(obj))
-    weighting = options.weighting(obj, mesh_io.read_group_weights(obj.data), bones)
-    points = mesh_io.read_points(obj.data.vertices) @ space[:3, :3].T + space[:3, 3]
-    return describe(obj, armature, weighting, points).with_warnings(_obstacles(obj))
+    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+    weights = mesh_io.read_group_weights(obj.data)
+    options = ModifierOptions.read(stack.armature_modifier(obj))
+    weighting = options.weighting(obj, weights, bones)
+    points = mesh_io.read_points(obj.data.vertices)
+    return describe(obj, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
 
 
 def _obstacles(obj: bpy.types.Object) -> list[str]:

@@ -37,6 +37,14 @@ class Bones:
     envelopes: Envelopes
     complete: bool = True
 
+    @classmethod
+    def none(cls) -> Bones:
+        """Of no armature, or one whose bones are being edited."""
+        none, numbers = np.empty(0, dtype=np.float32), np.empty(0, dtype=np.int32)
+        places, flags = np.empty((0, 3), dtype=np.float32), np.empty(0, dtype=bool)
+        envelopes = Envelopes(places, places, none, none, none, none, flags)
+        return cls((), flags, np.empty((0, 4, 4), dtype=np.float32), none, numbers, numbers, envelopes)
+
     @property
     def bend(self) -> bool:
         return bool((self.segments > 1).any())

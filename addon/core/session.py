@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One driven mesh between frames: its bound deformer, what it was last deformed with, and the result."""
+"""One driven mesh between frames: its bound deformers, what they were last given, and the result."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,11 +33,9 @@ class Frame:
 class Binding:
     """A mesh bound to bones. Deforms when a frame differs from the last."""
 
-    def __init__(self, weighting: Weighting, mask: np.ndarray | None = None) -> None:
-        """mask: float32 [vertices], the share of the deformation each vertex takes; None for all of it."""
+    def __init__(self, weighting: Weighting) -> None:
         self.weighting = weighting
         self.bones = weighting.bones
-        self.mask = mask
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
         self._deformer: sinew.Deformer | None = None
         self._last: Frame | None = None
@@ -60,12 +59,11 @@ class Binding:
         """The result of the last call of deform, float32 [vertices, 3]."""
         return self._points
 
-    def deform(self, frame: Frame) -> np.ndarray | None:
-        """Deformed points float32 [vertices, 3] in object space, valid until the next call; None where the
-        frame equals the last one."""
+    def deform(self, frame: Frame) -> bool:
+        """Brings `points` up to date, object space; false where the frame equals the last one."""
         last = self._last
         if last is not None and _same(last, frame):
-            return None
+            return False
         deformer = self._bound(frame)
         # In double: a bone far from the origin would lose digits in the product of two float matrices.
         posed_from_rest = frame.pose.astype(np.float64) @ self._rest_from_armature
@@ -75,12 +73,8 @@ class Binding:
             out=self._points,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
         )
-        if self.mask is not None:
-            self._points -= frame.rest_points
-            self._points *= self.mask[:, None]
-            self._points += frame.rest_points
         self._last = frame
-        return self._points
+        return True
 
     def _bound(self, frame: Frame) -> sinew.Deformer:
         last = self._last
@@ -116,3 +110,78 @@ def _same(a: Frame, b: Frame) -> bool:
         and np.array_equal(a.pose, b.pose)
         and np.array_equal(a.bones_from_model, b.bones_from_model)
     )
+
+
+@dataclass
+class Link:
+    """One of the Armature modifiers that deform a mesh one after the other.
+
+    mask   float32 [vertices], the share of the deformation each vertex takes; None for all of it
+    multi  a Multi Modifier: it starts from what the modifier before it started from
+    """
+
+    binding: Binding
+    mask: np.ndarray | None = None
+    multi: bool = False
+
+
+@dataclass
+class LinkFrame:
+    """What decides a link's part in one frame: see Frame."""
+
+    method: str
+    pose: np.ndarray
+    bones_from_model: np.ndarray
+
+
+class Chain:
+    """The links of one mesh, in the order of its modifiers."""
+
+    def __init__(self, links: Sequence[Link]) -> None:
+        self.links = links
+        self.points: np.ndarray | None = None
+        self._rest_points: np.ndarray | None = None
+        self._active: tuple[bool, ...] = ()
+
+    def deform(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None]) -> bool:
+        """Brings `points` up to date; false where nothing differs from the last call.
+
+        rest_points  float32 [vertices, 3], object space
+        frames       one for each link, None for one that is switched off or has no pose
+        """
+        active = tuple(frame is not None for frame in frames)
+        changed = self.points is None or active != self._active
+        if not any(active):
+            changed = changed or not _equal(rest_points, self._rest_points)
+            self.points = rest_points
+        else:
+            changed |= self._run(rest_points, frames)
+        self._active, self._rest_points = active, rest_points
+        return changed
+
+    def _run(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None]) -> bool:
+        changed, result = False, rest_points
+        starts: dict[int, np.ndarray] = {}
+        for number, (link, frame) in enumerate(zip(self.links, frames, strict=True)):
+            if frame is None:
+                continue
+            # What comes in here is kept for the Multi Modifiers right behind that have nothing yet.
+            for behind in range(number + 1, len(self.links)):
+                if not self.links[behind].multi or behind in starts:
+                    break
+                starts[behind] = result
+            start = starts.get(number, result)
+            changed |= link.binding.deform(
+                Frame(frame.method, frame.pose, frame.bones_from_model, start)
+            )
+            posed = link.binding.points
+            if link.mask is not None:
+                posed = result + link.mask[:, None] * (posed - result)
+            # The next link compares with what it was given, so a buffer that is written again will not do.
+            result = posed.copy() if link.mask is None and number + 1 < len(self.links) else posed
+        self.points = result
+        return changed
+
+
+def _equal(a: np.ndarray, b: np.ndarray | None) -> bool:
+    return b is not None and (a is b or np.array_equal(a, b))

@@ -106,12 +106,14 @@ def shapes(obj: bpy.types.Object, frames: list[float]) -> np.ndarray:
 
 
 def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume: bool) -> np.ndarray:
-    """What Blender's own Armature modifier makes of an object that Sinew does not drive."""
-    modifier = drive.armature_modifier(obj)
-    before = modifier.use_deform_preserve_volume
-    modifier.use_deform_preserve_volume = preserve_volume
+    """What Blender's own Armature modifiers make of an object that Sinew does not drive."""
+    modifiers = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
+    before = [modifier.use_deform_preserve_volume for modifier in modifiers]
+    for modifier in modifiers:
+        modifier.use_deform_preserve_volume = preserve_volume
     result = shapes(obj, frames)
-    modifier.use_deform_preserve_volume = before
+    for modifier, flag in zip(modifiers, before, strict=True):
+        modifier.use_deform_preserve_volume = flag
     return result
 
 

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys and drivers of Sinew's own settings."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import pose_driver, properties
+
+
+def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
+    """Takes keys of Sinew's settings off the object, unless another object plays the same action."""
+    animation = obj.animation_data
+    if animation is None:
+        return
+    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    for player in (animation, *strips):
+        action = player.action
+        if action is None or action.users > 1:
+            continue
+        removed = 0
+        for curves in _curve_lists(player):
+            for curve in [c for c in curves if c.data_path.startswith(path)]:
+                curves.remove(curve)
+                removed += 1
+        if removed and player is animation and not any(len(curves) for curves in _curve_lists(player)):
+            animation.action = None
+            bpy.data.actions.remove(action)
+
+
+def remove(obj: bpy.types.Object) -> None:
+    """Takes keys and drivers of Sinew's settings off the object, and its animation data if they were all."""
+    remove_keys(obj)
+    animation = obj.animation_data
+    if animation is None:
+        return
+    for driver in [d for d in animation.drivers if d.data_path.startswith("sinew.")]:
+        animation.drivers.remove(driver)
+    pose_driver.remove_empty_animation(obj)
+
+
+def _curve_lists(player: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
+    """The F-curves that `player` plays: an action's own up to 4.3, those of its slot since 4.4."""
+    action = player.action
+    slot = getattr(player, "action_slot", None)
+    if not hasattr(action, "layers"):
+        return [action.fcurves]
+    if slot is None:
+        return []
+    bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips]
+    return [bag.fcurves for bag in bags if bag is not None]

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An object in no scene whose vertices are the deformed points of another.
+
+It serves where an attribute of the mesh can not: the mesh is linked from another file, or it has other
+vertices than what is deformed.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from . import properties
+
+
+def ensure(obj: bpy.types.Object) -> bpy.types.Object:
+    settings = properties.of(obj)
+    if settings.carrier is None:
+        name = f"{obj.name} Sinew points"
+        settings.carrier = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+        properties.of(settings.carrier).helper = True
+    return settings.carrier
+
+
+def write(carrier: bpy.types.Object, points: np.ndarray) -> None:
+    """Stores float32 [vertices, 3]."""
+    mesh = carrier.data
+    if len(mesh.vertices) != len(points):
+        mesh.clear_geometry()
+        mesh.vertices.add(len(points))
+    mesh.vertices.foreach_set("co", points.ravel())
+    mesh.update_tag()
+
+
+def remove(obj: bpy.types.Object) -> None:
+    carrier = properties.of(obj).carrier
+    if carrier is not None:
+        # Takes the object that uses it along.
+        bpy.data.meshes.remove(carrier.data)

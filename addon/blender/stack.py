@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose modifiers stand where in an object's stack. Changes nothing."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import node_group, properties
+
+# Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
+HARMLESS_IN_FRONT = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
+
+
+def is_on(modifier: bpy.types.Modifier) -> bool:
+    return modifier.show_viewport or modifier.show_render
+
+
+def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    """Sinew's own modifier; one that has lost its node group is known by its name."""
+    nodes = [m for m in obj.modifiers if m.type == "NODES"]
+    lost = (m for m in nodes if m.node_group is None and m.name.startswith("Sinew"))
+    return next((m for m in nodes if node_group.is_sinew(m)), None) or next(lost, None)
+
+
+def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:
+    """The first Armature modifier that Sinew stands in for, or would: the first one with an armature, those
+    that are switched off last."""
+    if not properties.is_driven(obj):
+        candidates = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object is not None]
+        return min(candidates, key=lambda m: not is_on(m), default=None)
+    modifier = obj.modifiers.get(properties.of(obj).stand_ins[0].name)
+    if modifier is not None and modifier.type == "ARMATURE":
+        return modifier
+    # Renamed: ours is the one right behind our own modifier.
+    return next(iter(_run(obj, _index(obj, sinew_modifier(obj)) + 1)), None)
+
+
+def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
+    """The Armature modifiers that Sinew stands in for, or would: the first and those right behind it, which
+    Blender may chain as Multi Modifiers."""
+    first = armature_modifier(obj)
+    return _run(obj, _index(obj, first)) if first is not None else []
+
+
+def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
+    return next((i for i, m in enumerate(obj.modifiers) if m == modifier), len(obj.modifiers))
+
+
+def _run(obj: bpy.types.Object, start: int) -> list[bpy.types.ArmatureModifier]:
+    run = []
+    for modifier in list(obj.modifiers)[start:]:
+        if modifier.type != "ARMATURE":
+            break
+        run.append(modifier)
+    return run
+
+
+def in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The modifiers ahead of those that Sinew stands in for, without Sinew's own."""
+    return [m for m in list(obj.modifiers)[: _index(obj, armature_modifier(obj))] if not node_group.is_sinew(m)]
+
+
+def changes_in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Those ahead that are on and change positions, topology or weights."""
+    return [m for m in in_front(obj) if is_on(m) and m.type not in HARMLESS_IN_FRONT]
