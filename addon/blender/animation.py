@@ -39,6 +39,17 @@ def remove(obj: bpy.types.Object) -> None:
     pose_driver.remove_empty_animation(obj)
 
 
+def animated_paths(obj: bpy.types.Object) -> set[str]:
+    """The data paths that the object's action and drivers set."""
+    animation = obj.animation_data
+    if animation is None:
+        return set()
+    lists = [animation.drivers]
+    if animation.action is not None:
+        lists += _curve_lists(animation)
+    return {curve.data_path for curves in lists for curve in curves}
+
+
 def _curve_lists(player: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
     """The F-curves that `player` plays: an action's own up to 4.3, those of its slot since 4.4."""
     action = player.action

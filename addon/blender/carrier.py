@@ -15,7 +15,7 @@ from . import properties
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object:
     settings = properties.of(obj)
-    if settings.carrier is None:
+    if settings.carrier is None or settings.carrier.library is not None:
         name = f"{obj.name} Sinew points"
         settings.carrier = bpy.data.objects.new(name, bpy.data.meshes.new(name))
         properties.of(settings.carrier).helper = True
@@ -33,7 +33,8 @@ def write(carrier: bpy.types.Object, points: np.ndarray) -> None:
 
 
 def remove(obj: bpy.types.Object) -> None:
-    carrier = properties.of(obj).carrier
-    if carrier is not None:
+    settings = properties.of(obj)
+    carrier, settings.carrier = settings.carrier, None
+    if carrier is not None and carrier.library is None:
         # Takes the object that uses it along.
         bpy.data.meshes.remove(carrier.data)

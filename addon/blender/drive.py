@@ -84,12 +84,13 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
     if active is not None:
         obj.modifiers.active = active
     settings.method = method or _method_of(run[0])
-    for modifier in run:
-        stand_in = _stand_in(obj, modifier)
-        if method is None and _method_of(modifier) != settings.method:
-            stand_in.method = _method_of(modifier)
+    pairs = stand_ins(obj)
     points.arrange(obj)
     switch(obj, on=True)
+    # Last, as a change of method deforms the object.
+    for modifier, stand_in in pairs:
+        if method is None and _method_of(modifier) != settings.method:
+            stand_in.method = _method_of(modifier)
 
 
 def _method_of(modifier: bpy.types.ArmatureModifier) -> str:

@@ -51,6 +51,12 @@ def update(
 
     Raises SinewError with a sentence for the user where it can not be driven.
     """
+    if obj.library is not None:
+        # Blender lets nothing be written in bulk to linked data.
+        raise SinewError(
+            f"{obj.name} is linked from another file: its Armature modifier deforms it; make a library "
+            "override to use Sinew here"
+        )
     mode = obj.mode
     if mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
         drive.switch(obj, on=False)

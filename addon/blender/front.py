@@ -11,6 +11,7 @@ import bpy
 
 from ..core.errors import SinewError
 from . import properties, stack
+from .animation import animated_paths
 
 # A copy would run a simulation of its own, with a cache of its own.
 SIMULATIONS = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "PARTICLE_SYSTEM", "PARTICLE_INSTANCE", "EXPLODE"}
@@ -53,9 +54,9 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 def remove(obj: bpy.types.Object) -> None:
     settings = properties.of(obj)
-    if settings.front is not None:
-        bpy.data.objects.remove(settings.front)
-        settings.front_signature = ""
+    copy, settings.front, settings.front_signature = settings.front, None, ""
+    if copy is not None and copy.library is None:
+        bpy.data.objects.remove(copy)
 
 
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
@@ -106,8 +107,19 @@ def _signature(obj: bpy.types.Object) -> str:
     pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
     animation = obj.animation_data
     action = animation.action.session_uid if animation is not None and animation.action is not None else 0
-    modifiers = [_values(modifier, depth=3) for modifier in stack.in_front(obj)]
+    animated = tuple(path for path in animated_paths(obj) if path.startswith("modifiers["))
+    modifiers = [_modifier_values(modifier, animated) for modifier in stack.in_front(obj)]
     return repr((pinned, action, obj.parent_type, modifiers))
+
+
+def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) -> list:
+    """What the artist set; what an animation sets comes to the copy by itself."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+    return [
+        (name, value)
+        for name, value in _values(modifier, depth=3)
+        if not any(path.startswith((f"{start}.{name}", f"{start}{name}")) for path in animated)
+    ]
 
 
 # How a modifier is shown, not what it does.
@@ -116,7 +128,7 @@ _INTERFACE = {"rna_type", "show_expanded", "is_active", "execution_time", "persi
 
 def _values(struct: bpy.types.bpy_struct, depth: int) -> list:
     """All that a modifier's settings hold, nested; data blocks by their identity."""
-    values = [(key, _id_property(value)) for key, value in _id_properties(struct)]
+    values = [(f'["{key}"]', _id_property(value)) for key, value in _id_properties(struct)]
     for name, prop in struct.bl_rna.properties.items():
         if name in _INTERFACE:
             continue

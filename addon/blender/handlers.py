@@ -10,7 +10,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, points, properties
+from . import drive, driven, overrides, points, properties
 from .changes import Changes
 from .driven import Driven
 
@@ -150,6 +150,7 @@ def on_data_replaced(*_args: object) -> None:
 @persistent
 def on_loaded(*_args: object) -> None:
     session.forget()
+    overrides.take_back()
     refresh(bpy.context)
 
 
@@ -159,6 +160,7 @@ def on_save(*_args: object) -> None:
     for obj in bpy.data.objects:
         if properties.is_driven(obj):
             drive.give_back(obj)
+            overrides.keep(obj)
 
 
 @persistent

@@ -33,16 +33,37 @@ def remove_unused() -> None:
 def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
     """Gives a Sinew modifier its inputs, by name; those that it has already are left alone, as every change
     makes Blender evaluate the object."""
-    for item in modifier.node_group.interface.items_tree:
-        if item.item_type != "SOCKET" or item.in_out != "INPUT" or item.name not in values:
+    for name, value in values.items():
+        if get_input(modifier, name) == value:
             continue
-        value = values[item.name]
+        identifier = _identifier(modifier, name)
         if hasattr(modifier, "properties"):  # Blender 5.2 moved the inputs
-            holder = getattr(modifier.properties.inputs, item.identifier)
-            if holder.value != value:
-                holder.value = value
-        elif modifier.get(item.identifier) != value:
-            modifier[item.identifier] = value
+            getattr(modifier.properties.inputs, identifier).value = value
+        else:
+            modifier[identifier] = value
+
+
+def get_input(modifier: bpy.types.Modifier, name: str) -> object:
+    """None where the modifier has no such input."""
+    identifier = _identifier(modifier, name)
+    if identifier is None:
+        return None
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, identifier).value
+    return modifier.get(identifier)
+
+
+def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
+    if modifier.node_group is None:
+        return None
+    return next(
+        (
+            item.identifier
+            for item in modifier.node_group.interface.items_tree
+            if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+        ),
+        None,
+    )
 
 
 def _new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:

@@ -130,12 +130,29 @@ def of(obj: bpy.types.Object) -> SinewSettings:
 
 def is_driven(obj: bpy.types.Object) -> bool:
     # Asking for the settings of an object that has none would leave an empty group in the file.
-    return obj.type == "MESH" and obj.is_property_set("sinew") and len(obj.sinew.stand_ins) > 0
+    if obj.type != "MESH" or not obj.is_property_set("sinew"):
+        return False
+    return len(obj.sinew.stand_ins) > 0 and not obj.sinew.helper
 
 
 def is_helper(obj: bpy.types.Object) -> bool:
     """Whether Sinew made this object for another one."""
     return obj.is_property_set("sinew") and obj.sinew.helper
+
+
+def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Gives a group of settings the values of another, without telling the listeners."""
+    for name, prop in source.bl_rna.properties.items():
+        if prop.type == "COLLECTION":
+            getattr(target, name).clear()
+            for item in getattr(source, name):
+                copy(item, getattr(target, name).add())
+        elif not prop.is_readonly and source.is_property_set(name):
+            if prop.type == "ENUM":
+                # As a number: assigning the name calls the listeners.
+                target[name] = next(i.value for i in prop.enum_items if i.identifier == getattr(source, name))
+            else:
+                setattr(target, name, getattr(source, name))
 
 
 def clear(obj: bpy.types.Object) -> None:

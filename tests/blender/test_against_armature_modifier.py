@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scenes
 from conftest import BLEND_FILES, REAL_RIGS
-from sinew_addon.blender import drive, files, properties
+from sinew_addon.blender import drive, files, handlers, properties
 
 ORACLES = [("lbs", False), ("dq", True)]
 
@@ -237,13 +237,53 @@ def test_vertex_groups_switched_off():
     assert_equal_to_modifier(obj, [1, 11])
 
 
-def test_a_second_armature_modifier_goes_on_behind():
+def with_a_second_armature(behind: str | None = None) -> bpy.types.Object:
+    """An arm with a second Armature modifier, apart from the first where a type is given to stand between."""
     obj, _armature = scenes.make_arm()
     _unused, other = scenes.make_arm(name="Other")
-    second = obj.modifiers.new("Second", "ARMATURE")
-    second.object = other
+    scenes.bend(other, 50.0)
+    if behind is not None:
+        obj.modifiers.new("Between", behind)
+    obj.modifiers.new("Second", "ARMATURE").object = other
+    return obj
+
+
+def test_armature_modifiers_in_a_row():
+    assert_equal_to_modifier(with_a_second_armature(), [1, 6, 11])
+
+
+def test_an_armature_modifier_apart_stays_blenders():
+    obj = with_a_second_armature(behind="CAST")
+    expected = scenes.shapes(obj, [1, 6, 11])
+    scenes.add_sinew(obj)
+    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert obj.modifiers["Second"].object is not None
+    assert any("Second" in warning for warning in handlers.state_of(obj).facts.warnings)
+
+
+def test_each_of_several_armature_modifiers_starts_with_its_own_method():
+    obj = with_a_second_armature()
+    obj.modifiers["Second"].use_deform_preserve_volume = True
+    expected = scenes.shapes(obj, [1, 6, 11])
+    scenes.add_sinew(obj)
+    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    properties.of(obj).enabled = False
+    assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) == 0.0
+
+
+@pytest.mark.parametrize("mask", ["", "bone.1"])
+@pytest.mark.parametrize("off", [None, 0, 1])
+def test_multi_modifiers(mask, off):
+    obj = with_a_second_armature()
+    third = obj.modifiers.new("Third", "ARMATURE")
+    third.object, third.invert_vertex_group = obj.modifiers["Armature"].object, True
+    for modifier in obj.modifiers:
+        modifier.use_multi_modifier = True
+        if modifier.name != "Armature":
+            modifier.vertex_group = mask
+    if off is not None:
+        obj.modifiers[off].show_viewport = False
     assert_equal_to_modifier(obj, [1, 6, 11])
-    assert second.object == other
 
 
 def test_a_switched_off_armature_modifier_in_front_is_passed_over():

@@ -189,7 +189,7 @@ def test_linked_duplicate_has_a_pose_of_its_own():
     scenes.bend(other_rig, 60.0)
     second = first.copy()
     bpy.context.scene.collection.objects.link(second)
-    properties.of(second).armature = other_rig
+    properties.of(second).stand_ins[0].armature = other_rig
     assert second.data == first.data
     for frame in (1, 6, 11):
         bpy.context.scene.frame_set(frame)
@@ -371,17 +371,6 @@ def test_an_error_turns_one_object_off_once_and_no_other(monkeypatch, caplog):
     assert_follows(other)
 
 
-def test_modifier_in_front_is_refused_with_a_sentence():
-    obj, _armature = scenes.make_arm()
-    obj.modifiers.new("Mirror", "MIRROR")
-    obj.modifiers.move(1, 0)
-    bpy.context.view_layer.update()
-    before = snapshot.of_file()
-    with pytest.raises(RuntimeError, match="Mirror stands in front of Armature"):
-        bpy.ops.sinew.add()
-    assert snapshot.of_file() == before
-
-
 def test_an_unchanged_object_is_not_written(monkeypatch):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)
@@ -429,15 +418,9 @@ def test_deleted_armature_modifier_turns_the_mesh_off_with_a_sentence():
     assert len(obj.modifiers) == 0
 
 
-def test_what_is_not_reproduced_is_warned_of():
-    obj, armature = scenes.make_arm()
+def test_what_is_missing_in_the_rig_is_warned_of():
+    obj, _armature = scenes.make_arm()
     for group in obj.vertex_groups:
         group.remove([0, 1])
-    second = obj.modifiers.new("Second", "ARMATURE")
-    second.object, second.use_multi_modifier = armature, True
-    armature.data.bones[1].bbone_segments = 4
-    armature.data.bones[1].bbone_mapping_mode = "CURVED"
     scenes.add_sinew(obj)
-    warnings = " ".join(handlers.state_of(obj).facts.warnings)
-    for words in ("2 of 252 vertices", "Second is a Multi Modifier", "curved mapping"):
-        assert words in warnings
+    assert "2 of 252 vertices" in " ".join(handlers.state_of(obj).facts.warnings)

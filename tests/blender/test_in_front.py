@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Modifiers, parents and shape keys that change the mesh before it comes to the Armature modifier."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import snapshot
+from sinew_addon.blender import drive, properties
+from test_against_armature_modifier import assert_equal_to_modifier
+
+FRAMES = [1, 4, 8, 11]
+
+
+def arm_with(kind: str, **options: object) -> bpy.types.Object:
+    """An arm with a modifier in front of its Armature modifier."""
+    obj, _armature = scenes.make_arm(bones=3)
+    modifier = obj.modifiers.new("Front", kind)
+    for name, value in options.items():
+        setattr(modifier, name, value)
+    obj.modifiers.move(1, 0)
+    return obj
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("SUBSURF", {"levels": 2}),
+        ("MIRROR", {"use_axis": (False, True, False)}),
+        ("CAST", {"factor": 0.7}),
+        ("DECIMATE", {"ratio": 0.5}),
+        ("SOLIDIFY", {"thickness": 0.1}),
+    ],
+)
+def test_modifiers_in_front(kind, options):
+    obj = arm_with(kind, **options)
+    assert_equal_to_modifier(obj, FRAMES)
+    assert properties.of(obj).front is not None
+
+
+def test_mirrored_groups_take_the_other_side():
+    obj, armature = scenes.make_arm(bones=2)
+    for index, side in enumerate("LR"):
+        armature.data.bones[index].name = f"bone.{side}"
+    obj.modifiers.new("Mirror", "MIRROR")
+    obj.modifiers.move(1, 0)
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_a_lattice_in_front_follows_both_objects():
+    obj = arm_with("LATTICE")
+    lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
+    bpy.context.scene.collection.objects.link(lattice)
+    lattice.scale = (4.0, 4.0, 4.0)
+    lattice.data.points[0].co_deform.x -= 0.4
+    obj.modifiers["Front"].object = lattice
+    for moving in (lattice, obj):
+        moving.keyframe_insert("location", frame=1)
+        moving.location.y += 0.3
+        moving.keyframe_insert("location", frame=11)
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_geometry_nodes_in_front():
+    obj = arm_with("NODES")
+    group = bpy.data.node_groups.new("Front", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    source, split, result = (
+        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSubdivideMesh", "NodeGroupOutput")
+    )
+    group.links.new(source.outputs["Geometry"], split.inputs["Mesh"])
+    group.links.new(split.outputs["Mesh"], result.inputs["Geometry"])
+    obj.modifiers["Front"].node_group = group
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_an_animated_modifier_in_front():
+    obj = arm_with("CAST")
+    modifier = obj.modifiers["Front"]
+    for frame, factor in ((1, 0.0), (11, 1.0)):
+        modifier.factor = factor
+        modifier.keyframe_insert("factor", frame=frame)
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_weights_that_change_in_front():
+    obj = arm_with("VERTEX_WEIGHT_EDIT", vertex_group="bone.1")
+    modifier = obj.modifiers["Front"]
+    modifier.use_remove, modifier.remove_threshold = True, 0.0
+    modifier.keyframe_insert("remove_threshold", frame=1)
+    modifier.remove_threshold = 0.9
+    modifier.keyframe_insert("remove_threshold", frame=11)
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_number_of_vertices_that_changes_in_front():
+    obj = arm_with("BUILD", frame_start=1, frame_duration=12)
+    assert_equal_to_modifier(obj, [2, 5, 8])
+
+
+def test_shape_keys_before_a_modifier_in_front():
+    obj = arm_with("SUBSURF")
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Key")
+    for point in key.data:
+        point.co.z += 0.2
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_absolute_shape_keys():
+    obj, _armature = scenes.make_arm()
+    obj.shape_key_add(name="Basis")
+    for point in obj.shape_key_add(name="Key").data:
+        point.co.z += 0.2
+    keys = obj.data.shape_keys
+    keys.use_relative = False
+    for frame, time in ((1, 0.0), (11, 10.0)):
+        keys.eval_time = time
+        keys.keyframe_insert("eval_time", frame=frame)
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
+    obj, armature = scenes.make_arm()
+    obj.modifiers.clear()
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+    bpy.context.view_layer.update()
+    before = snapshot.of_file()
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    properties.of(obj).enabled = False
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    drive.remove(obj)
+    assert snapshot.of_file() == before
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+
+
+def test_parent_that_deforms_before_the_modifier():
+    obj, armature = scenes.make_arm()
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+    assert_equal_to_modifier(obj, FRAMES)
+
+
+def test_a_modifier_in_front_that_comes_changes_and_goes():
+    obj, armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj)
+
+    def check():
+        # The first update makes what the second one reads.
+        bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(7)
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        properties.of(obj).enabled = True
+        assert shown.shape == expected.shape
+        assert scenes.worst(shown, expected) <= 1e-5
+        assert not properties.of(obj).error
+
+    check()
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(2, 0)
+    check()
+    obj.modifiers["Front"].levels = 2
+    check()
+    obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = False
+    check()
+    assert properties.of(obj).front is None
+    assert properties.of(obj).carrier is None
+    assert armature.name in bpy.data.objects
+
+
+def test_removing_leaves_the_file_as_it_was():
+    obj = arm_with("SUBSURF")
+    bpy.context.view_layer.update()
+    before = snapshot.of_file()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(5)
+    drive.remove(obj)
+    bpy.context.scene.frame_set(1)
+    assert snapshot.of_file() == before
+
+
+def test_a_copy_has_points_of_its_own():
+    obj = arm_with("SUBSURF")
+    scenes.add_sinew(obj)
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(8)
+    assert properties.of(copy).carrier != properties.of(obj).carrier
+    assert properties.of(copy).front != properties.of(obj).front
+    assert scenes.worst(scenes.final_points(copy), scenes.final_points(obj)) == 0.0
+    drive.remove(obj)
+    bpy.context.scene.frame_set(4)
+    shown = scenes.final_points(copy)
+    properties.of(copy).enabled = False
+    assert scenes.worst(scenes.final_points(copy), shown) <= 1e-5
+
+
+def test_a_simulation_in_front_is_refused_with_a_sentence():
+    obj = arm_with("CLOTH")
+    bpy.context.view_layer.update()
+    before = snapshot.of_file()
+    with pytest.raises(RuntimeError, match="Front in front of Armature is a simulation"):
+        bpy.ops.sinew.add()
+    assert snapshot.of_file() == before

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Characters that come from another file: library overrides, and objects whose mesh is linked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.blender import drive, properties
+
+FRAMES = [1, 4, 11]
+
+
+def save_library(folder: Path, driven: bool, front: bool) -> np.ndarray:
+    """A file with an arm in a collection; the arm's shapes under Preserve Volume."""
+    obj, armature = scenes.make_arm()
+    if front:
+        obj.modifiers.new("Front", "SUBSURF")
+        obj.modifiers.move(1, 0)
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    collection = bpy.data.collections.new("Character")
+    bpy.context.scene.collection.children.link(collection)
+    for each in (obj, armature):
+        bpy.context.scene.collection.objects.unlink(each)
+        collection.objects.link(each)
+    if driven:
+        scenes.add_sinew(obj, "dq")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    return expected
+
+
+def link(folder: Path, override: bool) -> None:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_source, target):
+        if override:
+            target.collections = ["Character"]
+        else:
+            target.objects = ["Arm", "Arm Rig"]
+    if override:
+        target.collections[0].override_hierarchy_create(
+            bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
+        )
+    else:
+        for obj in target.objects:
+            bpy.context.scene.collection.objects.link(obj)
+        target.objects[0].make_local()
+    bpy.context.view_layer.update()
+
+
+def character() -> bpy.types.Object:
+    (obj,) = (
+        o for o in bpy.data.objects if o.type == "MESH" and o.library is None and not properties.is_helper(o)
+    )
+    assert obj.data.library is not None
+    return obj
+
+
+def assert_shapes(expected: np.ndarray) -> None:
+    got = scenes.shapes(character(), FRAMES)
+    assert got.shape == expected.shape
+    assert scenes.worst(got, expected) <= 1e-5
+
+
+@pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])
+@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
+def test_linked_meshes(tmp_path, override, driven, front):
+    expected = save_library(tmp_path, driven, front)
+    link(tmp_path, override)
+    scenes.add_sinew(character(), "dq")
+    assert_shapes(expected)
+    assert not properties.of(character()).error
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    assert properties.is_driven(character())
+    assert_shapes(expected)
+    drive.remove(character())
+    obj = character()
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    assert obj.modifiers["Armature"].object is not None
+    assert_shapes(expected)
+    # A hierarchy of overrides takes in what the library's own character has of Sinew.
+    local = [o for o in bpy.data.objects if o.library is None and o.override_library is None]
+    assert not any(properties.is_helper(o) for o in local)
