@@ -40,6 +40,7 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
         np.concatenate(parts),
         lengths,
         segments,
+        np.array([bone.bbone_mapping_mode == "CURVED" for bone in bones], dtype=bool),
         first_joints,
         _read_envelopes(bones),
         complete,

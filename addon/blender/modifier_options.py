@@ -51,12 +51,9 @@ class ModifierOptions:
         return 1.0 - mask if self.invert_mask else mask
 
 
-def differences(obj: bpy.types.Object, armature: bpy.types.Object) -> list[str]:
-    """A sentence for each thing that the modifier does and Sinew does not."""
+def differences(obj: bpy.types.Object) -> list[str]:
+    """A sentence for each thing that the modifiers do and Sinew does not."""
     found = []
-    deforming = [bone for bone in armature.data.bones if bone.use_deform]
-    if any(bone.bbone_segments > 1 and bone.bbone_mapping_mode == "CURVED" for bone in deforming):
-        found.append("Bendy bones with curved mapping: Sinew maps them straight")
     driven = stack.armature_modifiers(obj)
     others = [m for m in obj.modifiers if m.type == "ARMATURE" and m not in driven and m.object is not None]
     if others:

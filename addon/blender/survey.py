@@ -28,7 +28,7 @@ def describe(
         space = np.identity(4)
     there = points @ space[:3, :3].T + space[:3, 3]
     facts = describe_rig(weighting, there, [group.name for group in obj.vertex_groups])
-    return facts.with_warnings(differences(obj, armature))
+    return facts.with_warnings(differences(obj))
 
 
 def describe_undriven(obj: bpy.types.Object) -> RigFacts:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bendy bones: n segments move vertices by n + 1 joints along the bone, each vertex by the two beside it.
 
-Based on: what Blender's Armature modifier does for the straight mapping.
+Based on: what Blender's Armature modifier does; for the curved mapping, the description of its "B-Bone vertex
+mapping" in Blender's developer documentation and its change 110758, whose constants it shares.
 """
 
 from __future__ import annotations
@@ -9,6 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from .influences import Influences
+
+# How wide the curved mapping smooths at the plane in the middle, how fast the pull towards the ideal slope
+# grows, and how sharply it ends.
+WIDTH, SLOPE, SHARPNESS = 0.222, 3.0, 7.0
 
 
 def spread_over_joints(
@@ -18,24 +23,34 @@ def spread_over_joints(
     lengths: np.ndarray,
     segments: np.ndarray,
     first_joints: np.ndarray,
+    curved: np.ndarray,
 ) -> Influences:
     """The influences with each one of a bendy bone shared between the two joints beside the vertex.
 
     points        float [vertices, 3], rest points in armature space
-    rest          float [bones, 4, 4], armature space, Y along the bone
+    rest          float [bones + joints, 4, 4], armature space, Y along the bone
     lengths       float [bones]
     segments      int [bones], 1 for a bone that does not bend
     first_joints  int [bones], index of the bone's first joint; its joints follow one another
+    curved        bool [bones], vertices are mapped along the bone's curve at rest, not along its straight line
     """
     counts = influences.counts
     vertices = np.repeat(np.arange(len(counts)), counts)
     bones = influences.bones
     bends = segments[bones] > 1
     bent = bones[bends]
-    inverse = np.linalg.inv(rest.astype(np.float64))[bent]
     here = points[vertices[bends]].astype(np.float64)
-    along = np.einsum("ij,ij->i", inverse[:, 1, :3], here) + inverse[:, 1, 3]
-    position = np.clip(along / lengths[bent], 0.0, 1.0) * segments[bent]
+    share = np.empty(len(bent))
+    for bone in np.unique(bent):
+        of_bone = bent == bone
+        if curved[bone]:
+            joints = rest[first_joints[bone] :][: segments[bone] + 1].astype(np.float64)
+            share[of_bone] = share_along_curve(here[of_bone], joints)
+        else:
+            bone_from_armature = np.linalg.inv(rest[bone].astype(np.float64))
+            along = here[of_bone] @ bone_from_armature[1, :3] + bone_from_armature[1, 3]
+            share[of_bone] = along / lengths[bone]
+    position = np.clip(share, 0.0, 1.0) * segments[bent]
     joint = np.clip(np.floor(position).astype(np.int64), 0, segments[bent] - 1)
     second_share = np.clip(position - joint, 0.0, 1.0)
 
@@ -51,3 +66,73 @@ def spread_over_joints(
     offsets = np.zeros(len(counts) + 1, dtype=np.int32)
     np.cumsum(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)), out=offsets[1:])
     return Influences(offsets, slots.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32))
+
+
+def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:
+    """float64 [n]: where along a bendy bone's curve each point lies, 0 at its head, 1 at its tail.
+
+    A binary search among the planes through the joints finds the segment; then, from the last plane asked
+    to the first, points inside a bend are pulled towards the plane to take out the jump that they make there.
+
+    points  float64 [n, 3]
+    joints  float64 [segments + 1, 4, 4] at rest, Y along the curve, same space
+    """
+    segments = len(joints) - 1
+    normals = joints[:, :3, 1] / np.linalg.norm(joints[:, :3, 1], axis=1, keepdims=True)
+    places = joints[:, :3, 3]
+    distances = points @ normals.T - np.einsum("ij,ij->i", normals, places)
+    arc_length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+
+    asked, first, last = _search(distances, segments)
+    nearer, farther = (
+        np.abs(np.take_along_axis(distances, np.clip(plane, 0, segments)[:, None], axis=1)[:, 0])
+        for plane in (first, last)
+    )
+    between = np.divide(nearer, nearer + farther, out=np.zeros_like(nearer), where=nearer + farther > 0.0)
+    share = np.where(last <= 0, 0.0, np.where(first >= segments, 1.0, (first + between) / segments))
+
+    straightness = np.linalg.norm(places[-1] - places[0]) / arc_length
+    scales = _smoothing_scales(segments, segments * straightness * WIDTH)
+    for plane, scale in reversed(list(zip(asked, scales, strict=False))):
+        share = _pull_to_plane(share, plane, distances / arc_length, segments, scale)
+    return share
+
+
+def _search(distances: np.ndarray, segments: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """The planes asked at each step, -1 for points whose search is over, and the two that enclose a point:
+    -1 before the first plane, segments + 1 behind the last."""
+    count = len(distances)
+    first, last = np.full(count, -1), np.full(count, segments + 1)
+    bias = np.zeros(count, dtype=np.int64)
+    asked = []
+    while (going := last - first > 1).any():
+        plane = np.where(going, (first + last + bias) // 2, -1)
+        before = distances[np.arange(count), plane] < 0.0
+        last = np.where(going & before, plane, last)
+        first = np.where(going & ~before, plane, first)
+        # Odd numbers are halved towards the last split, for symmetry.
+        bias = before.astype(np.int64)
+        asked.append(plane)
+    return asked, first, last
+
+
+def _smoothing_scales(segments: int, widest: float) -> np.ndarray:
+    """One over the width, in the whole bone's length, that is smoothed at each step of the search."""
+    steps = int(np.ceil(np.log2(segments + 2)))
+    narrowing = max(widest, 1.0) ** (1.0 / (steps - 1))
+    return segments / widest * narrowing ** np.arange(steps)
+
+
+def _pull_to_plane(
+    share: np.ndarray, plane: np.ndarray, distances: np.ndarray, segments: int, scale: float
+) -> np.ndarray:
+    """`share` with points near one plane pulled towards where the ideal slope has them."""
+    distance = distances[np.arange(len(share)), plane]
+    place = plane / segments
+    gap = np.abs(share - place) - np.abs(distance)
+    nearness = 1.0 - np.abs(distance) * scale
+    pulled = (plane >= 0) & (gap > 0.0) & (nearness > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = SLOPE * gap / (SLOPE * gap + np.abs(distance))
+        strength = nearness**2 * (SHARPNESS + 1.0) / (SHARPNESS * nearness + 1.0)
+    return np.where(pulled, share + slope * strength * (place + distance - share), share)

@@ -23,6 +23,7 @@ class Bones:
     rest          float32 [bones + joints, 4, 4], armature space, Y along the bone
     lengths       float32 [bones]
     segments      int32 [bones], 1 for a bone that does not bend
+    curved        bool [bones], those that map vertices along their curve
     first_joints  int32 [bones], where in `rest` the segments + 1 joints of a bending bone begin
     envelopes     the reach of every bone
     complete      false where bendy bones had no joints yet, and count as not bending
@@ -33,6 +34,7 @@ class Bones:
     rest: np.ndarray
     lengths: np.ndarray
     segments: np.ndarray
+    curved: np.ndarray
     first_joints: np.ndarray
     envelopes: Envelopes
     complete: bool = True
@@ -43,7 +45,8 @@ class Bones:
         none, numbers = np.empty(0, dtype=np.float32), np.empty(0, dtype=np.int32)
         places, flags = np.empty((0, 3), dtype=np.float32), np.empty(0, dtype=bool)
         envelopes = Envelopes(places, places, none, none, none, none, flags)
-        return cls((), flags, np.empty((0, 4, 4), dtype=np.float32), none, numbers, numbers, envelopes)
+        rest = np.empty((0, 4, 4), dtype=np.float32)
+        return cls((), flags, rest, none, numbers, flags, numbers, envelopes)
 
     @property
     def bend(self) -> bool:
@@ -63,6 +66,7 @@ class Bones:
             and np.array_equal(self.deform, other.deform)
             and np.array_equal(self.rest, other.rest)
             and np.array_equal(self.segments, other.segments)
+            and np.array_equal(self.curved, other.curved)
             and self.envelopes.equals(other.envelopes)
         )
 
@@ -103,8 +107,15 @@ class Weighting:
         influences, bones = self.influences(points), self.bones
         if not bones.bend:
             return influences
-        rest = bones.rest[: len(bones.names)]
-        return spread_over_joints(influences, points, rest, bones.lengths, bones.segments, bones.first_joints)
+        return spread_over_joints(
+            influences,
+            points,
+            bones.rest,
+            bones.lengths,
+            bones.segments,
+            bones.first_joints,
+            bones.curved,
+        )
 
 
 @dataclass(frozen=True)

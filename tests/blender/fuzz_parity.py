@@ -106,6 +106,8 @@ def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
             if rng.random() < 0.5:
                 bone.bbone_segments = int(rng.integers(2, 9))
                 bone.bbone_curveinx, bone.bbone_curveoutz = rng.uniform(-0.3, 0.3, 2)
+                if rng.random() < 0.4:
+                    bone.bbone_mapping_mode = "CURVED"
     if has(seed, "envelopes", features) or has(seed, "envelope multiply", features):
         rng = numbers(seed, "envelopes")
         for bone in bones:
