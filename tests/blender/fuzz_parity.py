@@ -25,6 +25,7 @@ import numpy as np
 import scenes
 from mathutils import Euler, Matrix, Vector
 from sinew_addon.blender import drive, handlers, properties
+from sinew_addon.core import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import reference
@@ -44,6 +45,11 @@ FEATURES = (
     "undeforming bones",
     "messy weights",
     "modifier behind",
+    "modifier in front",
+    "further armatures",
+    "bone parent",
+    "parent deforms",
+    "absolute keys",
 )
 ORACLES = (("lbs", False), ("dq", True))
 
@@ -159,6 +165,9 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
                 key.vertex_group = groups[0].name
             if index and rng.random() < 0.3:
                 key.relative_key = obj.data.shape_keys.key_blocks[1]
+        if has(seed, "absolute keys", features, share=0.2):
+            obj.data.shape_keys.use_relative = False
+            obj.data.shape_keys.eval_time = rng.uniform(0.0, 30.0)
     return obj
 
 
@@ -178,6 +187,10 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
         modifier.invert_vertex_group = bool(rng.random() < 0.5)
     if has(seed, "modifier behind", features):
         obj.modifiers.new("Cast", "CAST").factor = 0.3
+    if has(seed, "modifier in front", features, share=0.3):
+        add_modifier_in_front(numbers(seed, "modifier in front"), obj)
+    if has(seed, "further armatures", features, share=0.3):
+        add_further_armatures(seed, features, obj, armature)
     if has(seed, "object transforms", features):
         rng = numbers(seed, "object transforms")
         for each in (obj, armature):
@@ -189,9 +202,55 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
             )
     if has(seed, "parenting", features):
         obj.parent = armature
+    if has(seed, "bone parent", features, share=0.1):
+        bones = armature.data.bones
+        obj.parent, obj.parent_type = armature, "BONE"
+        obj.parent_bone = bones[int(numbers(seed, "bone parent").integers(len(bones)))].name
+    elif has(seed, "parent deforms", features, share=0.1):
+        obj.parent, obj.parent_type = armature, "ARMATURE"
     pose(seed, features, armature)
     bpy.context.view_layer.update()
     return obj, armature
+
+
+def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> None:
+    kind = str(rng.choice(("SUBSURF", "MIRROR", "CAST", "SOLIDIFY", "LATTICE", "VERTEX_WEIGHT_EDIT")))
+    modifier = obj.modifiers.new("In Front", kind)
+    if kind == "CAST":
+        modifier.factor = rng.uniform(-0.5, 0.8)
+    elif kind == "LATTICE":
+        lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
+        bpy.context.scene.collection.objects.link(lattice)
+        lattice.scale = rng.uniform(2.0, 4.0, 3)
+        for point in lattice.data.points:
+            point.co_deform += Vector(rng.normal(0, 0.1, 3))
+        modifier.object = lattice
+    elif kind == "VERTEX_WEIGHT_EDIT":
+        modifier.vertex_group = obj.vertex_groups[0].name
+        modifier.use_add, modifier.default_weight = True, rng.uniform(0.1, 1.0)
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def add_further_armatures(
+    seed: int, features: set[str], obj: bpy.types.Object, armature: bpy.types.Object
+) -> None:
+    """One or two more Armature modifiers behind the first, of a copy of its armature in another pose."""
+    rng = numbers(seed, "further armatures")
+    other = armature.copy()
+    other.data = armature.data.copy()
+    bpy.context.scene.collection.objects.link(other)
+    other.location = rng.uniform(-0.5, 0.5, 3)
+    pose(seed + 1, features, other)
+    place = list(obj.modifiers).index(obj.modifiers["Armature"])
+    for number in range(int(rng.integers(1, 3))):
+        modifier = obj.modifiers.new(f"Further {number}", "ARMATURE")
+        modifier.object = other if number == 0 else armature
+        modifier.use_multi_modifier = bool(rng.random() < 0.6)
+        modifier.show_viewport = bool(rng.random() < 0.9)
+        if rng.random() < 0.7:
+            modifier.vertex_group = obj.vertex_groups[int(rng.integers(len(obj.vertex_groups)))].name
+            modifier.invert_vertex_group = bool(rng.random() < 0.5)
+        obj.modifiers.move(len(obj.modifiers) - 1, place + 1 + number)
 
 
 def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
@@ -224,9 +283,14 @@ def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
 
 
 def undecided(obj: bpy.types.Object) -> np.ndarray:
-    """bool [vertices]: those at a discontinuity of the modifier, of an object that was just deformed."""
+    """bool [vertices]: those at a discontinuity of a modifier, of an object that was just deformed."""
     driven = handlers.state_of(obj)
-    binding, frame = driven.binding, driven.binding.last_frame
+    bindings = [link.binding for link in driven.chain.links if link.binding.last_frame is not None]
+    return np.logical_or.reduce([undecided_by(binding) for binding in bindings])
+
+
+def undecided_by(binding: session.Binding) -> np.ndarray:
+    frame = binding.last_frame
     space = frame.bones_from_model
     points = frame.rest_points @ space[:3, :3].T + space[:3, 3]
     influences = binding.weighting.influences_over_joints(points)
@@ -257,24 +321,29 @@ def undecided(obj: bpy.types.Object) -> np.ndarray:
 def check(seed: int, features: set[str]) -> Outcome:
     obj, _armature = make_rig(seed, features)
     expected = {}
-    modifier = obj.modifiers["Armature"]
     for method, preserve_volume in ORACLES:
-        modifier.use_deform_preserve_volume = preserve_volume
+        for modifier in obj.modifiers:
+            if modifier.type == "ARMATURE":
+                modifier.use_deform_preserve_volume = preserve_volume
         bpy.context.view_layer.update()
         expected[method] = scenes.final_points(obj)
     drive.add(obj)
     handlers.refresh(bpy.context)
-    outcome = Outcome(seed, vertices=len(obj.data.vertices))
+    outcome = Outcome(seed, vertices=len(expected["lbs"]))
     for method, _preserve_volume in ORACLES:
-        properties.of(obj).method = method
+        drive.use_one_method(obj, method)
         if not properties.of(obj).enabled:
             outcome.errors[method] = float("inf")
             continue
         left_out = undecided(obj)
         outcome.left_out = int(left_out.sum())
+        shown = scenes.final_points(obj)
+        if shown.shape != expected[method].shape:
+            outcome.errors[method] = float("inf")
+            continue
         # A pose with scale makes the mesh larger, and its rounding with it.
         extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected[method], axis=0))))
-        error = np.abs(scenes.final_points(obj) - expected[method])[~left_out].max(initial=0.0)
+        error = np.abs(shown - expected[method])[~left_out].max(initial=0.0)
         outcome.errors[method] = float(error) / extent
     return outcome
 
