@@ -156,7 +156,7 @@ def _frames(
             return None
         method = settings.stand_ins[number].method if number else properties.SAME_METHOD
         method = settings.method if method == properties.SAME_METHOD else method
-        frames.append(LinkFrame(method, pose, space))
+        frames.append(LinkFrame(method, pose, space, settings.scale_rule))
     return frames
 
 

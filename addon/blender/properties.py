@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import bpy
 import sinew
 
+from ..core.scale_rule import SCALE_RULES
+
 METHODS = {method.name: method for method in sinew.methods()}
 
 
@@ -72,6 +74,13 @@ class SinewSettings(bpy.types.PropertyGroup):
         name="Method",
         description="How the bones' motions are blended at each vertex",
         items=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
+    scale_rule: bpy.props.EnumProperty(
+        name="Scale",
+        description="What becomes of bones' scale under methods that blend rigid motions",
+        items=[(r.name, r.label, r.description, r.number) for r in SCALE_RULES],
         update=_method_changed,
         override=OVERRIDABLE,
     )

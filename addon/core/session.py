@@ -10,8 +10,10 @@ import numpy as np
 import sinew
 
 from .rig import Weighting
+from .scale_rule import BLENDER_4, IGNORED
 
 IDENTITY = np.identity(4)
+LINEAR = "lbs"
 
 
 @dataclass
@@ -22,12 +24,14 @@ class Frame:
     pose              float32 [bones + joints, 4, 4], armature space, as Blender gives it
     bones_from_model  float64 [4, 4], takes the mesh's object space to armature space
     rest_points       float32 [vertices, 3], object space, shape keys applied
+    scale_rule        name of a scale rule
     """
 
     method: str
     pose: np.ndarray
     bones_from_model: np.ndarray
     rest_points: np.ndarray
+    scale_rule: str = BLENDER_4.name
 
 
 class Binding:
@@ -37,7 +41,8 @@ class Binding:
         self.weighting = weighting
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        self._deformer: sinew.Deformer | None = None
+        # For each purpose the deformer and the rest points that it has.
+        self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
 
@@ -64,48 +69,74 @@ class Binding:
         last = self._last
         if last is not None and _same(last, frame):
             return False
-        deformer = self._bound(frame)
         # In double: a bone far from the origin would lose digits in the product of two float matrices.
         posed_from_rest = frame.pose.astype(np.float64) @ self._rest_from_armature
-        same_space = np.array_equal(frame.bones_from_model, IDENTITY)
-        deformer.deform(
-            posed_from_rest.astype(np.float32),
-            out=self._points,
-            bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
-        )
+        rest_points = frame.rest_points
+        if self._spread_anew(frame):
+            self._bound.clear()
+        if frame.scale_rule != BLENDER_4.name:
+            split = sinew.affine.split_scale(posed_from_rest, self.bones.rest_axes.astype(np.float64))
+            if frame.scale_rule == IGNORED.name:
+                posed_from_rest = split.rigid
+            elif frame.method != LINEAR and split.has_scale.any():
+                rest_points = np.empty_like(self._points)
+                self._deform("scale", LINEAR, frame, frame.rest_points, split.scale, rest_points)
+                posed_from_rest = split.rigid
+        self._deform("motion", frame.method, frame, rest_points, posed_from_rest, self._points)
         self._last = frame
         return True
 
-    def _bound(self, frame: Frame) -> sinew.Deformer:
+    def _deform(
+        self,
+        purpose: str,
+        method: str,
+        frame: Frame,
+        rest_points: np.ndarray,
+        posed_from_rest: np.ndarray,
+        out: np.ndarray,
+    ) -> None:
+        """Deforms `rest_points` with the deformer that was bound for `purpose`, bound anew where it must be."""
+        deformer, points = self._bound.get(purpose, (None, None))
+        if deformer is None or deformer.method != method:
+            deformer = self._bind(frame, rest_points, method)
+        elif points is not rest_points:
+            deformer.set_rest_points(rest_points)
+        self._bound[purpose] = (deformer, rest_points)
+        same_space = np.array_equal(frame.bones_from_model, IDENTITY)
+        deformer.deform(
+            posed_from_rest.astype(np.float32),
+            out=out,
+            bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
+        )
+
+    def _spread_anew(self, frame: Frame) -> bool:
+        """Whether weights differ from the last frame's, as they can depend on where the vertices are."""
         last = self._last
-        reshaped = last is None or frame.rest_points is not last.rest_points
-        moved = reshaped or not np.array_equal(frame.bones_from_model, last.bones_from_model)
-        deformer = self._deformer
-        if (
-            deformer is None
-            or deformer.method != frame.method
-            or (moved and self.weighting.depends_on_points)
-        ):
-            space = frame.bones_from_model
-            influences = self.weighting.influences_over_joints(
-                frame.rest_points @ space[:3, :3].T + space[:3, 3]
-            )
-            self._deformer = sinew.Deformer(
-                frame.rest_points,
-                influences.offsets,
-                influences.bones,
-                influences.weights,
-                frame.method,
-                rest_bones=self.bones.rest_axes,
-            )
-        elif reshaped:
-            deformer.set_rest_points(frame.rest_points)
-        return self._deformer
+        if last is None or not self.weighting.depends_on_points:
+            return False
+        return frame.rest_points is not last.rest_points or not np.array_equal(
+            frame.bones_from_model, last.bones_from_model
+        )
+
+    def _bind(self, frame: Frame, rest_points: np.ndarray, method: str) -> sinew.Deformer:
+        space = frame.bones_from_model
+        influences = self.weighting.influences_over_joints(
+            frame.rest_points @ space[:3, :3].T + space[:3, 3]
+        )
+        return sinew.Deformer(
+            rest_points,
+            influences.offsets,
+            influences.bones,
+            influences.weights,
+            method,
+            rest_bones=self.bones.rest_axes,
+        )
 
 
 def _same(a: Frame, b: Frame) -> bool:
     return (
         a.method == b.method
+        and a.scale_rule == b.scale_rule
         and (a.rest_points is b.rest_points or np.array_equal(a.rest_points, b.rest_points))
         and np.array_equal(a.pose, b.pose)
         and np.array_equal(a.bones_from_model, b.bones_from_model)
@@ -132,6 +163,7 @@ class LinkFrame:
     method: str
     pose: np.ndarray
     bones_from_model: np.ndarray
+    scale_rule: str = BLENDER_4.name
 
 
 class Chain:
@@ -172,7 +204,7 @@ class Chain:
                 starts[behind] = result
             start = starts.get(number, result)
             changed |= link.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start)
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule)
             )
             posed = link.binding.points
             if link.mask is not None:

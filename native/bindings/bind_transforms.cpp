@@ -2,6 +2,7 @@
 #include "broadcast.h"
 #include "module.h"
 #include "sinew/transform/rigid_distance.h"
+#include "sinew/transform/split_scale.h"
 
 namespace sinew::bindings {
 namespace {
@@ -73,6 +74,11 @@ void bind_transforms(py::module_& m) {
     bind_representation<Affine>(affine);
     bind_representation<QuatVec>(quat_vec);
     bind_representation<DualQuat>(dual_quat);
+    def<Affine, Affine>(affine, "split_scale", {"posed_from_rest", "rest_bone"},
+                        [](const auto& posed_from_rest, const auto& rest_bone) {
+                            const auto split = split_scale(posed_from_rest, rest_bone);
+                            return std::tuple(split.rigid, split.scale, split.has_scale);
+                        });
     bind_dual_quaternions(dual_quat);
 }
 

@@ -29,6 +29,14 @@ class Distance(NamedTuple, Generic[Float]):
     translation: NDArray[Float]
 
 
+class ScaleSplit(NamedTuple, Generic[Float]):
+    """rigid and scale [.., 4, 4]; has_scale bool [..]: whether `scale` is more than rounding."""
+
+    rigid: NDArray[Float]
+    scale: NDArray[Float]
+    has_scale: NDArray[np.bool_] | Any
+
+
 class Blended(NamedTuple, Generic[Float]):
     """The transforms, and whether each is what the method defines; where not, the method says what it is."""
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._native import affine as _native
-from ._types import Distance, Float, Number, Screw
+from ._types import Distance, Float, Number, ScaleSplit, Screw
 
 __all__ = [
     "compose",
@@ -29,6 +29,7 @@ __all__ = [
     "inverse",
     "normalized",
     "rigid_distance",
+    "split_scale",
     "to_dual_quat",
     "to_quat_vec",
     "to_screw",
@@ -162,3 +163,16 @@ def rigid_distance(a: NDArray[Float], b: NDArray[Float]) -> Distance[Float]:
     The same for compose(x, a) and compose(x, b), x rigid. `a` and `b` must be rigid.
     """
     return Distance(*_native.rigid_distance(a, b))
+
+
+def split_scale(posed_from_rest: NDArray[Float], rest_bone: NDArray[Float]) -> ScaleSplit[Float]:
+    """A bone's motion in two, posed_from_rest = rigid * scale: what methods that blend rigid motions need.
+
+    posed_from_rest  where the motion takes points of the rest shape; may scale, shear and mirror
+    rest_bone        the bone's rest axes, Y along the bone, and head in the same space; orthonormal
+
+    Axes are made square keeping Y, as Blender's Armature modifier does for Preserve Volume; a mirror is in
+    `scale`. A motion within 1e-5 of orthonormal and 1e-4 of unit size has the identity for `scale`. `rigid` is
+    a rotation and a shift also where axes vanish.
+    """
+    return ScaleSplit(*_native.split_scale(posed_from_rest, rest_bone))

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What becomes of bones' scale: methods other than linear blend move vertices by rigid motions alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ScaleRule:
+    """A way to treat scale.
+
+    number  stored in .blend files: never changed, never used again
+    """
+
+    number: int
+    name: str
+    label: str
+    description: str
+
+
+# Each vertex goes where its bones' scales take it one by one, and those places are blended as motions.
+BLENDER_4 = ScaleRule(
+    1,
+    "4.0",
+    "As Blender 4.0",
+    "Each bone scales the vertex about itself before its motion is blended: Blender's rule since 4.0",
+)
+# The scales are blended as matrices, the vertex scaled once, then moved by the blended motion.
+BLENDER_3 = ScaleRule(
+    2,
+    "3.x",
+    "As Blender 3",
+    "The bones' scales are blended first, then their motions: Blender's rule up to 3.6",
+)
+IGNORED = ScaleRule(
+    3, "none", "Ignore Scale", "Bones turn and move vertices and never scale them, under every method"
+)
+
+SCALE_RULES = (BLENDER_4, BLENDER_3, IGNORED)
