@@ -50,6 +50,12 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
     return {curve.data_path for curves in lists for curve in curves}
 
 
+def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+    """Whether keys or drivers decide when a modifier is on."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
+    return any(path.startswith(start) for path in animated_paths(obj))
+
+
 def _curve_lists(player: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
     """The F-curves that `player` plays: an action's own up to 4.3, those of its slot since 4.4."""
     action = player.action

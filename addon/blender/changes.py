@@ -13,6 +13,7 @@ class Changes:
     """The data touched since the last update, by session_uid.
 
     objects    whose geometry was touched
+    moved      that were moved
     meshes     whose geometry was touched: points, weights, topology, shape keys
     armatures  whose bones may differ
     structure  objects may have come, gone or been hidden
@@ -20,6 +21,7 @@ class Changes:
     """
 
     objects: set[int] = field(default_factory=set)
+    moved: set[int] = field(default_factory=set)
     meshes: set[int] = field(default_factory=set)
     armatures: set[int] = field(default_factory=set)
     structure: bool = False
@@ -31,8 +33,11 @@ class Changes:
         for update in depsgraph.updates:
             what = update.id
             if isinstance(what, bpy.types.Object):
+                uid = what.original.session_uid
                 if update.is_updated_geometry:
-                    changes.objects.add(what.original.session_uid)
+                    changes.objects.add(uid)
+                if update.is_updated_transform:
+                    changes.moved.add(uid)
             elif isinstance(what, bpy.types.Mesh):
                 if update.is_updated_geometry:
                     changes.meshes.add(what.original.session_uid)

@@ -143,8 +143,10 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         clear_pointers(obj)
         if not settings.standing_in:
             _switch_off(obj)
+        keyed = any(animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
         shown = [s for s in settings.stand_ins if s.armature is not None]
-        _show(nodes, any(s.show_viewport for s in shown), any(s.show_render for s in shown))
+        viewport, render = (any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render"))
+        _show(nodes, viewport or keyed, render or keyed)
     elif settings.standing_in:
         give_back(obj)
         for modifier in stack.armature_modifiers(obj):

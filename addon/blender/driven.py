@@ -12,7 +12,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.rig import Bones, RigFacts
 from ..core.session import Binding, Chain, Link, LinkFrame
-from . import armature_io, drive, mesh_io, points, pose_driver, properties, source, stack, survey
+from . import animation, armature_io, drive, mesh_io, points, pose_driver, properties, source, stack, survey
 from .changes import Changes
 from .modifier_options import ModifierOptions
 from .source import Source
@@ -27,15 +27,21 @@ MODES_THAT_NEED_THE_POINTER = {"WEIGHT_PAINT"}
 class Driven:
     """What is known of a driven object between events; made again whenever it may be out of date.
 
-    armatures  the session_uid of each link's armature, 0 for none
+    armatures          the session_uid of each link's armature, 0 for none
+    keyed              for each link, whether an animation decides when its modifier is on
+    rest_points        of the last frame
+    dirtied_by_frames  the last change of frame moved the object or its rest points
     """
 
     mode: str
     armatures: list[int]
     options: list[ModifierOptions]
+    keyed: list[bool]
     source: Source
     chain: Chain
     facts: RigFacts
+    rest_points: np.ndarray | None = None
+    dirtied_by_frames: bool = False
     milliseconds: float = 0.0
 
     @property
@@ -72,7 +78,12 @@ def update(
     frames = _frames(obj, driven, depsgraph)
     if frames is None:
         return driven
-    if driven.chain.deform(source.rest_points(obj, driven.source, depsgraph), frames):
+    rest_points = source.rest_points(obj, driven.source, depsgraph)
+    if changes.frame:
+        reshaped = rest_points is not driven.rest_points
+        driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
+    driven.rest_points = rest_points
+    if driven.chain.deform(rest_points, frames):
         points.write(obj, driven.chain.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
     elif touched and not points.are_written(obj, len(driven.chain.points)):
@@ -143,7 +154,8 @@ def _frames(
     for number, link in enumerate(driven.chain.links):
         stand_in = properties.of(obj).stand_ins[number]
         armature = stand_in.armature
-        if armature is None or armature.mode == "EDIT" or not _takes_part(stand_in, depsgraph):
+        flags = evaluated.modifiers[stand_in.name] if driven.keyed[number] else stand_in
+        if armature is None or armature.mode == "EDIT" or not _takes_part(flags, depsgraph):
             frames.append(None)
             continue
         evaluated_armature = armature.evaluated_get(depsgraph)
@@ -160,8 +172,10 @@ def _frames(
     return frames
 
 
-def _takes_part(stand_in: properties.SinewStandIn, depsgraph: bpy.types.Depsgraph) -> bool:
-    return stand_in.show_render if depsgraph.mode == "RENDER" else stand_in.show_viewport
+def _takes_part(
+    flags: properties.SinewStandIn | bpy.types.Modifier, depsgraph: bpy.types.Depsgraph
+) -> bool:
+    return flags.show_render if depsgraph.mode == "RENDER" else flags.show_viewport
 
 
 def _current(
@@ -230,7 +244,8 @@ def _bind(
     ]
     facts = survey.describe(obj, pairs[0][1].armature, links[0].binding.weighting, read.points, depsgraph)
     armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
-    driven = Driven(obj.mode, armatures, options, read, Chain(links), facts)
+    keyed = [animation.is_visibility_animated(obj, modifier) for modifier, _stand_in in pairs]
+    driven = Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts)
     hold_pose(obj, driven)
     return driven
 

@@ -13,6 +13,7 @@ from ..core.errors import SinewError
 from . import drive, driven, overrides, points, properties
 from .changes import Changes
 from .driven import Driven
+from .gate import Gate, is_allowed
 
 log = logging.getLogger("sinew")
 
@@ -25,6 +26,7 @@ class Session:
     objects: list[bpy.types.Object] | None = None
     object_count: int = 0
     driven: dict[int, Driven] = field(default_factory=dict)
+    gate: Gate = field(default_factory=Gate)
     updating: bool = False
 
     @property
@@ -130,7 +132,18 @@ def _turn_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: 
 
 
 @persistent
+def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    if session.idle or session.objects is None or not is_allowed():
+        return
+    for obj in session.objects:
+        state = state_of(obj)
+        if state is not None and state.dirtied_by_frames:
+            session.gate.close(obj)
+
+
+@persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    session.gate.open()
     if not session.idle:
         _update(depsgraph, Changes.read(depsgraph, frame=True))
 
@@ -174,6 +187,7 @@ def on_saved(*_args: object) -> None:
 
 
 _HANDLERS = {
+    "frame_change_pre": [before_frame_change],
     "frame_change_post": [on_frame_change],
     "depsgraph_update_post": [on_depsgraph_update],
     "undo_pre": [on_data_replaced],

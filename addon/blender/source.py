@@ -69,6 +69,9 @@ def has_changed(
         return True
     if mesh.session_uid not in changes.meshes:
         return False
+    # An object that an animation moves dirties its mesh, and weights take long to read.
+    if changes.frame and obj.session_uid in changes.moved:
+        return False
     if keys is None:
         return True
     # Shape keys dirty the mesh whenever one moves, and weights do not change by that: reading them again on

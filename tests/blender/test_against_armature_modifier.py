@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scenes
 from conftest import BLEND_FILES, REAL_RIGS
-from sinew_addon.blender import drive, files, handlers, properties
+from sinew_addon.blender import drive, files, handlers, mesh_io, properties
 
 ORACLES = [("lbs", False), ("dq", True)]
 
@@ -343,3 +343,40 @@ def test_envelopes_with_moving_shape_keys():
     modifier = obj.modifiers["Armature"]
     modifier.use_bone_envelopes, modifier.use_vertex_groups = True, False
     assert_equal_to_modifier(obj, [1, 6, 11])
+
+
+def test_keyed_visibility_of_the_modifier():
+    obj, _armature = scenes.make_arm()
+    modifier = obj.modifiers["Armature"]
+    for frame, shown in ((1, True), (5, False), (9, True)):
+        modifier.show_viewport = shown
+        modifier.keyframe_insert("show_viewport", frame=frame)
+    assert_equal_to_modifier(obj, [3, 6, 10])
+
+
+def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:
+    """In edit mode the evaluated mesh is another than what it converts to."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = mesh_io.read_points(evaluated.to_mesh().vertices)
+    evaluated.to_mesh_clear()
+    return points
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_modes_in_which_blenders_tools_need_the_modifier(mode):
+    obj, _armature = scenes.make_arm()
+    bpy.context.scene.frame_set(8)
+    obj.modifiers["Armature"].show_in_editmode = True
+    bpy.ops.object.mode_set(mode=mode)
+    expected = final_points_in_any_mode(obj)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    shown = scenes.final_points(obj)
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.view_layer.update()
+    assert scenes.worst(final_points_in_any_mode(obj), expected) == 0.0
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    drive.use_one_method(obj, "lbs")
+    assert scenes.worst(scenes.final_points(obj), shown) <= 1e-6
+    assert not obj.modifiers["Armature"].show_viewport
