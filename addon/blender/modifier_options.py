@@ -24,7 +24,10 @@ class ModifierOptions:
     multi: bool
 
     @classmethod
-    def read(cls, modifier: bpy.types.ArmatureModifier) -> ModifierOptions:
+    def read(cls, modifier: bpy.types.ArmatureModifier | None) -> ModifierOptions:
+        """None stands for the parent type Armature, which has no modifier in the stack."""
+        if modifier is None:
+            return cls(True, True, "", False, False)
         return cls(
             modifier.use_vertex_groups,
             modifier.use_bone_envelopes,

@@ -62,7 +62,11 @@ class SINEW_OT_add(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if any(not properties.is_driven(obj) for obj in targets(context)):
             return True
-        cls.poll_message_set("Select a mesh with an Armature modifier, or an armature that deforms one")
+        others = drive.not_meshes(context.selected_objects)
+        if others:
+            cls.poll_message_set(f"{others[0].name} is no mesh: Sinew deforms meshes only")
+        else:
+            cls.poll_message_set("Select a mesh with an Armature modifier, or an armature that deforms one")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:

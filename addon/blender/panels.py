@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import handlers, operators, properties
+from . import drive, driven, handlers, operators, properties
 from .sidebar import Sidebar, draw_text
 
 
@@ -15,6 +15,9 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         meshes = operators.targets(context)
+        for other in drive.not_meshes(context.selected_objects):
+            text = f"{other.name} stays with its Armature modifier: Sinew deforms meshes only"
+            draw_text(layout, context, text, icon="INFO")
         if not meshes:
             draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
             return
@@ -45,8 +48,14 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
     if settings.error:
         draw_text(layout, context, settings.error, icon="ERROR", alert=True)
+    elif settings.enabled and obj.mode in driven.MODES_OF_THE_MODIFIER:
+        draw_text(layout, context, "In this mode the Armature modifier shows its own shape", icon="INFO")
     layout.prop(settings, "method", text="")
     draw_text(layout, context, properties.METHODS[settings.method].description)
+    if len(settings.armatures) > 1 or any(s.method != properties.SAME_METHOD for s in settings.stand_ins):
+        for stand_in in list(settings.stand_ins)[1:]:
+            layout.prop(stand_in, "method", text=stand_in.name)
+    layout.prop(settings, "scale_rule")
 
 
 def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

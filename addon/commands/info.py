@@ -23,7 +23,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     reports = []
     for path in args.files:
         try:
-            report = {"file": str(path), "meshes": describe_file(path)}
+            report = {"file": str(path), "meshes": describe_file(path), "left_to_blender": left_to_blender()}
         except SinewError as error:
             failed = True
             report = {"file": str(path), "error": str(error)}
@@ -66,11 +66,23 @@ def describe_file(path: Path) -> list[dict[str, object]]:
     return meshes
 
 
+def left_to_blender() -> list[str]:
+    """The open file's objects that an armature deforms and that are no meshes."""
+    import bpy
+
+    from ..blender import drive
+
+    return [f"{obj.name} ({obj.type.title()})" for obj in drive.not_meshes(list(bpy.data.objects))]
+
+
 def _show(report: dict, console: Console) -> None:
     meshes = report["meshes"]
     console.say(
         f"{report['file']}: {len(meshes) or 'no'} armature-deformed mesh{'' if len(meshes) == 1 else 'es'}"
     )
+    if report["left_to_blender"]:
+        names = ", ".join(report["left_to_blender"])
+        console.say(f"No meshes, left to their Armature modifiers: {names}")
     if not meshes:
         return
     console.table(

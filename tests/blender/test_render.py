@@ -103,3 +103,56 @@ def test_after_a_render_the_current_frame_is_shown(tmp_path):
     render_animation(scene, tmp_path, (2, 3))
     assert scene.frame_current == 11
     assert np.array_equal(scenes.final_points(obj), before)
+
+
+def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    obj.parent = armature
+    for frame, place in ((1, (0.0, 0.0, 0.0)), (11, (0.5, 0.5, 0.0))):
+        armature.location = place
+        armature.keyframe_insert("location", frame=frame)
+    obj.modifiers.new("Behind", "SUBSURF").render_levels = 1
+
+
+def in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.modifiers.new("Front", "SUBSURF").render_levels = 2
+    obj.modifiers.move(1, 0)
+
+
+def second_view_layer(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    """Two view layers, the rig hidden in one of them."""
+    scene = bpy.context.scene
+    collection = bpy.data.collections.new("Rig")
+    scene.collection.children.link(collection)
+    scene.collection.objects.unlink(armature)
+    collection.objects.link(armature)
+    other = scene.view_layers.new("Other")
+    other.layer_collection.children["Rig"].exclude = True
+    moving_parent(obj, armature)
+
+
+def persistent_data(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    bpy.context.scene.render.use_persistent_data = True
+    in_front(obj, armature)
+
+
+def workbench(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    moving_parent(obj, armature)
+
+
+@pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "motion blur"])
+@pytest.mark.parametrize(
+    "set_up", [moving_parent, in_front, second_view_layer, persistent_data, workbench], ids=lambda f: f.__name__
+)
+def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
+    obj, armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur)
+    set_up(obj, armature)
+    (tmp_path / "modifier").mkdir()
+    (tmp_path / "sinew").mkdir()
+    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
+    assert np.abs(expected[0] - expected[2]).mean() > 0.002, "nothing moves: nothing is tested"
+    scenes.add_sinew(obj, "lbs")
+    got = render_animation(scene, tmp_path / "sinew", (5, 7))
+    assert np.abs(got - expected).mean() < 3e-4
