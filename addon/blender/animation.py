@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import pose_driver, properties
+from . import pose_driver
 
 
 def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.rig import Bones, RigFacts
 from ..core.session import Binding, Chain, Link, LinkFrame
-from . import animation, armature_io, drive, mesh_io, points, pose_driver, properties, source, stack, survey
+from . import animation, armature_io, drive, points, pose_driver, properties, source, stack, survey
 from .changes import Changes
 from .modifier_options import ModifierOptions
 from .source import Source
