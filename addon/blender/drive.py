@@ -38,7 +38,7 @@ def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def not_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of `objects` that an armature deforms and that Sinew leaves to Blender: lattices, curves, text."""
+    """Those of `objects` that an armature deforms and that Sinew leaves to Blender, such as lattices."""
     return [
         o for o in objects if o.type != "MESH" and any(m.type == "ARMATURE" and m.object for m in o.modifiers)
     ]
@@ -145,7 +145,9 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
             _switch_off(obj)
         keyed = any(animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
         shown = [s for s in settings.stand_ins if s.armature is not None]
-        viewport, render = (any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render"))
+        viewport, render = (
+            any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render")
+        )
         _show(nodes, viewport or keyed, render or keyed)
     elif settings.standing_in:
         give_back(obj)

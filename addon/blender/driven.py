@@ -147,7 +147,7 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
 def _frames(
     obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph
 ) -> list[LinkFrame | None] | None:
-    """What decides each link's part in this frame; None where nothing can be said, and the last shape stays."""
+    """What decides each link's part in this frame; None where that is unknown, and the last shape stays."""
     evaluated = obj.evaluated_get(depsgraph)
     settings = evaluated.sinew
     frames: list[LinkFrame | None] = []
@@ -172,9 +172,7 @@ def _frames(
     return frames
 
 
-def _takes_part(
-    flags: properties.SinewStandIn | bpy.types.Modifier, depsgraph: bpy.types.Depsgraph
-) -> bool:
+def _takes_part(flags: properties.SinewStandIn | bpy.types.Modifier, depsgraph: bpy.types.Depsgraph) -> bool:
     return flags.show_render if depsgraph.mode == "RENDER" else flags.show_viewport
 
 
@@ -217,9 +215,7 @@ def _bones_changed(
     return changed
 
 
-def _bind(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | None = None
-) -> Driven | None:
+def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | None = None) -> Driven | None:
     """Reads mesh, weights and bones; keeps the old bindings where they came out the same."""
     read = source.read(obj, depsgraph)
     if read is None:

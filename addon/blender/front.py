@@ -14,10 +14,24 @@ from . import properties, stack
 from .animation import animated_paths
 
 # A copy would run a simulation of its own, with a cache of its own.
-SIMULATIONS = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "PARTICLE_SYSTEM", "PARTICLE_INSTANCE", "EXPLODE"}
+SIMULATIONS = {
+    "CLOTH",
+    "SOFT_BODY",
+    "FLUID",
+    "DYNAMIC_PAINT",
+    "PARTICLE_SYSTEM",
+    "PARTICLE_INSTANCE",
+    "EXPLODE",
+}
 
 # These can change weights from one frame to the next.
-WEIGHT_CHANGERS = {"VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "DATA_TRANSFER", "NODES"}
+WEIGHT_CHANGERS = {
+    "VERTEX_WEIGHT_EDIT",
+    "VERTEX_WEIGHT_MIX",
+    "VERTEX_WEIGHT_PROXIMITY",
+    "DATA_TRANSFER",
+    "NODES",
+}
 
 
 def is_needed(obj: bpy.types.Object) -> bool:
@@ -103,7 +117,7 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
 
 
 def _signature(obj: bpy.types.Object) -> str:
-    """Differs where the copy would: the settings of what stands in front, and the shape key that is pinned."""
+    """Differs where the copy would: by the settings of what stands in front, and the pinned shape key."""
     pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
     animation = obj.animation_data
     action = animation.action.session_uid if animation is not None and animation.action is not None else 0

@@ -92,7 +92,11 @@ def _make_for_attribute() -> bpy.types.NodeTree:
         {"Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex")},
     )
     source, named, place, result = _nodes(
-        group, "NodeGroupInput", "GeometryNodeInputNamedAttribute", "GeometryNodeSetPosition", "NodeGroupOutput"
+        group,
+        "NodeGroupInput",
+        "GeometryNodeInputNamedAttribute",
+        "GeometryNodeSetPosition",
+        "NodeGroupOutput",
     )
     named.data_type = "FLOAT_VECTOR"
     group.links.new(source.outputs["Points"], named.inputs["Name"])
@@ -110,7 +114,10 @@ def _make_for_carrier() -> bpy.types.NodeTree:
         CARRIER,
         {
             "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
-            "Front": ("NodeSocketObject", "Object that has the modifiers in front, to be evaluated with this one"),
+            "Front": (
+                "NodeSocketObject",
+                "Object that has the modifiers in front, to be evaluated with this one",
+            ),
         },
     )
     source, info, index, position, sample, place, result = _nodes(

@@ -67,7 +67,9 @@ def separate(objects: list[bpy.types.Object]) -> None:
     for obj in objects:
         settings = properties.of(obj)
         held = {
-            ("carrier", settings.carrier.name_full) if settings.carrier else (obj.data.name_full, settings.attribute)
+            ("carrier", settings.carrier.name_full)
+            if settings.carrier
+            else (obj.data.name_full, settings.attribute)
         }
         if settings.front is not None:
             held.add(("front", settings.front.name_full))

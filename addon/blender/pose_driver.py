@@ -16,8 +16,8 @@ PATH = "sinew.pose"
 
 
 def ensure(obj: bpy.types.Object, bones: Sequence[tuple[bpy.types.Object, str]]) -> None:
-    """The driver reads exactly `bones`, each an armature and a bone's name. All bones that move vertices must be named: Blender
-    evaluates those, their parents and their constraints' targets, and no others."""
+    """The driver reads exactly `bones`, each an armature and a bone's name. All bones that move vertices must
+    be named: Blender evaluates those, their parents and their constraints' targets, and no others."""
     curve = _find(obj)
     if curve is not None:
         variables = curve.driver.variables

@@ -22,7 +22,9 @@ def register() -> None:
         return
     from . import handlers, operators, panels, properties
 
-    _register_classes((properties.SinewStandIn, properties.SinewSettings, *operators.CLASSES, *panels.CLASSES))
+    _register_classes(
+        (properties.SinewStandIn, properties.SinewSettings, *operators.CLASSES, *panels.CLASSES)
+    )
     bpy.types.Object.sinew = bpy.props.PointerProperty(
         type=properties.SinewSettings, override=properties.OVERRIDABLE
     )

@@ -32,7 +32,7 @@ def spread_over_joints(
     lengths       float [bones]
     segments      int [bones], 1 for a bone that does not bend
     first_joints  int [bones], index of the bone's first joint; its joints follow one another
-    curved        bool [bones], vertices are mapped along the bone's curve at rest, not along its straight line
+    curved        bool [bones], vertices are mapped along the bone's curve at rest, not its straight line
     """
     counts = influences.counts
     vertices = np.repeat(np.arange(len(counts)), counts)

@@ -95,7 +95,7 @@ class Binding:
         posed_from_rest: np.ndarray,
         out: np.ndarray,
     ) -> None:
-        """Deforms `rest_points` with the deformer that was bound for `purpose`, bound anew where it must be."""
+        """Deforms `rest_points` with the deformer bound for `purpose`, bound anew where it must be."""
         deformer, points = self._bound.get(purpose, (None, None))
         if deformer is None or deformer.method != method:
             deformer = self._bind(frame, rest_points, method)
@@ -120,9 +120,7 @@ class Binding:
 
     def _bind(self, frame: Frame, rest_points: np.ndarray, method: str) -> sinew.Deformer:
         space = frame.bones_from_model
-        influences = self.weighting.influences_over_joints(
-            frame.rest_points @ space[:3, :3].T + space[:3, 3]
-        )
+        influences = self.weighting.influences_over_joints(frame.rest_points @ space[:3, :3].T + space[:3, 3])
         return sinew.Deformer(
             rest_points,
             influences.offsets,

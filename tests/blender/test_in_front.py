@@ -211,7 +211,7 @@ def test_a_copy_has_points_of_its_own():
 
 
 def test_a_simulation_in_front_is_refused_with_a_sentence():
-    obj = arm_with("CLOTH")
+    arm_with("CLOTH")
     bpy.context.view_layer.update()
     before = snapshot.of_file()
     with pytest.raises(RuntimeError, match="Front in front of Armature is a simulation"):

@@ -142,7 +142,9 @@ def workbench(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "motion blur"])
 @pytest.mark.parametrize(
-    "set_up", [moving_parent, in_front, second_view_layer, persistent_data, workbench], ids=lambda f: f.__name__
+    "set_up",
+    [moving_parent, in_front, second_view_layer, persistent_data, workbench],
+    ids=lambda f: f.__name__,
 )
 def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
     obj, armature = scenes.make_arm()

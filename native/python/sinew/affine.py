@@ -172,7 +172,7 @@ def split_scale(posed_from_rest: NDArray[Float], rest_bone: NDArray[Float]) -> S
     rest_bone        the bone's rest axes, Y along the bone, and head in the same space; orthonormal
 
     Axes are made square keeping Y, as Blender's Armature modifier does for Preserve Volume; a mirror is in
-    `scale`. A motion within 1e-5 of orthonormal and 1e-4 of unit size has the identity for `scale`. `rigid` is
-    a rotation and a shift also where axes vanish.
+    `scale`. A motion within 1e-5 of orthonormal and 1e-4 of unit size has the identity for `scale`. `rigid`
+    is a rotation and a shift also where axes vanish.
     """
     return ScaleSplit(*_native.split_scale(posed_from_rest, rest_bone))
