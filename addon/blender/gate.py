@@ -2,8 +2,8 @@
 """Keeps Blender from evaluating a mesh twice where a change of frame itself makes it dirty.
 
 On a change of frame Blender evaluates, calls Sinew, and evaluates again what Sinew wrote. A mesh that moves,
-or whose shape keys do, comes up in the first round too, with the points of the last frame: all for nothing, and
-a simulation behind would run on the wrong shape. So its modifiers rest until the points are there.
+or whose shape keys do, comes up in the first round too, with the points of the last frame: all for nothing,
+and a simulation behind would run on the wrong shape. So its modifiers rest until the points are there.
 """
 
 from __future__ import annotations
