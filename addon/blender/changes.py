@@ -12,28 +12,33 @@ import bpy
 class Changes:
     """The data touched since the last update, by session_uid.
 
+    touched    objects that were touched in any way
     objects    whose geometry was touched
     moved      that were moved
     meshes     whose geometry was touched: points, weights, topology, shape keys
     armatures  whose bones may differ
     structure  objects may have come, gone or been hidden
     frame      this is a change of frame
+    complete   whatever is not listed is as it was at the last update; else all may have changed
     """
 
+    touched: set[int] = field(default_factory=set)
     objects: set[int] = field(default_factory=set)
     moved: set[int] = field(default_factory=set)
     meshes: set[int] = field(default_factory=set)
     armatures: set[int] = field(default_factory=set)
     structure: bool = False
     frame: bool = False
+    complete: bool = False
 
     @classmethod
-    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
-        changes = cls(frame=frame)
+    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:
+        changes = cls(frame=frame, complete=complete)
         for update in depsgraph.updates:
             what = update.id
             if isinstance(what, bpy.types.Object):
                 uid = what.original.session_uid
+                changes.touched.add(uid)
                 if update.is_updated_geometry:
                     changes.objects.add(uid)
                 if update.is_updated_transform:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -29,6 +29,8 @@ class Driven:
 
     armatures          the session_uid of each link's armature, 0 for none
     keyed              for each link, whether an animation decides when its modifier is on
+    watched            the session_uid of each object that the shape depends on
+    frames             what decided the last frame
     rest_points        of the last frame
     dirtied_by_frames  the last change of frame moved the object or its rest points
     """
@@ -40,9 +42,19 @@ class Driven:
     source: Source
     chain: Chain
     facts: RigFacts
+    watched: set[int] = field(default_factory=set)
+    frames: list[LinkFrame | None] | None = None
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
     milliseconds: float = 0.0
+
+    def is_untouched_by(self, changes: Changes) -> bool:
+        """Whether nothing that the shape depends on is among the changes."""
+        return (
+            changes.complete
+            and not (changes.structure or changes.armatures)
+            and self.watched.isdisjoint(changes.touched)
+        )
 
     @property
     def binding(self) -> Binding:
@@ -64,6 +76,8 @@ def update(
             "override to use Sinew here"
         )
     mode = obj.mode
+    if driven is not None and driven.mode == mode and driven.is_untouched_by(changes):
+        return driven
     if mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
         drive.switch(obj, on=False)
         return None
@@ -73,11 +87,14 @@ def update(
     driven = _current(obj, driven, depsgraph, changes)
     if driven is None:
         return None
+    if touched or not driven.watched:
+        driven.watched = {obj.session_uid, _uid(properties.of(obj).front), *driven.armatures}
     # Binding is not part of a frame's time: it happens once.
     started = time.perf_counter()
-    frames = _frames(obj, driven, depsgraph)
+    frames = _frames(obj, driven, depsgraph, changes)
     if frames is None:
         return driven
+    driven.frames = frames
     rest_points = source.rest_points(obj, driven.source, depsgraph)
     if changes.frame:
         reshaped = rest_points is not driven.rest_points
@@ -145,7 +162,7 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
 
 
 def _frames(
-    obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph
+    obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> list[LinkFrame | None] | None:
     """What decides each link's part in this frame; None where that is unknown, and the last shape stays."""
     evaluated = obj.evaluated_get(depsgraph)
@@ -159,7 +176,11 @@ def _frames(
             frames.append(None)
             continue
         evaluated_armature = armature.evaluated_get(depsgraph)
-        space = armature_io.bones_from_model(evaluated, evaluated_armature)
+        last = driven.frames[number] if driven.frames is not None and changes.complete else None
+        if last is not None and changes.moved.isdisjoint((obj.session_uid, armature.session_uid)):
+            space = last.bones_from_model
+        else:
+            space = armature_io.bones_from_model(evaluated, evaluated_armature)
         if space is None:
             # An armature scaled to nothing for a moment.
             return None

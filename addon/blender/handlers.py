@@ -26,6 +26,7 @@ class Session:
     objects: list[bpy.types.Object] | None = None
     object_count: int = 0
     driven: dict[int, Driven] = field(default_factory=dict)
+    depsgraph: int = 0  # the address of the one last seen
     gate: Gate = field(default_factory=Gate)
     updating: bool = False
 
@@ -36,6 +37,7 @@ class Session:
 
     def forget(self) -> None:
         self.objects = None
+        self.depsgraph = 0
         self.driven.clear()
 
 
@@ -131,6 +133,13 @@ def _turn_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: 
         log.error("%s", settings.error, exc_info=error)
 
 
+def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
+    """What an evaluation lists is all only to who saw the one before: a render has a depsgraph of its own."""
+    same = session.depsgraph == depsgraph.as_pointer()
+    session.depsgraph = depsgraph.as_pointer()
+    return Changes.read(depsgraph, frame, complete=same)
+
+
 @persistent
 def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     if session.idle or session.objects is None or not is_allowed():
@@ -145,13 +154,13 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     session.gate.open()
     if not session.idle:
-        _update(depsgraph, Changes.read(depsgraph, frame=True))
+        _update(depsgraph, _read_changes(depsgraph, frame=True))
 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not session.idle:
-        _update(depsgraph, Changes.read(depsgraph, frame=False))
+        _update(depsgraph, _read_changes(depsgraph, frame=False))
 
 
 @persistent

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -48,11 +49,11 @@ class Bones:
         rest = np.empty((0, 4, 4), dtype=np.float32)
         return cls((), flags, rest, none, numbers, flags, numbers, envelopes)
 
-    @property
+    @cached_property
     def bend(self) -> bool:
         return bool((self.segments > 1).any())
 
-    @property
+    @cached_property
     def rest_axes(self) -> np.ndarray:
         """`rest` with axes of unit length: a bendy bone's joints can be scaled at rest."""
         axes = self.rest.copy()
@@ -88,7 +89,7 @@ class Weighting:
     entries: Entries
     use_envelopes: bool
 
-    @property
+    @cached_property
     def depends_on_points(self) -> bool:
         multiply = bool(self.bones.envelopes.multiply[self.entries.bones].any())
         return self.bones.bend or multiply or self.use_envelopes

@@ -82,9 +82,26 @@ def test_info(arm_file):
                     "warnings": [],
                 }
             ],
+            "left_to_blender": [],
         }
     ]
     assert "252" in run_sinew("info", path).stdout
+
+
+def test_info_names_what_is_left_to_blender(tmp_path):
+    _obj, armature = scenes.make_arm()
+    lattice = bpy.data.objects.new("Cage", bpy.data.lattices.new("Cage"))
+    bpy.context.scene.collection.objects.link(lattice)
+    lattice.modifiers.new("Armature", "ARMATURE").object = armature
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "cage.blend"))
+    assert (
+        "left to their Armature modifiers: Cage (Lattice)"
+        in run_sinew("info", tmp_path / "cage.blend").stdout
+    )
+    lattice.select_set(True)
+    bpy.ops.sinew.add()
+    assert not any(properties.is_driven(o) for o in (lattice, armature))
+    assert lattice.modifiers["Armature"].object == armature
 
 
 def test_info_warns(tmp_path):

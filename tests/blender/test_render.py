@@ -140,10 +140,18 @@ def workbench(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     moving_parent(obj, armature)
 
 
+def eevee(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    if bpy.app.version < (5, 2, 0) or not bpy.context.scene.render.use_motion_blur:
+        pytest.skip("EEVEE takes long without a graphics card: rendered by the newest Blender only, blurred")
+    bpy.context.scene.render.engine = "BLENDER_EEVEE"
+    bpy.context.scene.eevee.taa_render_samples = 1
+    moving_parent(obj, armature)
+
+
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "motion blur"])
 @pytest.mark.parametrize(
     "set_up",
-    [moving_parent, in_front, second_view_layer, persistent_data, workbench],
+    [moving_parent, in_front, second_view_layer, persistent_data, workbench, eevee],
     ids=lambda f: f.__name__,
 )
 def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
