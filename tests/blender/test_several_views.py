@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One character seen more than once: in two scenes at different frames, and as an instance."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import scenes
+
+
+def points_in(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
+    mesh = obj.evaluated_get(scene.view_layers[0].depsgraph).data
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def instanced_points() -> np.ndarray:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    # What an instance says is void outside the loop.
+    for instance in depsgraph.object_instances:
+        if instance.is_instance and instance.object.type == "MESH":
+            mesh = instance.object.data
+            points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+            mesh.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def test_two_scenes_at_different_frames():
+    obj, armature = scenes.make_arm()
+    expected = {frame: scenes.shapes(obj, [frame])[0] for frame in (3, 9)}
+    first, second = bpy.context.scene, bpy.data.scenes.new("Second")
+    for each in (obj, armature):
+        second.collection.objects.link(each)
+    scenes.add_sinew(obj, "lbs")
+    for _round in range(2):
+        first.frame_set(3)
+        second.frame_set(9)
+        assert scenes.worst(points_in(obj, first), expected[3]) <= 1e-5
+        assert scenes.worst(points_in(obj, second), expected[9]) <= 1e-5
+        first.frame_set(3)
+        assert scenes.worst(points_in(obj, first), expected[3]) <= 1e-5
+
+
+def test_an_instanced_collection():
+    obj, armature = scenes.make_arm()
+    collection = bpy.data.collections.new("Character")
+    for each in (obj, armature):
+        bpy.context.scene.collection.objects.unlink(each)
+        collection.objects.link(each)
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    bpy.context.scene.collection.objects.link(empty)
+    expected = []
+    for frame in (1, 9):
+        bpy.context.scene.frame_set(frame)
+        expected.append(instanced_points())
+    scenes.add_sinew(obj, "lbs")
+    for frame, points in zip((1, 9), expected, strict=True):
+        bpy.context.scene.frame_set(frame)
+        assert scenes.worst(instanced_points(), points) <= 1e-5
