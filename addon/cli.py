@@ -14,9 +14,16 @@ _commands: list[object] = []
 
 def main(argv: list[str]) -> int:
     """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
-    from .commands import compare, console, info, methods, points, reskin
+    from .commands import compare, console, inbetween, info, methods, points, reskin
 
-    modules = {"methods": methods, "info": info, "points": points, "reskin": reskin, "compare": compare}
+    modules = {
+        "methods": methods,
+        "info": info,
+        "points": points,
+        "reskin": reskin,
+        "inbetween": inbetween,
+        "compare": compare,
+    }
     parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")
     parser.add_argument("--verbose", action="store_true", help="show what Blender prints")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import pose_driver
+from . import actions, pose_driver
 
 
 def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
@@ -19,11 +19,12 @@ def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
         if action is None or action.users > 1:
             continue
         removed = 0
-        for curves in _curve_lists(player):
+        for curves in actions.curve_lists(action, actions.slot_of(player)):
             for curve in [c for c in curves if c.data_path.startswith(path)]:
                 curves.remove(curve)
                 removed += 1
-        if removed and player is animation and not any(len(curves) for curves in _curve_lists(player)):
+        left = actions.curve_lists(action, actions.slot_of(player))
+        if removed and player is animation and not any(len(curves) for curves in left):
             animation.action = None
             bpy.data.actions.remove(action)
 
@@ -46,7 +47,7 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
         return set()
     lists = [animation.drivers]
     if animation.action is not None:
-        lists += _curve_lists(animation)
+        lists += actions.curve_lists(animation.action, actions.slot_of(animation))
     return {curve.data_path for curves in lists for curve in curves}
 
 
@@ -54,15 +55,3 @@ def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) 
     """Whether keys or drivers decide when a modifier is on."""
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
     return any(path.startswith(start) for path in animated_paths(obj))
-
-
-def _curve_lists(player: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.bpy_prop_collection]:
-    """The F-curves that `player` plays: an action's own up to 4.3, those of its slot since 4.4."""
-    action = player.action
-    slot = getattr(player, "action_slot", None)
-    if not hasattr(action, "layers"):
-        return [action.fcurves]
-    if slot is None:
-        return []
-    bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips]
-    return [bag.fcurves for bag in bags if bag is not None]

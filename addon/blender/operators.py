@@ -8,15 +8,27 @@ from collections.abc import Callable
 import bpy
 
 from ..core.errors import SinewError
-from . import drive, handlers, properties
+from . import drive, handlers, inbetween, inbetween_bake, properties
 
 
-def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The meshes meant: those active or selected, and all that a selected or active armature deforms."""
+def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The objects selected or active."""
     chosen = list(context.selected_objects)
     active = context.active_object
     if active is not None and active not in chosen:
         chosen.append(active)
+    return chosen
+
+
+def armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The armatures meant: those selected or active, and those of such meshes; the active one first."""
+    found = {o if o.type == "ARMATURE" else drive.armature_of(o) for o in _chosen(context)} - {None}
+    return sorted(found, key=lambda o: (o != context.active_object, o.name))
+
+
+def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The meshes meant: those active or selected, and all that a selected or active armature deforms."""
+    chosen, active = _chosen(context), context.active_object
     armatures = {o for o in chosen if o.type == "ARMATURE"}
     meshes = [
         o
@@ -115,4 +127,43 @@ class SINEW_OT_remove(_OnDriven, bpy.types.Operator):
         return result
 
 
-CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove)
+class SINEW_OT_bake_inbetweens(bpy.types.Operator):
+    bl_idname = "sinew.bake_inbetweens"
+    bl_label = "Bake In-betweens"
+    bl_description = (
+        "Write the in-betweens as plain keys into a copy of the action, which plays without Sinew; the "
+        "action itself stays in the file"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    step: bpy.props.IntProperty(
+        name="Step", description="Frames from one baked key to the next", default=1, min=1, soft_max=12
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if any(inbetween.is_on(armature) for armature in armatures(context)):
+            return True
+        cls.poll_message_set("Choose a method for the in-betweens of a selected armature")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        manager = context.window_manager
+        manager.progress_begin(0.0, 1.0)
+        baked = []
+        try:
+            for armature in filter(inbetween.is_on, armatures(context)):
+                try:
+                    baked.append(inbetween_bake.bake(armature, self.step, manager.progress_update))
+                except SinewError as error:
+                    self.report({"ERROR"}, str(error))
+        finally:
+            manager.progress_end()
+        if not baked:
+            return {"CANCELLED"}
+        names = ", ".join(f"{one.bones} bones into {one.action.name}" for one in baked)
+        self.report({"INFO"}, f"Baked {names}")
+        return {"FINISHED"}
+
+
+CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove, SINEW_OT_bake_inbetweens)

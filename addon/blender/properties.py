@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 import sinew
 
+from ..core import inbetween
 from ..core.scale_rule import SCALE_RULES
 
 METHODS = {method.name: method for method in sinew.methods()}
@@ -20,6 +22,7 @@ class Listeners:
 
     method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    inbetween_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
 
 
 listeners = Listeners()
@@ -167,3 +170,64 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
 def clear(obj: bpy.types.Object) -> None:
     """Takes Sinew's settings out of the object, as if they had never been."""
     obj.property_unset("sinew")
+
+
+def _inbetween_changed(armature: bpy.types.Object, context: bpy.types.Context) -> None:
+    if listeners.inbetween_changed is not None:
+        listeners.inbetween_changed(armature, context)
+
+
+class SinewActionHold(bpy.types.PropertyGroup):
+    """A slot of an action whose bones Sinew plays; its name is the slot's handle, 0 where there are none."""
+
+    muted: bpy.props.StringProperty(description="The curves that the artist had muted")
+
+    def muted_by_artist(self) -> set[tuple[str, int]]:
+        return {(path, index) for path, index in json.loads(self.muted or "[]")}
+
+    def set_muted_by_artist(self, curves: set[tuple[str, int]]) -> None:
+        text = json.dumps(sorted(curves)) if curves else ""
+        if self.muted != text:
+            self.muted = text
+
+
+CLASSES = (SinewStandIn, SinewSettings, SinewActionHold)
+
+# Properties of objects themselves, as a group that the linked file does not have is lost from a library
+# override on saving (Blender 5.0 and 5.2).
+INBETWEEN = {
+    "sinew_inbetween": bpy.props.EnumProperty(
+        name="In-betweens",
+        description="How the bones move between the keyed poses of the action",
+        items=[
+            (inbetween.BLENDER, "Blender's Curves", "Each channel by its own curve, as without Sinew", 0),
+            *((m.name, m.label, m.description, m.number) for m in inbetween.METHODS.values()),
+        ],
+        default=inbetween.BLENDER,
+        options=set(),
+        override=OVERRIDABLE,
+        update=_inbetween_changed,
+    ),
+    "sinew_inbetween_path": bpy.props.EnumProperty(
+        name="Path",
+        description="Which keyed poses shape the way from one to the next",
+        items=[
+            (
+                inbetween.STRAIGHT,
+                "Key to Key",
+                "The two neighbours, at the pace of the keys' own interpolation",
+                0,
+            ),
+            (
+                inbetween.SPLINE,
+                "Spline",
+                "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace",
+                1,
+            ),
+        ],
+        default=inbetween.STRAIGHT,
+        options=set(),
+        override=OVERRIDABLE,
+        update=_inbetween_changed,
+    ),
+}

@@ -20,14 +20,18 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from . import handlers, operators, panels, properties
+    from . import handlers, inbetween_handlers, operators, panels, properties
 
-    _register_classes(
-        (properties.SinewStandIn, properties.SinewSettings, *operators.CLASSES, *panels.CLASSES)
-    )
+    _register_classes((*properties.CLASSES, *operators.CLASSES, *panels.CLASSES))
     bpy.types.Object.sinew = bpy.props.PointerProperty(
         type=properties.SinewSettings, override=properties.OVERRIDABLE
     )
+    bpy.types.Action.sinew_holds = bpy.props.CollectionProperty(type=properties.SinewActionHold)
+    for name, choice in properties.INBETWEEN.items():
+        setattr(bpy.types.Object, name, choice)
+    # Poses come before what they deform.
+    inbetween_handlers.register()
+    inbetween_handlers.adopt_open_file()
     handlers.register()
     handlers.adopt_open_file()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
@@ -37,15 +41,18 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import drive, handlers, properties
+        from . import drive, handlers, inbetween_handlers, properties
 
         atexit.unregister(unregister)
         handlers.unregister()
+        inbetween_handlers.unregister()
         # As in a saved file: the Armature modifiers point to their armatures again.
         for obj in bpy.data.objects:
             if properties.is_driven(obj):
                 drive.give_back(obj)
-        del bpy.types.Object.sinew
+        del bpy.types.Object.sinew, bpy.types.Action.sinew_holds
+        for name in properties.INBETWEEN:
+            delattr(bpy.types.Object, name)
     while _registered:
         bpy.utils.unregister_class(_registered.pop())
 

@@ -35,7 +35,7 @@ def draw_text(
 ) -> None:
     """Text broken into as many labels as the sidebar's width asks for."""
     scale = context.preferences.system.ui_scale
-    width = max(20, int(context.region.width / scale * CHARACTERS_PER_PIXEL))
+    width = max(20, int(context.region.width / scale * CHARACTERS_PER_PIXEL) - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8

@@ -47,7 +47,7 @@ def arm_file(tmp_path):
 
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    for command in ("methods", "info", "points", "reskin", "compare"):
+    for command in ("methods", "info", "points", "reskin", "inbetween", "compare"):
         assert "usage: sinew" in run_sinew(command, "--help").stdout
 
 
@@ -260,3 +260,77 @@ def test_the_method_asked_for_wins_over_keys_and_any_object_name_is_written(tmp_
     run_sinew("points", tmp_path / "keyed.blend", "--method", "dq", "--frames", "11", "--out", out)
     with np.load(out) as points:
         assert scenes.worst(points["file"], expected) <= 1e-5
+
+
+def bones_of(armature: bpy.types.Object, frames: list[int]) -> np.ndarray:
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        result.append(np.array([bone.matrix for bone in shown.pose.bones]))
+    return np.array(result)
+
+
+@pytest.fixture
+def keyed_file(tmp_path):
+    """Two armatures, and what their bones do by ScLERP on a spline: file, and [11, bones, 4, 4] of each."""
+    armatures = [scenes.make_arm(bones=3, name=name)[1] for name in ("Left", "Right")]
+    frames = list(range(1, 12))
+    blender = bones_of(armatures[0], frames)
+    for armature in armatures:
+        armature.sinew_inbetween_path, armature.sinew_inbetween = "spline", "sclerp"
+    expected = [bones_of(armature, frames) for armature in armatures]
+    assert np.abs(expected[0] - blender).max() > 0.01
+    for armature in armatures:
+        armature.sinew_inbetween = "blender"
+    path = tmp_path / "keyed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path, expected
+
+
+@pytest.mark.parametrize("live", [False, True], ids=["baked", "live"])
+def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
+    path, expected = keyed_file
+    before = path.read_bytes()
+    options = ["--method", "sclerp", "--spline", "--out", tmp_path / "out"]
+    result = run_sinew("inbetween", path, *options, *(["--live"] if live else []))
+    assert "1 of 1 files" in result.stdout
+    assert path.read_bytes() == before
+    files.open_file(tmp_path / "out" / "keyed.blend")
+    for name, bones in zip(("Left Rig", "Right Rig"), expected, strict=True):
+        armature = bpy.data.objects[name]
+        assert armature.sinew_inbetween == ("sclerp" if live else "blender")
+        assert np.abs(bones_of(armature, list(range(1, 12))) - bones).max() < 1e-5
+    assert len(bpy.data.actions) == (2 if live else 4), "the keyed actions stay in the file"
+    assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
+
+
+def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
+    path, _expected = keyed_file
+    left, right = bpy.data.objects["Left Rig"], bpy.data.objects["Right Rig"]
+    right.animation_data.nla_tracks.new().strips.new("Walk", 1, right.animation_data.action)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "strips.blend"))
+    left.animation_data_clear()
+    right.animation_data_clear()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "still.blend"))
+    out = ["--out", tmp_path / "out"]
+    cases = [
+        ([path, "--method", "best", *out], "expected one of matrix_linear"),
+        ([path, "--method", "dlb", "--step", "0", *out], "step"),
+        ([path, "--method", "dlb", "--out", path.parent], "replace an input"),
+        ([tmp_path / "still.blend", "--method", "dlb", *out], "keyed bones"),
+        ([tmp_path / "strips.blend", "--method", "dlb", *out], "NLA strips (Walk)"),
+    ]
+    for arguments, sentence in cases:
+        result = run_sinew("inbetween", *arguments, status=1)
+        complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
+        assert len(complaints) == 1, result.stderr
+        assert sentence in complaints[0]
+    # The armature that nothing stands in the way of was done.
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["strips.blend"]
+
+
+def test_inbetween_reads_glb_files(real_rig, tmp_path):
+    result = run_sinew("inbetween", real_rig("Fox.glb"), "--method", "dlb", "--step", 4, "--out", tmp_path)
+    assert "1 of 1 files" in result.stdout
+    assert (tmp_path / "Fox.blend").exists()

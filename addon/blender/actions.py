@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The F-curves of an action that move bones: which they are, their keys, and holding them.
+
+A slot of an action is held while Sinew plays its bones: their curves are muted, so that Blender leaves those
+channels alone, and everything else in the action plays on. What the artist had muted is kept in the action
+(properties.SinewActionHold), where undo and copies take it along.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+# The first column of each of a bone's channels, as in pose_io.read_channels().
+COLUMNS = {
+    "location": 0,
+    "rotation_quaternion": 3,
+    "rotation_axis_angle": 3,
+    "rotation_euler": 3,
+    "scale": 7,
+}
+_BONE_PATH = re.compile(rf'pose\.bones\["(.*)"\]\.({"|".join(COLUMNS)})')
+
+REPEATING = {"REPEAT", "REPEAT_OFFSET"}
+
+
+class Channel(NamedTuple):
+    """What a curve moves: a property of a bone, and where that stands in its row of channels."""
+
+    bone: str
+    property: str
+    column: int
+
+
+def slot_of(player: bpy.types.AnimData | bpy.types.NlaStrip) -> bpy.types.bpy_struct | None:
+    """The slot that `player` plays of its action; None up to Blender 4.3, which has none."""
+    return getattr(player, "action_slot", None)
+
+
+def handle_of(slot: bpy.types.bpy_struct | None) -> int:
+    return slot.handle if slot is not None else 0
+
+
+def curve_lists(
+    action: bpy.types.Action, slot: bpy.types.bpy_struct | None
+) -> list[bpy.types.bpy_prop_collection]:
+    """The F-curves for `slot`: an action's own up to 4.3, those of its slot since 4.4."""
+    if not hasattr(action, "layers"):
+        return [action.fcurves]
+    if slot is None:
+        return []
+    bags = [strip.channelbag(slot) for layer in action.layers for strip in layer.strips]
+    return [bag.fcurves for bag in bags if bag is not None]
+
+
+def all_curves(action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None) -> list[bpy.types.FCurve]:
+    return [curve for curves in curve_lists(action, slot) for curve in curves] if action is not None else []
+
+
+def channel_of(curve: bpy.types.FCurve) -> Channel | None:
+    """What of a bone's transform the curve moves; None where it moves something else."""
+    found = _bone_property(curve.data_path)
+    return Channel(*found, COLUMNS[found[1]] + curve.array_index) if found else None
+
+
+@functools.lru_cache(maxsize=100_000)
+def _bone_property(path: str) -> tuple[str, str] | None:
+    match = _BONE_PATH.fullmatch(path)
+    return (bpy.utils.unescape_identifier(match[1]), match[2]) if match else None
+
+
+def bone_curves(
+    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
+) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
+    """The curves that move bones, by bone."""
+    bones: dict[str, list[tuple[bpy.types.FCurve, Channel]]] = {}
+    for curve in all_curves(action, slot):
+        channel = channel_of(curve)
+        if channel is not None:
+            bones.setdefault(channel.bone, []).append((curve, channel))
+    return bones
+
+
+def key_times(curves: Sequence[bpy.types.FCurve]) -> np.ndarray:
+    """The times at which any of the curves has a key, ascending, float32."""
+    times = [_key_points(curve)[:, 0] for curve in curves]
+    # Keyed poses have keys in all channels: seldom is there anything to sort.
+    if len({array.tobytes() for array in times}) == 1:
+        return times[0]
+    return np.unique(np.concatenate(times))
+
+
+def _key_points(curve: bpy.types.FCurve) -> np.ndarray:
+    points = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    return points.reshape(-1, 2)
+
+
+def gains_of_a_round(
+    curves: Sequence[bpy.types.FCurve], times: np.ndarray, onwards: bool
+) -> np.ndarray | None:
+    """What each of a bone's curves gains, [curves], from one round of its keys at `times` to the next, where
+    they repeat after the last (`onwards`) or before the first; None where they do not, or not in step."""
+    gains = []
+    for curve in curves:
+        modifiers = [m for m in curve.modifiers if not m.mute]
+        if len(modifiers) != 1 or modifiers[0].type != "CYCLES" or len(curve.keyframe_points) < 2:
+            return None
+        modifier = modifiers[0]
+        mode, count = (
+            (modifier.mode_after, modifier.cycles_after)
+            if onwards
+            else (modifier.mode_before, modifier.cycles_before)
+        )
+        first, last = curve.keyframe_points[0].co, curve.keyframe_points[-1].co
+        limited = count or modifier.use_restricted_range or modifier.use_influence
+        if mode not in REPEATING or limited or first[0] != times[0] or last[0] != times[-1]:
+            return None
+        gains.append(last[1] - first[1] if mode == "REPEAT_OFFSET" else 0.0)
+    return np.array(gains)
+
+
+def hold_still(curves: Sequence[bpy.types.FCurve], times: np.ndarray) -> np.ndarray:
+    """At which of `times` the curves all hold the value of a key up to the next (interpolation Constant)."""
+    still = np.ones(len(times), dtype=bool)
+    for curve in curves:
+        kinds = np.empty(len(curve.keyframe_points), dtype=np.int32)
+        curve.keyframe_points.foreach_get("interpolation", kinds)
+        key = np.searchsorted(_key_points(curve)[:, 0], times, side="right") - 1
+        still &= (key >= 0) & (kinds[key] == key_value("interpolation", "CONSTANT"))
+        if not still.any():
+            break
+    return still
+
+
+@functools.cache
+def key_value(name: str, choice: str) -> int:
+    """The number that stands for a choice of a key's property in arrays of Blender's."""
+    return bpy.types.Keyframe.bl_rna.properties[name].enum_items[choice].value
+
+
+def reason_against(curves: Sequence[bpy.types.FCurve]) -> str | None:
+    """Why a bone's curves can not be keyed poses; None where they can."""
+    if not all(len(curve.keyframe_points) for curve in curves):
+        return "has a curve without keys"
+    for curve in curves:
+        others = {m.type for m in curve.modifiers if not m.mute} - {"CYCLES"}
+        if others:
+            return f"has an F-curve modifier ({', '.join(sorted(others)).lower()})"
+    return None
+
+
+def hold(
+    action: bpy.types.Action, slot: bpy.types.bpy_struct | None, rotations: dict[str, str]
+) -> dict[str, str]:
+    """Mutes the curves of bones that Sinew can play; done again, it takes in what has come since.
+
+    rotations  the property that turns each bone, by its name
+    Returns the bones that are left to Blender, and why.
+    """
+    name = str(handle_of(slot))
+    record = action.sinew_holds.get(name)
+    known = record is not None
+    if record is None:
+        record = action.sinew_holds.add()
+        record.name = name
+    muted = record.muted_by_artist()
+    left = {}
+    for bone, pairs in bone_curves(action, slot).items():
+        for curve, _channel in pairs:
+            if not known and curve.mute:
+                muted.add(key_of(curve))
+            elif known and not curve.mute:
+                muted.discard(key_of(curve))
+        playing = [
+            curve
+            for curve, channel in pairs
+            if key_of(curve) not in muted and plays(channel, rotations.get(bone))
+        ]
+        reason = reason_against(playing)
+        if reason is not None:
+            left[bone] = reason
+            playing = []
+        for curve, _channel in pairs:
+            _set_mute(curve, curve in playing or key_of(curve) in muted)
+    record.set_muted_by_artist(muted)
+    return left
+
+
+def release(action: bpy.types.Action, handle: int) -> None:
+    """Gives the curves of a held slot back as the artist had them."""
+    index = action.sinew_holds.find(str(handle))
+    if index < 0:
+        return
+    muted = action.sinew_holds[index].muted_by_artist()
+    slot = next((s for s in getattr(action, "slots", ()) if s.handle == handle), None)
+    for pairs in bone_curves(action, slot).values():
+        for curve, _channel in pairs:
+            _set_mute(curve, key_of(curve) in muted)
+    action.sinew_holds.remove(index)
+    if not action.sinew_holds:
+        action.property_unset("sinew_holds")
+
+
+def held_curves(
+    action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
+) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
+    """The curves that Sinew plays, by bone; empty where the slot is not held."""
+    record = action.sinew_holds.get(str(handle_of(slot))) if action is not None else None
+    if record is None:
+        return {}
+    muted = record.muted_by_artist()
+    held = {}
+    for bone, pairs in bone_curves(action, slot).items():
+        pairs = [pair for pair in pairs if pair[0].mute and key_of(pair[0]) not in muted]
+        if pairs:
+            held[bone] = pairs
+    return held
+
+
+def key_of(curve: bpy.types.FCurve) -> tuple[str, int]:
+    return curve.data_path, curve.array_index
+
+
+def plays(channel: Channel, rotation: str | None) -> bool:
+    """Whether the channel plays a part where `rotation` turns its bone: not a rotation of another mode, nor
+    anything of a bone that is gone."""
+    return rotation is not None and channel.property in ("location", "scale", rotation)
+
+
+def _set_mute(curve: bpy.types.FCurve, mute: bool) -> None:
+    # Every assignment makes Blender evaluate the action again.
+    if curve.mute != mute:
+        curve.mute = mute

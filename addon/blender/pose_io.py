@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pose bones' location, rotation and scale from and to Blender, in any rotation mode."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Euler, Quaternion
+
+from ..core.inbetween import Poses
+
+CHANNELS = 10
+
+ROTATION_PROPERTIES = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+
+
+def rotation_properties(bones: bpy.types.bpy_prop_collection) -> dict[str, str]:
+    """By name, the one of each pose bone's three rotations that turns it."""
+    return {bone.name: ROTATION_PROPERTIES.get(bone.rotation_mode, "rotation_euler") for bone in bones}
+
+
+def read_channels(bones: bpy.types.bpy_prop_collection) -> np.ndarray:
+    """float32 [bones, 10]: location 3, rotation 4 (Euler angles: 3 and a 0), scale 3 of pose bones as set."""
+    channels = np.zeros((len(bones), CHANNELS), dtype=np.float32)
+    for name, columns, rows in _channel_blocks(bones):
+        width = columns.stop - columns.start
+        channels[rows, columns] = _read_channel(bones, name, width)[rows]
+    return channels
+
+
+def write_channels(bones: bpy.types.bpy_prop_collection, channels: np.ndarray) -> bool:
+    """Sets what differs from `channels`, as read_channels() has them; whether anything did."""
+    changed = False
+    for name, columns, rows in _channel_blocks(bones):
+        values = _read_channel(bones, name, columns.stop - columns.start)
+        if not np.array_equal(values[rows], channels[rows, columns]):
+            values[rows] = channels[rows, columns]
+            bones.foreach_set(name, values.ravel())
+            changed = True
+    return changed
+
+
+def _channel_blocks(
+    bones: bpy.types.bpy_prop_collection,
+) -> list[tuple[str, slice, np.ndarray]]:
+    """Each property of the channels, its columns and the bones (rows) that are moved by it."""
+    rotations = np.array(list(rotation_properties(bones).values()))
+    everything = np.ones(len(bones), dtype=bool)
+    blocks = [("location", slice(0, 3), everything), ("scale", slice(7, 10), everything)]
+    for name in np.unique(rotations):
+        width = 3 if name == "rotation_euler" else 4
+        blocks.append((str(name), slice(3, 3 + width), rotations == name))
+    return blocks
+
+
+def _read_channel(bones: bpy.types.bpy_prop_collection, name: str, width: int) -> np.ndarray:
+    flat = np.empty(width * len(bones), dtype=np.float32)
+    bones.foreach_get(name, flat)
+    return flat.reshape(-1, width)
+
+
+def poses_of(channels: np.ndarray, modes: np.ndarray) -> Poses:
+    """Bones' transforms relative to their rest, from channels [bones, 10] in rotation `modes` [bones]. A
+    quaternion or an axis of length 0 is no rotation."""
+    rigid = np.empty((len(channels), 7))
+    for mode in np.unique(modes):
+        rows = modes == mode
+        rigid[rows, :4] = _quaternions(channels[rows, 3:7], str(mode))
+    rigid[:, 4:] = channels[:, :3]
+    return Poses(rigid, channels[:, 7:].astype(np.float64))
+
+
+def channels_of(poses: Poses, modes: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """What poses_of() undoes, float64 [bones, 10]; of the ways to write a rotation that close to `near`."""
+    channels = np.zeros((len(modes), CHANNELS))
+    channels[:, :3], channels[:, 7:] = poses.rigid[:, 4:], poses.scale
+    for mode in np.unique(modes):
+        rows = modes == mode
+        rotations = _rotations(poses.rigid[rows, :4], str(mode), near[rows, 3:7])
+        channels[rows, 3 : 3 + rotations.shape[1]] = rotations
+    return channels
+
+
+def closer(channels: np.ndarray, modes: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """`channels` with rotations that are written far from `near` written anew: the other quaternion, angles
+    without the full turns between them."""
+    quaternions = modes == "QUATERNION"
+    against = (channels[:, 3:7] * near[:, 3:7]).sum(axis=1) < 0.0
+    turned = np.abs(channels[:, 3:7] - near[:, 3:7]).max(axis=1) > np.pi
+    far = np.where(quaternions, against, turned)[:, None]
+    return np.where(far, channels_of(poses_of(channels, modes), modes, near), channels)
+
+
+def _quaternions(rotations: np.ndarray, mode: str) -> np.ndarray:
+    if mode not in ROTATION_PROPERTIES:
+        return np.array(
+            [Euler(angles, mode).to_quaternion() for angles in rotations[:, :3]], dtype=np.float64
+        )
+    if mode == "QUATERNION":
+        return _unit(rotations.astype(np.float64), otherwise=(1.0, 0.0, 0.0, 0.0))
+    axes = _unit(rotations[:, 1:].astype(np.float64), otherwise=(0.0, 0.0, 0.0))
+    half = 0.5 * rotations[:, :1].astype(np.float64)
+    is_turn = axes.any(axis=1, keepdims=True)
+    return np.concatenate([np.where(is_turn, np.cos(half), 1.0), np.sin(half) * axes], axis=1)
+
+
+def _rotations(quaternions: np.ndarray, mode: str, near: np.ndarray) -> np.ndarray:
+    if mode not in ROTATION_PROPERTIES:
+        return np.array(
+            [
+                Quaternion(quaternion).to_euler(mode, Euler(angles, mode))
+                for quaternion, angles in zip(quaternions, near[:, :3], strict=True)
+            ]
+        )
+    if mode == "QUATERNION":
+        return np.where((quaternions * near).sum(axis=1, keepdims=True) < 0.0, -quaternions, quaternions)
+    away = (quaternions[:, 1:] * near[:, 1:]).sum(axis=1, keepdims=True) < 0.0
+    quaternions = np.where(away, -quaternions, quaternions)
+    sines = np.linalg.norm(quaternions[:, 1:], axis=1)
+    turns = 2.0 * np.arctan2(sines, quaternions[:, 0])
+    rounds = np.round((near[:, 0] - turns) / (2.0 * np.pi))
+    # No turn has any axis: it keeps the one that it has.
+    axes = np.where(sines[:, None] > 0.0, quaternions[:, 1:], near[:, 1:])
+    return np.column_stack([turns + 2.0 * np.pi * rounds, _unit(axes, otherwise=(0.0, 1.0, 0.0))])
+
+
+def _unit(vectors: np.ndarray, otherwise: tuple[float, ...]) -> np.ndarray:
+    """Each row at length 1; `otherwise` in the place of one of length 0."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(
+        vectors, lengths, out=np.broadcast_to(otherwise, vectors.shape).copy(), where=lengths > 0.0
+    )

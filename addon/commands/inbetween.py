@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew inbetween`: copies of files whose bones move between their keyed poses by a method of Sinew."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..core.errors import SinewError
+from ..core.jobs import Job, plan_jobs
+from .console import Console
+
+HELP = """\
+Writes a copy of each file in which every armature with keyed poses moves between them by the method chosen,
+instead of by the F-curves of single channels. Inputs are never written to. A folder stands for all .blend
+files below it.
+
+The in-betweens are baked: plain keys in a new action, beside the old one, that any Blender plays. With --live
+the copy keeps its action and has the choice only, for a Blender with Sinew, where keys can still be edited.
+Constraints and drivers act after the in-betweens, as always. NLA strips, actions of several layers, and bones
+whose curves have modifiers other than Cycles are left to Blender."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    import sinew
+
+    parser = subparsers.add_parser(
+        "inbetween",
+        help="write copies of files whose bones move between keyed poses by a method of Sinew",
+        description=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("inputs", nargs="+", type=Path, metavar="FILE_OR_FOLDER")
+    names = ", ".join(sinew.interpolate.METHODS)
+    parser.add_argument("--method", required=True, help=f"one of {names}")
+    parser.add_argument(
+        "--spline", action="store_true", help="a Catmull-Rom spline through the keyed poses, not key to key"
+    )
+    parser.add_argument(
+        "--step", type=int, default=1, metavar="FRAMES", help="from one baked key to the next (default: 1)"
+    )
+    parser.add_argument("--live", action="store_true", help="keep the action, do not bake: for Sinew to play")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the copies")
+    parser.add_argument("--overwrite", action="store_true", help="replace copies that are there already")
+    return parser
+
+
+@dataclass
+class Outcome:
+    """What became of one file."""
+
+    job: Job
+    armatures: int = 0
+    bones: int = 0
+    left_out: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    error: str | None = None
+
+    @property
+    def failed(self) -> bool:
+        return self.error is not None or bool(self.left_out)
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    import sinew
+
+    if args.method not in sinew.interpolate.METHODS:
+        names = ", ".join(sinew.interpolate.METHODS)
+        raise SinewError(f"method: expected one of {names}, got {args.method!r}")
+    if args.step < 1:
+        raise SinewError(f"step: expected 1 or more frames, got {args.step}")
+    jobs = plan_jobs(args.inputs, args.out)
+    outcomes = []
+    for job in console.progress(jobs, len(jobs), "Making in-betweens"):
+        outcome = _inbetween(job, args)
+        if outcome.error is not None:
+            console.complain(outcome.error)
+        for reason in outcome.left_out:
+            console.complain(f"{job.source}: left as it was: {reason}")
+        for note in outcome.notes:
+            console.note(f"{job.source}: {note}")
+        outcomes.append(outcome)
+    console.table(
+        ("file", "armatures", "bones", "result"),
+        [(str(o.job.source), str(o.armatures), str(o.bones), _result(o)) for o in outcomes],
+    )
+    failures = sum(outcome.failed for outcome in outcomes)
+    console.say(f"{len(outcomes) - failures} of {len(outcomes)} files with in-betweens by {args.method}")
+    return 1 if failures else 0
+
+
+def _inbetween(job: Job, args: argparse.Namespace) -> Outcome:
+    import bpy
+
+    from ..blender import actions, files, inbetween, inbetween_bake, inbetween_handlers
+    from ..core import inbetween as core
+
+    outcome = Outcome(job)
+    path = core.SPLINE if args.spline else core.STRAIGHT
+    try:
+        if job.target.exists() and not args.overwrite:
+            raise SinewError(f"{job.target}: is there already; use --overwrite to replace it")
+        files.open_file(job.source)
+        armatures = [
+            obj
+            for obj in bpy.data.objects
+            if obj.type == "ARMATURE" and obj.is_editable and actions.bone_curves(*inbetween.action_of(obj))
+        ]
+        if not armatures:
+            raise SinewError(f"{job.source}: no armature plays an action with keyed bones; nothing written")
+        for armature in armatures:
+            armature.sinew_inbetween_path = path
+            armature.sinew_inbetween = args.method
+        for armature in armatures:
+            player, reason = inbetween_handlers.player_of(armature), inbetween_handlers.problem_of(armature)
+            if player is None or not player.bones:
+                outcome.left_out.append(reason or f"{armature.name}: no bone that Sinew can play")
+                armature.sinew_inbetween = core.BLENDER
+                continue
+            outcome.notes += [f"{bone} {why}: left to Blender" for bone, why in sorted(player.left.items())]
+            outcome.armatures += 1
+            outcome.bones += player.bones
+            if not args.live:
+                far = inbetween_bake.bake(armature, args.step).far
+                outcome.notes += [f"{bone} {core.TOO_FAR[path]}" for bone in sorted(far)]
+        if not outcome.armatures:
+            raise SinewError(f"{job.source}: {outcome.left_out.pop()}; nothing written")
+        files.save_copy(job.source, job.target)
+    except SinewError as error:
+        outcome.error = str(error)
+    return outcome
+
+
+def _result(outcome: Outcome) -> str:
+    if outcome.error is not None:
+        return "failed"
+    if outcome.left_out:
+        return f"{outcome.job.target}, {len(outcome.left_out)} left as they were"
+    return str(outcome.job.target)

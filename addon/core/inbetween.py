@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What lies between keyed poses: `sinew.interpolate` and `sinew.spline` on bones that have a scale, too.
+
+Every bone is on its own, relative to its parent; made from transforms relative to the root, bones would
+leave their parents' ends (Smith 2013, figure 3.3). The method makes the rigid part; the scale is the mean of
+the keyed scales, by the same weights.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import sinew
+from sinew import affine, interpolate, quat_vec, spline
+
+# The choice beside METHODS: the action's own curves.
+BLENDER = "blender"
+
+# From key to key, or on a spline through four.
+STRAIGHT, SPLINE = "straight", "spline"
+
+# How far past its keys a timing may carry a bone, as a part of the way between them. Easing of type Elastic
+# swings by an amount of its own, however short the way; keys that differ by a rounding are not thrown far.
+FARTHEST = (-10.0, 11.0)
+
+
+class Method(NamedTuple):
+    """A way of interpolating, named as in sinew.interpolate.METHODS."""
+
+    name: str
+    label: str
+    description: str
+    number: int
+
+
+# The number is what files hold.
+METHODS = {
+    method.name: method
+    for method in (
+        Method(
+            "matrix_linear",
+            "Matrix, linear",
+            "Matrices component by component: bones grow thin between keys turned far from each other",
+            1,
+        ),
+        Method("matrix_polar", "Matrix, made rigid", "The same, brought back to the nearest rotation", 2),
+        Method(
+            "matrix_log",
+            "Matrix, logarithm",
+            "Logarithms of matrices: not the shortest way, and dependent on the rest pose",
+            3,
+        ),
+        Method(
+            "qv_nlerp", "QV, nlerp", "The shortest turn, at a slightly uneven pace; location goes straight", 4
+        ),
+        Method("qv_slerp", "QV, slerp", "The shortest turn, at an even pace; location goes straight", 5),
+        Method("dlb", "DLB", "Dual quaternions, linear: nearly a screw, at a slightly uneven pace", 6),
+        Method(
+            "sclerp",
+            "ScLERP",
+            "The screw from key to key: a bone that turns and moves swings along an arc, at an even pace",
+            7,
+        ),
+        Method("dib", "DIB", "ScLERP between two keys; on a spline, all keys blended iteratively", 8),
+    )
+}
+
+
+# What to say of bones for which the method has no one answer.
+TOO_FAR = {
+    STRAIGHT: "turns by half a turn or more from key to key, and takes the shorter way: key in between",
+    SPLINE: "turns too far for this spline, and may jump: key in between, or choose DLB or QV, nlerp",
+}
+
+
+class Poses(NamedTuple):
+    """Bones' transforms: rigid [.., 7] in the layout of sinew.quat_vec, unit; scale [.., 3]; float64."""
+
+    rigid: np.ndarray
+    scale: np.ndarray
+
+
+class Inbetweens(NamedTuple):
+    """The poses, and whether the method defines each; sinew.interpolate says what it has if not."""
+
+    poses: Poses
+    is_defined: np.ndarray
+
+
+def straight(a: Poses, b: Poses, progress: np.ndarray, method: str) -> Inbetweens:
+    """Each bone from `a` to `b`, [bones], as far as `progress` [bones] says: 0 is a, 1 is b."""
+    between = interpolate.between(
+        _in_layout_of(method, a.rigid), _in_layout_of(method, b.rigid), progress, method
+    )
+    return _inbetweens(between, a.scale + progress[:, None] * (b.scale - a.scale), method)
+
+
+def on_spline(keys: Poses, times: np.ndarray, at: float, method: str) -> Inbetweens:
+    """Each bone on the Catmull-Rom spline through its keys, blend form.
+
+    keys  [4, bones]: two before `at` and two after; at an end of the keys one of them twice
+    times [4]
+    """
+    layout = np.ascontiguousarray(np.swapaxes(_in_layout_of(method, keys.rigid), 0, 1))
+    values = [spline.catmull_rom(bone, times, at, method) for bone in layout]
+    blended = interpolate.Blended(
+        np.array([value.transforms for value in values]), np.array([value.is_defined for value in values])
+    )
+    # A shift alone is the mean of the keys' shifts: the scales travel as shifts.
+    shifts = np.zeros_like(keys.rigid) + quat_vec.identity()
+    shifts[..., 4:] = keys.scale
+    roots = sinew.Skeleton(np.full(shifts.shape[1], -1, dtype=np.int32))
+    scale = roots.spline(shifts, times, at, "qv_nlerp")[0][:, 4:]
+    return _inbetweens(blended, scale, method)
+
+
+def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """How far along from `a` to `b` each bone is at `now`: [bones], 0 to 1, beyond within FARTHEST.
+
+    now, a, b  [bones, channels] as Blender's curves have them at this time and at the keys; channels without
+               keys are equal. The mean over the channels, each weighted with how far it goes, so that a bone
+               keeps the easing of its keys. 0 where a and b are equal.
+    """
+    change = b - a
+    way = np.abs(change).sum(axis=1)
+    gone = (np.sign(change) * (now - a)).sum(axis=1)
+    # Below: what is left of equal keys in float32.
+    moves = way > 1e-6
+    return np.clip(np.divide(gone, way, out=np.zeros_like(way), where=moves), *FARTHEST)
+
+
+def _in_layout_of(method: str, rigid: np.ndarray) -> np.ndarray:
+    if method.startswith("matrix_"):
+        return quat_vec.to_affine(rigid)
+    return rigid if method.startswith("qv_") else quat_vec.to_dual_quat(rigid)
+
+
+def _inbetweens(blended: interpolate.Blended, scale: np.ndarray, method: str) -> Inbetweens:
+    transforms = blended.transforms
+    if method.startswith("matrix_"):
+        if method == "matrix_linear":
+            # A bone has no shear: of a matrix that is not rigid its rotation and its axes' lengths are kept.
+            scale = scale * np.linalg.norm(transforms[..., :3, :3], axis=-2)
+            transforms = affine.normalized(transforms)
+        rigid = affine.to_quat_vec(transforms)
+    else:
+        rigid = transforms if method.startswith("qv_") else sinew.dual_quat.to_quat_vec(transforms)
+    return Inbetweens(Poses(rigid, scale), np.asarray(blended.is_defined))
