@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 
@@ -26,7 +28,7 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     parts, count, complete = [rest], len(bones), True
     for bone in np.flatnonzero(segments > 1):
         try:
-            joints = _read_joints(evaluated_armature, rest, int(bone), int(segments[bone]), at_rest=True)
+            joints = _read_joints(evaluated_armature, rest, [(int(bone), int(segments[bone]))], at_rest=True)
         except RuntimeError:
             # Blender has not evaluated this pose, as in a view layer that does not show it.
             segments[bone], complete = 1, False
@@ -63,12 +65,7 @@ def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
     pose = _read_matrices(evaluated_armature.pose.bones, "matrix")
     if not bones.bend:
         return pose
-    parts = [pose]
-    for bone in np.flatnonzero(bones.segments > 1):
-        parts.append(
-            _read_joints(evaluated_armature, pose, int(bone), int(bones.segments[bone]), at_rest=False)
-        )
-    return np.concatenate(parts)
+    return np.concatenate([pose, _read_joints(evaluated_armature, pose, bones.bending, at_rest=False)])
 
 
 def _read_envelopes(bones: bpy.types.bpy_prop_collection) -> Envelopes:
@@ -96,12 +93,25 @@ def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarra
 
 
 def _read_joints(
-    evaluated_armature: bpy.types.Object, matrices: np.ndarray, bone: int, segments: int, at_rest: bool
+    evaluated_armature: bpy.types.Object,
+    matrices: np.ndarray,
+    bending: Sequence[tuple[int, int]],
+    at_rest: bool,
 ) -> np.ndarray:
-    """float32 [segments + 1, 4, 4]: a bendy bone's joints in armature space, from its matrix there."""
-    pose_bone = evaluated_armature.pose.bones[bone]
-    joints = [np.array(pose_bone.bbone_segment_matrix(k, rest=at_rest)) for k in range(segments + 1)]
-    return (matrices[bone].astype(np.float64) @ np.stack(joints)).astype(np.float32)
+    """float32 [joints, 4, 4]: the joints of bendy bones in armature space, from the bones' matrices there.
+
+    bending  each bone and how many segments it has
+    """
+    pose_bones, owners, flat = evaluated_armature.pose.bones, [], []
+    for bone, segments in bending:
+        joint = pose_bones[bone].bbone_segment_matrix
+        for k in range(segments + 1):
+            # A matrix is unpacked faster than numpy reads it.
+            for row in joint(k, rest=at_rest):
+                flat.extend(row)
+        owners += [bone] * (segments + 1)
+    joints = np.array(flat, dtype=np.float64).reshape(-1, 4, 4)
+    return (matrices[owners].astype(np.float64) @ joints).astype(np.float32)
 
 
 def bones_from_model(

@@ -54,6 +54,11 @@ class Bones:
         return bool((self.segments > 1).any())
 
     @cached_property
+    def bending(self) -> list[tuple[int, int]]:
+        """The bones that bend, in the order of their joints, and how many segments each has."""
+        return [(int(bone), int(self.segments[bone])) for bone in np.flatnonzero(self.segments > 1)]
+
+    @cached_property
     def rest_axes(self) -> np.ndarray:
         """`rest` with axes of unit length: a bendy bone's joints can be scaled at rest."""
         axes = self.rest.copy()
