@@ -184,7 +184,9 @@ def figure_3_10(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
             {"drift, in widths": drift / width},
         ),
     )
-    return Figure("3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " 120 degrees.",))
+    return Figure(
+        "3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " The joint turns by 120 degrees.",)
+    )
 
 
 def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture]) -> Figure:
@@ -202,7 +204,9 @@ def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         kept["lbs"] < 0.5 and min(kept["qv"], kept["dq"]) > 0.99,
         {f"radius, {method}": share for method, share in kept.items()},
     )
-    return Figure("3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " 170 degrees.",))
+    return Figure(
+        "3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " The joint turns by 170 degrees.",)
+    )
 
 
 def trimmed(pictures: list[Picture]) -> list[Picture]:

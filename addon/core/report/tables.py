@@ -154,7 +154,20 @@ def chain_operations(measurements: Measurements | None) -> Table:
 # --- Times
 
 _UNOPTIMISED = "ratio, not optimised"
-_TIME_COLUMNS = ("printed s", "ours ms", "ns each", "fastest ns", _UNOPTIMISED)
+# Where a candidate's operations are counted.
+_COUNTED_IN = {"3.4": "3.3", "3.5": "3.2"}
+_COUNTED = {
+    "sinew_affine": "affine",
+    "sinew_quat_vec": "quat_vec",
+    "sinew_dual_quat": "dual_quat",
+    "glm_4x4": "matrix_4x4",
+    **{
+        f"sinew_{name}": name
+        for name in ("matrix_linear", "matrix_log", "qv_nlerp", "qv_slerp", "dlb", "sclerp")
+    },
+    **{f"sinew_{name}": name for name in ("lbs", "qv", "dq")},
+}
+_TIME_COLUMNS = ("printed s", "ns each", "fastest ns", "operations", _UNOPTIMISED)
 
 
 def _time_table(
@@ -179,6 +192,7 @@ def _time_table(
     if measurements is None:
         return Table(number, title, ("ratio",), tolerance, 2, missing=HOW_TO_MEASURE)
     each = OPERATIONS[number]
+    counts = measurements.counts[_COUNTED_IN.get(number, number)]
 
     def times(key: str, of: dict[str, Timing]) -> Timing | None:
         return of.get(f"{number}/{key}")
@@ -204,9 +218,9 @@ def _time_table(
                 )
         more: dict[str, float | str] = {
             "printed s": seconds.get(key, ""),
-            "ours ms": ours.median * 1e3,
             "ns each": ours.median / each * 1e9,
             "fastest ns": ours.fastest / each * 1e9,
+            "operations": counts[_COUNTED[key]]["total"] if _COUNTED.get(key) in counts else "",
             _UNOPTIMISED: "" if slow is None else slow.median / glm_base.median,
         }
         rows.append(Row(name, None if expected is None else (expected,), (ratio,), agrees, why, more))
@@ -513,7 +527,7 @@ def one_by_one() -> Table:
         f"{s['as_report']:.1e} too.",
         "The other reading, all three with unit axes (or all with normalised quaternions): they agree to "
         f"{s['unit_axes']:.0e} (or {s['quaternions']:.0e}) in float64 and to {s['unit_axes_float32']:.0e} in "
-        "float32. The representations are equally accurate.",
+        "float32. What is left is rounding.",
     )
     return Table(
         "3.7",
@@ -531,7 +545,7 @@ def combined() -> Table:
     rows, apart = [], []
     for name, expected in printed.COMBINED.items():
         built = _built(moved_combined, name)
-        rows.append(_chain_row(printed.NAMES[name], name, expected, built))
+        rows.append(_chain_row(_SHORT_NAMES[name], name, expected, built))
         key = AS_REPORT[name], np.float32
         ours = error(built[key], moved_one_by_one(name, np.float32, key[0])[-1])
         theirs = error(expected, printed.ONE_BY_ONE[name][-1])

@@ -105,7 +105,8 @@ struct QvNlerp {
 };
 
 /// Unit dual quaternion along the weighted sum (DLB; Kavan et al. 2008, eq. 4; Smith 2013, sections 2.2.3
-/// and 2.3.1). Between two: the screw of Sclerp, not at constant pace. Does not depend on the origin.
+/// and 2.3.1). Between two: about the axis of Sclerp's screw, turn and shift not at constant pace and out of
+/// step by up to 8.15 degrees and 15 % of the shift. Does not depend on the origin.
 ///
 /// Not defined where a rotation is half a turn from the heaviest (its sign as given then decides), or where
 /// the sum of the real parts cancels: the result is then the heaviest.
