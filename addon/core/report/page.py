@@ -17,7 +17,7 @@ TITLE = "Dual quaternions in transformation and interpolation: the report's expe
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1b1d21; background: #fff; margin: 0 auto;
-  padding: 2em 1.5em; max-width: 76em; }
+  padding: 2em 1.5em; max-width: 84em; }
 h1 { font-size: 1.7em; line-height: 1.25; } h2 { margin-top: 2.2em; border-bottom: 1px solid #c8ccd2; }
 h3 { margin: 2em 0 .4em; font-size: 1.1em; }
 .scroll { overflow-x: auto; }
@@ -126,7 +126,7 @@ def _table(table: Table) -> str:
         return "\n".join([*lines, f'<p class="missing">{escape(table.missing)}</p>'])
     what = f" ({', '.join(table.columns)})" if len(table.columns) > 1 else f" {table.columns[0]}"
     explains = any(row.why for row in table.rows)
-    head = ["", f"Printed{what}", f"Ours{what}", *table.more_columns, "Agrees", *["Why not"] * explains]
+    head = ["", f"Printed{what}", f"Ours{what}", "Agrees", *table.more_columns, *["Why not"] * explains]
     lines.append('<div class="scroll"><table><tr>' + "".join(f"<th>{escape(h)}</th>" for h in head) + "</tr>")
     lines += [_row(table, row, explains) for row in table.rows]
     lines.append("</table></div>")
@@ -138,9 +138,9 @@ def _row(table: Table, row: Row, explains: bool) -> str:
     cells = [f'<td class="name">{escape(row.name)}</td>']
     for numbers in (row.printed, row.ours):
         cells.append(f'<td class="number">{format_numbers(numbers, table.decimals)}</td>')
+    cells.append(f"<td>{_verdict(row.agrees)}</td>")
     for column in table.more_columns:
         cells.append(f'<td class="number">{_cell(row.more.get(column, ""))}</td>')
-    cells.append(f"<td>{_verdict(row.agrees)}</td>")
     if explains:
         cells.append(f'<td class="why">{escape(row.why)}</td>')
     return "<tr>" + "".join(cells) + "</tr>"
