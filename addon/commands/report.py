@@ -62,6 +62,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for folder in (args.programs, args.blend_files):
         if folder is not None and not folder.is_dir():
             raise SinewError(f"{folder}: no such folder")
+    if args.out.exists() and not args.out.is_dir():
+        raise SinewError(f"{args.out}: is a file, expected a folder")
     measurements = None
     if args.programs is not None:
         measurements = measure.measure(args.programs, args.quick, console.note)

@@ -161,6 +161,13 @@ def test_a_folder_that_is_not_there_is_said_to_be(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_file_in_the_place_of_the_folder_is_left(tmp_path):
+    path = tmp_path / "out"
+    path.write_text("mine")
+    assert "is a file, expected a folder" in run_report(path, status=1).stderr
+    assert path.read_text() == "mine"
+
+
 def test_a_program_that_fails_is_said_to(tmp_path):
     for name in measure.PROGRAMS:
         (tmp_path / name).write_text("#!/bin/sh\necho no such processor >&2\nexit 3\n")

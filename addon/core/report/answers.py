@@ -131,10 +131,12 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
             f"matrices; and pairs, which keep it too, move a bent joint by {drift:.1f} widths of the limb, "
             "as they turn about the origin."
         )
-    sentences.append(
-        "In a hierarchy whose joints only turn, pairs interpolate as dual quaternions do: there they are "
-        "enough."
-    )
+    apart = _fact(figures, "3.7", "apart")
+    if apart is not None and apart < 1e-5:
+        sentences.append(
+            "In a hierarchy whose joints only turn, pairs interpolate as dual quaternions do: there they are "
+            "enough."
+        )
     return Answer(question, " ".join(sentences))
 
 

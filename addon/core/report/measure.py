@@ -67,6 +67,8 @@ def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measure
 
     Raises SinewError where a program is not there or fails.
     """
+    # A program called by its bare name would be looked for elsewhere.
+    programs = programs.resolve()
     for name in PROGRAMS:
         if not (programs / name).is_file():
             raise SinewError(f"{programs}: has no program {name}; ./dev report builds it in a checkout")
