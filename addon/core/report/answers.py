@@ -31,16 +31,9 @@ def answers(measurements: Measurements | None, figures: tuple[Figure, ...]) -> t
     )
 
 
-class _Costs:
-    """Nanoseconds of one operation in a table's optimised loop."""
-
-    def __init__(self, measurements: Measurements) -> None:
-        self._measurements = measurements
-
-    def __call__(self, table: str, *names: str) -> float:
-        """Of the fastest of these."""
-        of = self._measurements.optimised
-        return min(of[f"{table}/{name}"].median for name in names) / OPERATIONS[table] * 1e9
+def _nanoseconds(measurements: Measurements, table: str, name: str) -> float:
+    """One operation in a table's optimised loop."""
+    return measurements.optimised[f"{table}/{name}"].median / OPERATIONS[table] * 1e9
 
 
 def _matrices(measurements: Measurements | None) -> Answer:
@@ -50,36 +43,31 @@ def _matrices(measurements: Measurements | None) -> Answer:
     )
     if measurements is None:
         return Answer(question, "Not measured in this installation; see Table 3.4.")
-    cost = _Costs(measurements)
-    slow = measurements.unoptimised
-    orders = []
+    orders, shares = [], []
     for table, seconds in (("3.4", printed.CHAIN_SECONDS), ("3.10", printed.SKINNING_SECONDS)):
-        times = [slow[f"{table}/glm_{name}"].median for name in ("4x4", "quat_vec", "dual_quat")]
-        orders.append(np.array_equal(np.argsort(times), np.argsort(list(seconds.values()))))
-    ratios = [
-        slow[f"{table}/glm_dual_quat"].median / slow[f"{table}/glm_4x4"].median for table in ("3.4", "3.10")
-    ]
-    theirs = [
-        printed.CHAIN_SECONDS["dual_quat"] / printed.CHAIN_SECONDS["affine"],
-        printed.SKINNING_SECONDS["dq"] / printed.SKINNING_SECONDS["lbs"],
-    ]
+        theirs = list(seconds.values())
+        ours = [
+            measurements.unoptimised[f"{table}/glm_{name}"].median
+            for name in ("4x4", "quat_vec", "dual_quat")
+        ]
+        orders.append(np.array_equal(np.argsort(ours), np.argsort(theirs)))
+        shares.append(f"{ours[2] / ours[0]:.2f} (printed {theirs[2] / theirs[0]:.2f})")
     tasks = {
-        "moving a point": ("3.5", ("sinew_quat_vec", "sinew_dual_quat")),
-        "interpolating": ("3.9", ("sinew_qv_nlerp", "sinew_dlb")),
-        "blending three and moving a point": ("3.10", ("sinew_qv", "sinew_dq")),
-        "combining two": ("3.4", ("sinew_quat_vec", "sinew_dual_quat")),
+        "moving a point": ("3.5", ("sinew_affine", "sinew_quat_vec", "sinew_dual_quat")),
+        "interpolating": ("3.9", ("sinew_matrix_linear", "sinew_qv_nlerp", "sinew_dlb")),
+        "blending three and moving a point": ("3.10", ("sinew_lbs", "sinew_qv", "sinew_dq")),
+        "combining two": ("3.4", ("sinew_affine", "sinew_quat_vec", "sinew_dual_quat")),
     }
-    matrix = {"3.4": "sinew_affine", "3.5": "sinew_affine", "3.9": "sinew_matrix_linear", "3.10": "sinew_lbs"}
     parts = []
-    for task, (table, others) in tasks.items():
-        times = [cost(table, name) for name in (matrix[table], *others)]
+    for task, (table, names) in tasks.items():
+        times = [_nanoseconds(measurements, table, name) for name in names]
         parts.append(f"{task} {times[0]:.1f}, {times[1]:.1f} and {times[2]:.1f}")
     return Answer(
         question,
         f"Built without optimisation, GLM gives {'' if all(orders) else 'not quite '}the printed order: its "
-        f"dual quaternions take {ratios[0]:.2f} of the time of its 4x4 matrices to combine (printed "
-        f"{theirs[0]:.2f}) and {ratios[1]:.2f} to blend and move a point (printed {theirs[1]:.2f}). "
-        f"Optimised, in nanoseconds with Sinew's 3x4 matrix, pair and dual quaternion: {'; '.join(parts)}.",
+        f"dual quaternions take {shares[0]} of the time of its 4x4 matrices to combine and {shares[1]} to "
+        "blend and move a point. Optimised, in nanoseconds with Sinew's 3x4 matrix, pair and dual "
+        f"quaternion: {'; '.join(parts)}.",
     )
 
 
@@ -94,20 +82,23 @@ def _fact(figures: tuple[Figure, ...], number: str, key: str) -> float | None:
 
 def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> Answer:
     question = (
-        "Is a dual quaternion worth it over a pair or a matrix, when matrices are implemented well? "
-        "(chapter 5: "
-        '"dual quaternions are a natural fit for skeletal animation systems")'
+        "Dual quaternions are a natural fit for skeletal animation (chapter 5). Are they worth it over "
+        "pairs and matrices, when matrices are implemented well?"
     )
     sentences = []
     if measurements is None:
         sentences.append("What they cost is not measured in this installation; see Table 3.10.")
     else:
-        cost = _Costs(measurements)
-        kernels = {name: cost("3.10", f"kernel_{name}") for name in ("lbs", "qv", "dq")}
+        kernels = {name: _nanoseconds(measurements, "3.10", f"kernel_{name}") for name in ("lbs", "qv", "dq")}
         over_matrix, over_pair = kernels["dq"] / kernels["lbs"], kernels["dq"] / kernels["qv"]
-        one_vertex = cost("3.10", "sinew_dq") / cost("3.10", "sinew_lbs")
-        point = cost("3.5", "sinew_dual_quat") / cost("3.5", "sinew_affine")
-        chain = cost("3.4", "sinew_dual_quat") / cost("3.4", "sinew_affine")
+        one_vertex, point, chain = (
+            _nanoseconds(measurements, table, name) / _nanoseconds(measurements, table, matrix)
+            for table, name, matrix in (
+                ("3.10", "sinew_dq", "sinew_lbs"),
+                ("3.5", "sinew_dual_quat", "sinew_affine"),
+                ("3.4", "sinew_dual_quat", "sinew_affine"),
+            )
+        )
         sentences.append(
             f"For skinning {'yes' if over_matrix <= WORTH else 'at a price'}: in Sinew's kernels a vertex of "
             f"three bones takes {kernels['dq']:.1f} ns, {over_matrix:.1f} times as long as with matrices and "
@@ -116,8 +107,8 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
             "long as with matrices."
         )
         sentences.append(
-            f"Moving points by one transform takes {point:.1f} times as long as with a 3x4 matrix, and "
-            f"combining transforms {chain:.2f} times, in 8 numbers instead of 12: for that alone "
+            f"Moving points by one transform takes {point:.1f} times as long as with a 3x4 matrix, combining "
+            f"transforms {chain:.2f} times as long, in 8 numbers instead of 12. Where points are only moved, "
             + ("it is as good as a matrix." if point <= CLOSE else "a matrix is better.")
         )
     thin = _fact(figures, "3.11", "radius, lbs")
@@ -134,8 +125,8 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
     apart = _fact(figures, "3.7", "apart")
     if apart is not None and apart < 1e-5:
         sentences.append(
-            "In a hierarchy whose joints only turn, pairs interpolate as dual quaternions do: there they are "
-            "enough."
+            "In a hierarchy whose joints only turn, pairs interpolate as dual quaternions do: there they "
+            "are enough."
         )
     return Answer(question, " ".join(sentences))
 
@@ -163,8 +154,10 @@ def _slower_methods(measurements: Measurements | None) -> Answer:
     bends = paths.bends(paths.paths(paths.ORIGIN))
     sentences = []
     if measurements is not None:
-        cost = _Costs(measurements)
-        log, linear, dlb = (cost("3.9", f"sinew_{name}") for name in ("matrix_log", "matrix_linear", "dlb"))
+        log, linear, dlb = (
+            _nanoseconds(measurements, "3.9", f"sinew_{name}")
+            for name in ("matrix_log", "matrix_linear", "dlb")
+        )
         sentences.append(
             f"Interpolating by logarithms of matrices takes {log:.0f} ns, {log / linear:.0f} times as long "
             f"as linear matrices and {log / dlb:.0f} times as long as DLB."
@@ -182,8 +175,7 @@ def _slower_methods(measurements: Measurements | None) -> Answer:
 
 
 def dlb_bound() -> Fact:
-    """The largest differences of DLB and ScLERP between the identity and a screw, of angles up to 180 "
-    "degrees."""
+    """The largest differences of DLB and ScLERP between the identity and a screw of up to 180 degrees."""
     t = np.linspace(0.0, 1.0, 201)
     axis, point = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     degrees, share = 0.0, 0.0
