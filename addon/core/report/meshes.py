@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 3.6 to 3.11: deformed chains of links, what is measured of them, and what the report says of "
-"them."""
+"""Figures 3.6 to 3.11: deformed chains of links, what is measured of them and what the report says."""
 
 from __future__ import annotations
 
