@@ -14,7 +14,7 @@ _commands: list[object] = []
 
 def main(argv: list[str]) -> int:
     """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
-    from .commands import compare, console, inbetween, info, methods, points, reskin
+    from .commands import compare, console, inbetween, info, methods, points, report, reskin
 
     modules = {
         "methods": methods,
@@ -23,6 +23,7 @@ def main(argv: list[str]) -> int:
         "reskin": reskin,
         "inbetween": inbetween,
         "compare": compare,
+        "report": report,
     }
     parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")
     parser.add_argument("--verbose", action="store_true", help="show what Blender prints")
@@ -36,8 +37,9 @@ def main(argv: list[str]) -> int:
         return stop.code if isinstance(stop.code, int) else 2
     output = console.keep_output() if args.verbose else console.take_over_output()
     try:
-        if args.command != "methods":
-            _prepare_blender()
+        # A report without Blender has no pictures, and says so.
+        if args.command not in ("methods", "report"):
+            prepare_blender()
         return modules[args.command].run(args, output)
     except SinewError as error:
         output.complain(error)
@@ -71,7 +73,8 @@ def unregister_command() -> None:
         bpy.utils.unregister_cli_command(_commands.pop())
 
 
-def _prepare_blender() -> None:
+def prepare_blender() -> None:
+    """Makes Sinew's own properties known to Blender. Raises SinewError where there is no Blender."""
     try:
         import bpy
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""Make the five example rigs of this folder, each saved as a compressed .blend file.
+"""Make the six example rigs of this folder, each saved as a compressed .blend file.
 
     python blend_files/make_rigs.py [--out DIR]
 
@@ -26,6 +26,8 @@ X, Y, Z = np.eye(3)
 
 ARM_DOWN = np.array((math.sin(math.radians(20)), 0, -math.cos(math.radians(20))))
 """Direction of the hanging arm of the shoulder rig, 20 degrees off the side."""
+
+LINK_COLOURS = (0.16, 0.3, 0.55), (0.65, 0.75, 0.85)
 
 Point = tuple[float, float, float]
 Weights = dict[str, np.ndarray]
@@ -408,28 +410,63 @@ def key_angles(rig: bpy.types.Object, bone: str, keys: list[tuple[int, Point]]) 
 # Rigs
 
 
+def chain_colours(points: np.ndarray, faces: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Material 0 or 1 of each face of a chain along x: quarters of each link differ, so that a twist shows
+    even where the shape does not change."""
+    middles = points[faces].mean(axis=1)
+    quarter = np.floor(np.arctan2(middles[:, 2], middles[:, 1]) / (math.pi / 2))
+    number = np.clip(np.searchsorted(ends, middles[:, 3]) - 1, 0, len(ends) - 2)
+    return ((quarter + number) % 2).astype(np.int32)
+
+
 def make_report_mesh() -> None:
     """The report's test mesh: a straight tube of six links with a bone each and linear weighting.
 
-    Frames 1 to 24 bend the middle joint by 120 degrees and back (Figure 3.10); frames 24 to 48 twist the same
-    joint by 170 degrees about the tube's axis and back (Figure 3.11). Quarters of each link differ in colour:
-    so a twist shows even where the shape does not change.
+    The root of the chain is the armature's origin, as in a hierarchy, so that what turns about the origin
+    turns far from the joint. Frames 1 to 24 bend the middle joint by 120 degrees and back (Figure 3.10);
+    frames 24 to 48 twist the same joint by 170 degrees about the tube's axis and back (Figure 3.11).
     """
     new_scene(48)
-    ends = np.linspace(-0.75, 0.75, 7)
-    lengths = np.linspace(-0.75, 0.75, 97)
+    ends = np.linspace(0, 1.5, 7)
+    lengths = np.linspace(0, 1.5, 97)
     points, faces = tube(lengths, lengths[:, None] * X, (Y, Z), np.full((97, 2), 0.11), sides=7, dome=0.35)
     bones = chain_bones("Link", ends, X)
     rig = add_armature("Report Mesh Rig", bones)
-    skin = add_mesh("Report Mesh", points, faces, (0.16, 0.3, 0.55), (0.65, 0.75, 0.85))
+    skin = add_mesh("Report Mesh", points, faces, *LINK_COLOURS)
     bind(skin, rig, linear_weights(points[:, 3], bones, ends))
-    middles = points[faces].mean(axis=1)
-    quarter = np.floor(np.arctan2(middles[:, 2], middles[:, 1]) / (math.pi / 2))
-    number = np.clip(np.searchsorted(ends, middles[:, 3]) - 1, 0, len(bones) - 1)
-    skin.data.polygons.foreach_set("material_index", ((quarter + number) % 2).astype(np.int32))
+    skin.data.polygons.foreach_set("material_index", chain_colours(points, faces, ends))
     bend, twist = ((1, 0), (9, 60), (16, 120), (20, 60), (24, 0)), ((32, 85), (40, 170), (44, 85), (48, 0))
     key_quaternions(rig, bones[3].name, [*turns(-Y, bend), *turns(X, twist)])
-    add_camera((0.15, -3, 0.75), (0.05, 0, 0.18), 1.4)
+    add_camera((0.9, -3, 0.75), (0.8, 0, 0.18), 1.4)
+
+
+def make_report_links() -> None:
+    """A chain of six links that do not blend, each a closed body on a bone of its own (Figures 3.6 to 3.8).
+
+    The two keyframes between which the report's methods differ are frames 12 and 36: all five joints turned
+    by 45 degrees one way, and by 45 degrees the other.
+    """
+    new_scene(48)
+    ends = np.linspace(0, 1.5, 7)
+    bones = chain_bones("Link", ends, X)
+    parts = []
+    for head, tail in pairwise(ends):
+        lengths = np.linspace(head + 0.02, tail - 0.02, 17)
+        radii = np.interp(lengths, (head, tail), (0.075, 0.055))
+        radii = np.stack((radii, radii), axis=1)
+        parts.append(tube(lengths, lengths[:, None] * X, (Y, Z), radii, sides=5, dome=0.3))
+    points = np.concatenate([part for part, _ in parts])
+    firsts = np.cumsum([0] + [len(part) for part, _ in parts[:-1]])
+    faces = np.concatenate([part + first for first, (_, part) in zip(firsts, parts, strict=True)])
+    rig = add_armature("Report Links Rig", bones)
+    skin = add_mesh("Report Links", points, faces, *LINK_COLOURS)
+    number = np.repeat(np.arange(len(bones)), [len(part) for part, _ in parts])
+    alone = np.eye(len(bones))[number]
+    bind(skin, rig, {bone.name: alone[:, i] for i, bone in enumerate(bones)})
+    skin.data.polygons.foreach_set("material_index", chain_colours(points, faces, ends))
+    for bone in bones[1:]:
+        key_quaternions(rig, bone.name, turns(-Y, ((1, 0), (12, -45), (36, 45), (48, 0))))
+    add_camera((0.5, -3, 0), (0.5, 0, 0), 2.0)
 
 
 def make_elbow() -> None:
@@ -640,6 +677,7 @@ def make_shoulder() -> None:
 
 RIGS = {
     "report_mesh": make_report_mesh,
+    "report_links": make_report_links,
     "elbow": make_elbow,
     "wrist": make_wrist,
     "tentacle": make_tentacle,

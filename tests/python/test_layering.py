@@ -107,7 +107,8 @@ def test_library_knows_nothing_of_python(path):
 
 def test_only_bindings_include_pybind11():
     suffixes = (".h", ".hpp", ".cpp", ".cc")
-    files = [path for folder in ("native", "tests", "bench") for path in sources(ROOT / folder, *suffixes)]
+    folders = ("native", "tests", "bench", "experiments")
+    files = [path for folder in folders for path in sources(ROOT / folder, *suffixes)]
     users = {path for path in files if python_headers(path.read_text(encoding="utf-8"))}
     bindings = ROOT / "native" / "bindings"
     assert users

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smith 2013, Tables 3.6 to 3.8: what the printed digits are, and why the columns differ.
+"""Smith 2013, Tables 3.1 and 3.6 to 3.8 and Figures 3.4 and 3.5: what the printed digits are, and why the
+columns differ. All numbers are those of `sinew report`.
 
 The axes in the report are rounded and not of unit length (|(0.707, -0.707, 0)| = 0.99985). Its matrix path
 normalises the axis (as glm::rotate does), its quaternion path the quaternion (cos, sin axis).
@@ -8,79 +9,13 @@ normalises the axis (as glm::rotate does), its quaternion path the quaternion (c
 import numpy as np
 import pytest
 import sinew
-
-# Table 3.7: angle in degrees, axis and translation of transforms A to D; applied in this order.
-CHAIN = [
-    (70, (-0.089, 0.445, -0.89), (2, 2, 2)),
-    (70, (-0.667, -0.333, -0.667), (0, -2, -0.5)),
-    (170, (0.707, -0.707, 0), (10, -1, -4)),
-    (10, (0.707, 0, 0.707), (0, 0, 1)),
-]
-TABLE_3_7 = {
-    "affine": [
-        (2.0, 2.0, 2.0),
-        (2.7737715, -0.5859429, 1.0187607),
-        (10.4774714, -3.8822441, -4.7346449),
-        (10.8386106, -1.9554013, -4.0957837),
-    ],
-    "quat_vec": [
-        (2.0, 2.0, 2.0),
-        (2.7739086, -0.5862051, 1.0187545),
-        (10.4777184, -3.8823950, -4.7346096),
-        (10.8388376, -1.9558195, -4.0957294),
-    ],
-    "dual_quat": [
-        (2.0000005, 2.0000007, 2.0000002),
-        (2.7739096, -0.5862050, 1.0187547),
-        (10.4777203, -3.8823957, -4.7346106),
-        (10.8388424, -1.9558202, -4.0957308),
-    ],
-}
-TABLE_3_8 = {
-    "affine": (10.8386087, -1.9554017, -4.0957837),
-    "quat_vec": (10.8388386, -1.9558198, -4.0957308),
-    "dual_quat": (10.8388443, -1.9558202, -4.0957317),
-}
-LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
+from sinew_addon.core.report import answers, paths, printed, tables
+from sinew_addon.core.report.tables import AS_REPORT, LAYOUTS, error, moved_combined, moved_one_by_one, pair
 
 
-def pair(angle, axis, translation, dtype, normalise):
-    """A quaternion-vector pair built by normalising the `normalise`: "axis" or "quaternion"."""
-    half, axis = np.radians(angle) / 2, np.array(axis, np.float64)
-    if normalise == "axis":
-        axis /= np.linalg.norm(axis)
-    quaternion = np.array([np.cos(half), *(np.sin(half) * axis)])
-    quaternion /= np.linalg.norm(quaternion)
-    return np.array([*quaternion, *translation], dtype)
-
-
-def chain(name, dtype, normalise):
-    pairs = np.array([pair(*row, dtype, normalise) for row in CHAIN])
-    return pairs if name == "quat_vec" else getattr(sinew.quat_vec, f"to_{name}")(pairs)
-
-
-def one_by_one(name, dtype, normalise):
-    """Table 3.7: the point (0, 0, 0) after each transform in turn, [4, 3]."""
-    point, points = np.zeros(3, dtype), []
-    for transform in chain(name, dtype, normalise):
-        point = LAYOUTS[name].transform_point(transform, point)
-        points.append(point)
-    return np.array(points)
-
-
-def combined(name, dtype, normalise):
-    """Table 3.8: the same by one transform, D C B A, [3]."""
-    module = LAYOUTS[name]
-    a, b, c, d = chain(name, dtype, normalise)
-    product = module.compose(d, module.compose(c, module.compose(b, a)))
-    return module.transform_point(product, np.zeros(3, dtype))
-
-
-def error(got, printed):
-    return np.abs(np.asarray(got, np.float64) - np.array(printed)).max()
-
-
-AS_REPORT = {"affine": "axis", "quat_vec": "quaternion", "dual_quat": "quaternion"}
+def test_table_3_1_memory():
+    assert [row.ours for row in tables.memory().rows] == [(12,), (7,), (8,)]
+    assert all(row.agrees for row in tables.memory().rows)
 
 
 def test_table_3_6_translation_of_one_transform():
@@ -95,6 +30,7 @@ def test_table_3_6_translation_of_one_transform():
                 np.testing.assert_array_equal(moved, [1, 0, 0.5])
             moved = sinew.dual_quat.transform_point(sinew.quat_vec.to_dual_quat(motion), zero)
             assert error(moved, (1, 0, 0.5)) <= 2 * np.finfo(dtype).eps
+    assert [row.agrees for row in tables.translation().rows] == [True] * 3
 
 
 @pytest.mark.parametrize(
@@ -103,33 +39,132 @@ def test_table_3_6_translation_of_one_transform():
     [("affine", 3e-6), ("quat_vec", 2e-6), ("dual_quat", 6e-6)],
 )
 def test_tables_3_7_and_3_8_are_the_report_s_construction_in_float64(name, tolerance):
-    assert error(one_by_one(name, np.float64, AS_REPORT[name]), TABLE_3_7[name]) < tolerance
-    assert error(combined(name, np.float64, AS_REPORT[name]), TABLE_3_8[name]) < 1.2 * tolerance
+    one_by_one = moved_one_by_one(name, np.float64, AS_REPORT[name])
+    assert error(one_by_one, printed.ONE_BY_ONE[name]) < tolerance
+    combined = moved_combined(name, np.float64, AS_REPORT[name])
+    assert error(combined, printed.COMBINED[name]) < 1.2 * tolerance
 
 
 def test_float64_digits_of_the_pair():
-    points = one_by_one("quat_vec", np.float64, "quaternion")
+    points = moved_one_by_one("quat_vec", np.float64, "quaternion")
     assert error(points[1], (2.7739085, -0.5862051, 1.0187546)) < 6e-8
     assert error(points[3], (10.8388386, -1.9558195, -4.0957293)) < 6e-8
-    assert error(combined("quat_vec", np.float64, "quaternion"), points[3]) < 1e-14
+    assert error(moved_combined("quat_vec", np.float64, "quaternion"), points[3]) < 1e-14
 
 
 def test_columns_differ_by_the_axes_and_not_by_the_representation():
     # As printed, matrix and pair are 4e-4 apart in Table 3.7; by one construction, rounding.
-    assert error(TABLE_3_7["affine"], TABLE_3_7["quat_vec"]) > 4e-4
-    mixed = error(one_by_one("affine", np.float64, "axis"), one_by_one("quat_vec", np.float64, "quaternion"))
-    assert mixed == pytest.approx(error(TABLE_3_7["affine"], TABLE_3_7["quat_vec"]), abs=3e-6)
+    apart = error(printed.ONE_BY_ONE["affine"], printed.ONE_BY_ONE["quat_vec"])
+    assert apart > 4e-4
+    mixed = error(
+        moved_one_by_one("affine", np.float64, "axis"), moved_one_by_one("quat_vec", np.float64, "quaternion")
+    )
+    assert mixed == pytest.approx(apart, abs=3e-6)
     for normalise in ("axis", "quaternion"):
-        exact = one_by_one("quat_vec", np.float64, normalise)
+        exact = moved_one_by_one("quat_vec", np.float64, normalise)
         for name in LAYOUTS:
-            assert error(one_by_one(name, np.float64, normalise), exact) < 5e-14
-            assert error(combined(name, np.float64, normalise), exact[-1]) < 5e-14
+            assert error(moved_one_by_one(name, np.float64, normalise), exact) < 5e-14
+            assert error(moved_combined(name, np.float64, normalise), exact[-1]) < 5e-14
 
 
 @pytest.mark.parametrize("normalise", ["axis", "quaternion"])
 def test_with_one_construction_float32_agrees_too(normalise):
     # Coordinates reach 10.8, where float32 has steps of 1e-6.
-    exact = one_by_one("quat_vec", np.float64, normalise)
+    exact = moved_one_by_one("quat_vec", np.float64, normalise)
     for name in LAYOUTS:
-        assert error(one_by_one(name, np.float32, normalise), exact) < 4e-6
-        assert error(combined(name, np.float32, normalise), exact[-1]) < 4e-6
+        assert error(moved_one_by_one(name, np.float32, normalise), exact) < 4e-6
+        assert error(moved_combined(name, np.float32, normalise), exact[-1]) < 4e-6
+
+
+@pytest.mark.parametrize("table", [tables.one_by_one(), tables.combined()], ids=["3.7", "3.8"])
+def test_rows_show_both_readings(table):
+    assert len(table.rows) == (12 if table.number == "3.7" else 3)
+    for row in table.rows:
+        assert row.agrees
+        assert row.more["difference"] == error(row.ours, row.printed) < 6.5e-6
+        unit = [float(number) for number in row.more["with unit axes"].split(",")]
+        is_matrix = "matri" in row.name
+        first = row.name.startswith("A")
+        # With unit axes only the matrices stay: theirs are unit already. A alone moves by its translation.
+        assert (error(unit, row.printed) < 3e-6) == (is_matrix or first)
+
+
+def test_a_wrong_digit_is_seen(monkeypatch):
+    wrong = {**printed.COMBINED, "quat_vec": (10.8388386, -1.9558198, -4.0957608)}
+    monkeypatch.setattr(printed, "COMBINED", wrong)
+    assert [row.agrees for row in tables.combined().rows] == [True, False, True]
+    assert tables.combined().rows[1].why
+
+
+def brute_force(method, t, point):
+    """Figures 3.4 and 3.5 by scipy alone."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    (angle_a, axis_a, shift_a), (angle_b, axis_b, shift_b) = printed.ENDS
+    turns = Rotation.from_rotvec(
+        [
+            np.radians(angle) * np.array(axis) / np.linalg.norm(axis)
+            for angle, axis in ((angle_a, axis_a), (angle_b, axis_b))
+        ]
+    )
+    shift = (1 - t) * np.array(shift_a) + t * np.array(shift_b)
+    if method == "matrix_linear":
+        a, b = turns.as_matrix()
+        return ((1 - t) * a + t * b) @ point + shift
+    if method == "qv_slerp":
+        return Slerp([0, 1], turns)(t).apply(point) + shift
+    a, b = turns.as_quat()
+    return Rotation.from_quat((1 - t) * a + t * (b if a @ b > 0 else -b)).apply(point) + shift
+
+
+@pytest.mark.parametrize("method", ["matrix_linear", "qv_nlerp", "qv_slerp"])
+@pytest.mark.parametrize("point", [(0, 0, 0), (1, 1, 1)])
+def test_paths_of_matrices_and_pairs(method, point):
+    path = paths.paths(np.array(point, float), steps=10)[method].moved
+    for i, moved in enumerate(path):
+        assert error(moved, brute_force(method, i / 10, np.array(point, float))) < 1e-12
+
+
+def test_all_paths_have_the_same_ends():
+    for point in (paths.ORIGIN, paths.CORNER):
+        all_paths = paths.paths(point, steps=10)
+        assert set(all_paths) == set(sinew.interpolate.METHODS)
+        for end in (0, -1):
+            expected = brute_force("qv_slerp", -end, point)
+            assert all(error(path.moved[end], expected) < 1e-12 for path in all_paths.values())
+
+
+def test_figures_3_4_and_3_5_show_what_the_report_says():
+    for figure in (paths.figure_3_4(), paths.figure_3_5()):
+        assert figure.missing is None
+        assert len(figure.pictures) == 2
+        assert all(fact.agrees for fact in figure.facts)
+    shrinking = paths.figure_3_5().facts[0].values
+    # Half way the turn between the two is gone from the matrix but for its axis: by hand, from the sum.
+    assert shrinking["matrix_linear"] == pytest.approx(0.1347, abs=1e-4)
+
+
+def test_plots_name_every_method():
+    for picture in (*paths.figure_3_4().pictures, *paths.figure_3_5().pictures):
+        for method in sinew.interpolate.METHODS:
+            if "turned" in picture.caption and method == "matrix_linear":
+                continue
+            assert f">{method}<" in picture.content, (picture.caption, method)
+
+
+def test_dlb_and_sclerp_differ_by_as_much_as_the_report_says():
+    fact = answers.dlb_bound()
+    assert fact.agrees
+    assert fact.values["degrees"] == pytest.approx(8.15, abs=0.05)
+    assert fact.values["share of translation"] == pytest.approx(0.15, abs=0.005)
+
+
+def test_a_chain_drifts_more_the_longer_it_is():
+    assert answers.chain_drift(1) < answers.chain_drift(6) < answers.chain_drift(24)
+    # One joint of 90 degrees: nlerp against slerp by hand, at the t where they differ most; the chain is two
+    # links long, and the tip one link from the joint.
+    t = np.linspace(0, 0.5, 1001)
+    half = np.pi / 4
+    nlerp = np.arctan2(t * np.sin(half), 1 - t + t * np.cos(half))
+    angle = 2 * np.abs(nlerp - t * half).max()
+    assert answers.chain_drift(1) == pytest.approx(np.sin(angle / 2), rel=1e-3)

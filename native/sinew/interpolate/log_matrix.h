@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+
 #include "sinew/interpolate/linear.h"
 #include "sinew/transform/twist.h"
 
@@ -19,7 +21,9 @@ struct MatrixLog {
 
     template <class T>
     [[nodiscard]] static Blended<Affine<T>> between(const Affine<T>& a, const Affine<T>& b, T t) noexcept {
-        return blend_of_two<MatrixLog>(a, b, t);
+        const std::array<Affine<T>, 2> ends{a, b};
+        const std::array<T, 2> weights{T(1) - t, t};
+        return blend<Signs::kAsGiven, T>(ends, weights);
     }
 
     template <Signs signs = Signs::kToHeaviest, class T>

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew report`: the experiments of the report that Sinew implements, on one page."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from ..core.errors import SinewError
+from ..core.report.model import Figure, Page
+from .console import Console
+
+PICTURE_SIZE, QUICK_PICTURE_SIZE = 520, 64
+NO_FILES = (
+    "Not drawn in this installation: it takes Sinew's example rigs report_links.blend and "
+    "report_mesh.blend. ./dev report passes them on in a checkout; elsewhere, give their folder: sinew "
+    "report --blend-files FOLDER."
+)
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "report",
+        help="do the experiments of Smith 2013 again and write them as one page",
+        description="Writes FOLDER/report.html, which needs no other file, and report.json: Tables 3.1 "
+        "to 3.10 and Figures 3.4 to 3.11 of Smith 2013, each with the printed values, Sinew's and whether "
+        "they agree. An installed Sinew computes Tables 3.1 and 3.6 to 3.8 and, with matplotlib, Figures "
+        "3.4 and 3.5. Operation counts and times (Tables 3.2 to 3.5, 3.9, 3.10) take programs that are "
+        "built against GLM and Eigen, and pictures (Figures 3.6 to 3.11) Sinew's example rigs: ./dev report "
+        "in a checkout builds the ones and passes on both. The page says what was left out and why.",
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="FOLDER")
+    parser.add_argument(
+        "--programs",
+        type=Path,
+        metavar="FOLDER",
+        help="operation_counts and timings_*, as ./dev report builds them",
+    )
+    parser.add_argument(
+        "--blend-files", type=Path, metavar="FOLDER", help="Sinew's example rigs (blend_files/ of a checkout)"
+    )
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "workbench", "cycles"),
+        default="auto",
+        help="of the pictures; auto: Workbench, or Cycles where there is no OpenGL",
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="seconds instead of minutes: times that say nothing, small pictures",
+    )
+    return parser
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    import sinew
+
+    from ..core.report import answers, measure, meshes, page, paths, tables
+
+    for folder in (args.programs, args.blend_files):
+        if folder is not None and not folder.is_dir():
+            raise SinewError(f"{folder}: no such folder")
+    if args.out.exists() and not args.out.is_dir():
+        raise SinewError(f"{args.out}: is a file, expected a folder")
+    measurements = None
+    if args.programs is not None:
+        measurements = measure.measure(args.programs, args.quick, console.note)
+    console.note("Computing Figures 3.4 and 3.5")
+    plots = (paths.figure_3_4(), paths.figure_3_5())
+    pictures = meshes.missing(NO_FILES) if args.blend_files is None else _draw(args, console)
+    figures = (*plots, *pictures)
+    build = {} if measurements is None else measurements.build
+    content = Page(
+        version=sinew.__version__,
+        machine={**measure.machine(), **build},
+        quick=args.quick,
+        tables=tables.tables(measurements),
+        figures=figures,
+        answers=answers.answers(measurements, figures),
+    )
+    for part in (*content.tables, *content.figures):
+        if part.missing is not None:
+            kind = "Table" if part in content.tables else "Figure"
+            console.note(f"{kind} {part.number}: {part.missing}")
+    for path in page.write(content, args.out):
+        console.say(str(path))
+    return 0
+
+
+def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
+    """Figures 3.6 to 3.11; where this installation can not draw, why."""
+    from ..cli import prepare_blender
+    from ..core.report import meshes
+
+    try:
+        import PIL  # noqa: F401
+
+        prepare_blender()
+    except (ImportError, SinewError) as error:
+        return meshes.missing(
+            f"Not drawn in this installation: {error}. Install bpy and pillow and try again."
+        )
+    from ..blender import render, report_figures
+
+    engine = args.engine
+    if engine == "auto":
+        engine = "workbench" if render.has_opengl() else "cycles"
+    size = QUICK_PICTURE_SIZE if args.quick else PICTURE_SIZE
+    with tempfile.TemporaryDirectory() as scratch:
+        return report_figures.figures(args.blend_files, engine, size, Path(scratch), console.note)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the programs of experiments/: counted operations, and the loops of the timing tables."""
+
+from __future__ import annotations
+
+import json
+import platform
+import re
+import statistics
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import SinewError
+
+PROGRAMS = ("operation_counts", "timings_optimised", "timings_unoptimised")
+# Without optimisation Eigen takes minutes, and says nothing of the report, which used GLM.
+UNOPTIMISED = r"^3\.(4|5|10)/(plain|glm|sinew)|^3\.9/(plain|glm|sinew_(matrix_linear|qv|dlb|sclerp))"
+# What one loop of each table does so many times.
+OPERATIONS = {"3.4": 5 * 100_000, "3.5": 1_000_000, "3.9": 1_000_000, "3.10": 1_000_000}
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Processor seconds for a whole loop: the median of all runs and the fastest.
+
+    A shortened loop's, as many times as it was shortened.
+    """
+
+    median: float
+    fastest: float
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What the programs gave.
+
+    counts       operations, by table, name and kind
+    optimised    by "table/name", as built to be fast
+    unoptimised  the same without optimisation, of fewer candidates
+    """
+
+    counts: dict[str, dict[str, dict[str, int]]]
+    optimised: dict[str, Timing]
+    unoptimised: dict[str, Timing]
+    build: dict[str, str]
+
+
+def machine() -> dict[str, str]:
+    """Processor, system and Python."""
+    try:
+        found = re.search(r"^model name\s*:\s*(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    except OSError:
+        found = None
+    return {
+        "processor": found.group(1) if found else platform.processor() or platform.machine(),
+        "system": platform.platform(),
+        "Python": platform.python_version(),
+    }
+
+
+def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measurements:
+    """Runs the programs in the folder `programs`; some 90 seconds, `quick` less than one.
+
+    step  called with what is about to be done
+
+    Raises SinewError where a program is not there or fails.
+    """
+    # A program called by its bare name would be looked for elsewhere.
+    programs = programs.resolve()
+    for name in PROGRAMS:
+        if not (programs / name).is_file():
+            raise SinewError(f"{programs}: has no program {name}; ./dev report builds it in a checkout")
+    step("Counting operations")
+    counts = json.loads(_output([programs / "operation_counts"]))
+    step("Timing the report's loops, optimised")
+    optimised, context = _timings(programs / "timings_optimised", 1 if quick else 15, quick)
+    step("Timing them without optimisation")
+    only = f"--benchmark_filter={UNOPTIMISED}"
+    unoptimised, plain_context = _timings(programs / "timings_unoptimised", 1 if quick else 5, quick, only)
+    build = {
+        "compiler": context["compiler"],
+        "optimised": context["flags"],
+        "without optimisation": plain_context["flags"],
+        "load average": ", ".join(f"{load:.1f}" for load in context.get("load_avg", ())) or "unknown",
+    }
+    return Measurements(counts, optimised, unoptimised, build)
+
+
+def _timings(program: Path, repetitions: int, quick: bool, *options: str) -> tuple[dict[str, Timing], dict]:
+    shorten = 1000 if quick else 1
+    # Interleaved, so that a neighbour's load falls on all candidates alike.
+    result = json.loads(
+        _output(
+            [
+                program,
+                "--benchmark_format=json",
+                f"--benchmark_repetitions={repetitions}",
+                "--benchmark_enable_random_interleaving=true",
+                f"--shorten={shorten}",
+                *options,
+            ]
+        )
+    )
+    runs: dict[str, list[float]] = {}
+    for run in result["benchmarks"]:
+        if run["run_type"] == "iteration":
+            name = "/".join(run["run_name"].split("/")[:2])
+            runs.setdefault(name, []).append(run["cpu_time"] * 1e-9 * shorten)
+    return {name: Timing(statistics.median(times), min(times)) for name, times in runs.items()}, result[
+        "context"
+    ]
+
+
+def _output(command: Sequence[object]) -> str:
+    try:
+        done = subprocess.run(
+            [str(word) for word in command], capture_output=True, text=True, check=False, timeout=600
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SinewError(f"{command[0]}: can not run: {error}") from None
+    if done.returncode != 0:
+        last = (done.stderr.strip().splitlines() or ["it says nothing"])[-1]
+        raise SinewError(f"{command[0]}: failed with status {done.returncode}: {last}")
+    return done.stdout

@@ -1,0 +1,562 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tables 3.1 to 3.10: memory, operations, times, accuracy."""
+
+from __future__ import annotations
+
+import numpy as np
+import sinew
+
+from . import printed
+from .measure import OPERATIONS, Measurements, Timing
+from .model import Row, Table
+
+LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
+# The report's matrices normalise the axis, as glm::rotate does; its quaternions themselves.
+AS_REPORT = {"affine": "axis", "quat_vec": "quaternion", "dual_quat": "quaternion"}
+# Coordinates reach 10.8, where float32 has steps of 1e-6: ten of them.
+CHAIN_TOLERANCE = 1e-5
+# Two steps of float32 at 1.
+TRANSLATION_TOLERANCE = 2.4e-7
+RATIO_TOLERANCE = 0.25
+HOW_TO_MEASURE = (
+    "Not measured in this installation: it takes programs that are built against GLM and Eigen. In a "
+    "checkout of Sinew, ./dev report builds them and passes them on; sinew report --programs FOLDER takes "
+    "those that are built already."
+)
+
+
+def tables(measurements: Measurements | None) -> tuple[Table, ...]:
+    """All ten; those that need `measurements` say so where there are none."""
+    return (
+        memory(),
+        point_operations(measurements),
+        chain_operations(measurements),
+        chain_times(measurements),
+        point_times(measurements),
+        translation(),
+        one_by_one(),
+        combined(),
+        interpolation_times(measurements),
+        skinning_times(measurements),
+    )
+
+
+def error(got: object, expected: object) -> float:
+    """The largest difference of a component."""
+    return float(np.abs(np.asarray(got, np.float64) - np.asarray(expected, np.float64)).max())
+
+
+def memory() -> Table:
+    # The fourth row of a matrix, always (0, 0, 0, 1), is there in Python's arrays and nowhere else.
+    sizes = {name: module.identity().size for name, module in LAYOUTS.items()}
+    sizes["affine"] = sinew.affine.identity()[:3].size
+    rows = [
+        Row(
+            printed.NAMES[name],
+            (printed.MEMORY[name],),
+            (size,),
+            size == printed.MEMORY[name],
+            more={"bytes in float32": 4 * size},
+        )
+        for name, size in sizes.items()
+    ]
+    return Table(
+        "3.1",
+        "Memory of the representations",
+        ("numbers",),
+        "The numbers must be equal.",
+        0,
+        tuple(rows),
+        ("bytes in float32",),
+    )
+
+
+# --- Operations
+
+_OPERATION_COLUMNS = ("adds", "multiplies", "total")
+_OPERATION_NOTE = (
+    "Counted by running Sinew's templates on a number that counts. As in the report, multiplying by a 0 or "
+    "1 that the source writes and adding such a 0 are free. A doubling counts as an addition, x + x: so the "
+    "report's numbers come out."
+)
+
+
+def _operations(counts: dict[str, int]) -> tuple[int, int, int]:
+    """As the report counts; what is timed here has divisions and roots beside, these have none."""
+    adds = counts["additions"] + counts["doublings"]
+    return adds, counts["multiplications"], adds + counts["multiplications"]
+
+
+def _operation_rows(
+    counts: dict[str, dict[str, int]],
+    wanted: dict[str, tuple[int, int, int]],
+    names: dict[str, str],
+    why: dict[str, str],
+) -> tuple[Row, ...]:
+    rows = []
+    for key, name in names.items():
+        ours, expected = _operations(counts[key]), wanted.get(key)
+        agrees = None if expected is None else ours == expected
+        rows.append(Row(name, expected, ours, agrees, why.get(key, "") if agrees is False else ""))
+    return tuple(rows)
+
+
+def point_operations(measurements: Measurements | None) -> Table:
+    title, tolerance = "Operations to move a point", "The numbers must be equal."
+    if measurements is None:
+        return Table("3.2", title, _OPERATION_COLUMNS, tolerance, 0, missing=HOW_TO_MEASURE)
+    counts = measurements.counts["3.2"]
+    products = _operations(counts["dual_quat_by_products"])
+    names = {
+        **printed.NAMES,
+        "dual_quat_by_products": "The report's formula d p d* by our product",
+        "matrix_4x4": "GLM's 4x4 matrix, fourth row and all",
+    }
+    why = {
+        "dual_quat": "Ours turns the point by two cross products and reads the translation off 2 dual real*. "
+        f"The report's formula, two products of dual quaternions, takes {products[0]} and {products[1]} when "
+        "every component is computed; how it comes to the printed numbers, it does not say."
+    }
+    return Table(
+        "3.2",
+        title,
+        _OPERATION_COLUMNS,
+        tolerance,
+        0,
+        _operation_rows(counts, printed.POINT_OPERATIONS, names, why),
+        notes=(_OPERATION_NOTE,),
+    )
+
+
+def chain_operations(measurements: Measurements | None) -> Table:
+    title, tolerance = "Operations to chain two transforms", "The numbers must be equal."
+    if measurements is None:
+        return Table("3.3", title, _OPERATION_COLUMNS, tolerance, 0, missing=HOW_TO_MEASURE)
+    names = {**printed.NAMES, "matrix_4x4": "GLM's 4x4 matrix, fourth row and all"}
+    adds, multiplies, total = printed.CHAIN_OPERATIONS["quat_vec"]
+    why = {
+        "quat_vec": f"Adds and multiplies are equal; the printed total of {total} is a slip: "
+        f"{adds} + {multiplies} = {adds + multiplies}.",
+        "dual_quat": "Three quaternion products have 48 multiplications and 36 additions: the printed "
+        "columns are exchanged. Adding two of the products, in each component, makes 4 additions more.",
+    }
+    return Table(
+        "3.3",
+        title,
+        _OPERATION_COLUMNS,
+        tolerance,
+        0,
+        _operation_rows(measurements.counts["3.3"], printed.CHAIN_OPERATIONS, names, why),
+        notes=(_OPERATION_NOTE,),
+    )
+
+
+# --- Times
+
+_UNOPTIMISED = "ratio, not optimised"
+# Where a candidate's operations are counted.
+_COUNTED_IN = {"3.4": "3.3", "3.5": "3.2"}
+_COUNTED = {
+    "sinew_affine": "affine",
+    "sinew_quat_vec": "quat_vec",
+    "sinew_dual_quat": "dual_quat",
+    "glm_4x4": "matrix_4x4",
+    **{
+        f"sinew_{name}": name
+        for name in ("matrix_linear", "matrix_log", "qv_nlerp", "qv_slerp", "dlb", "sclerp")
+    },
+    **{f"sinew_{name}": name for name in ("lbs", "qv", "dq")},
+}
+_TIME_COLUMNS = ("printed s", "ns each", "fastest ns", "operations", _UNOPTIMISED)
+
+
+def _time_table(
+    number: str,
+    title: str,
+    measurements: Measurements | None,
+    names: dict[str, str],
+    seconds: dict[str, float],
+    glm: dict[str, str],
+    notes: tuple[str, ...] = (),
+) -> Table:
+    """A table of ratios to the first of `names`, plain 4x4 matrices.
+
+    names    of candidates, for people
+    seconds  printed, by candidate; the first is that of the report's matrices
+    glm      the candidates as the report had them, by those that `seconds` names
+    """
+    tolerance = (
+        "Ratios to the report's matrices, 4x4 with all sixteen numbers; one agrees within "
+        f"{RATIO_TOLERANCE:.0%} of the printed one. Without optimisation the ratios are to GLM's 4x4."
+    )
+    if measurements is None:
+        return Table(number, title, ("ratio",), tolerance, 2, missing=HOW_TO_MEASURE)
+    each = OPERATIONS[number]
+    counts = measurements.counts[_COUNTED_IN.get(number, number)]
+
+    def times(key: str, of: dict[str, Timing]) -> Timing | None:
+        return of.get(f"{number}/{key}")
+
+    base_key = next(iter(names))
+    base = times(base_key, measurements.optimised)
+    glm_base = times("glm_4x4", measurements.unoptimised)
+    rows = []
+    for key, name in names.items():
+        ours = times(key, measurements.optimised)
+        slow = times(key, measurements.unoptimised)
+        ratio = ours.median / base.median
+        expected = seconds[key] / seconds[base_key] if key in seconds else None
+        agrees, why = None, ""
+        if expected is not None and key != base_key:
+            agrees = abs(ratio / expected - 1) <= RATIO_TOLERANCE
+            if not agrees:
+                like = times(glm[key], measurements.unoptimised)
+                why = (
+                    f"Optimisation makes plain matrices {_times(number, base_key, measurements)} times as "
+                    f"fast and these {_times(number, key, measurements)} times. Without it, and in GLM where "
+                    f"GLM has it, the ratio is {like.median / glm_base.median:.2f}."
+                )
+        more: dict[str, float | str] = {
+            "printed s": seconds.get(key, ""),
+            "ns each": ours.median / each * 1e9,
+            "fastest ns": ours.fastest / each * 1e9,
+            "operations": counts[_COUNTED[key]]["total"] if _COUNTED.get(key) in counts else "",
+            _UNOPTIMISED: "" if slow is None else slow.median / glm_base.median,
+        }
+        rows.append(Row(name, None if expected is None else (expected,), (ratio,), agrees, why, more))
+    printed_each = seconds[base_key] / each * 1e9
+    glm_each = glm_base.median / each * 1e9
+    plain_each = base.median / each * 1e9
+    first = (
+        f"The report's matrices take {printed_each:,.0f} ns each. Here GLM's take {glm_each:,.0f} ns without "
+        f"optimisation, and plain loops {plain_each:.1f} ns with it: the printed times look like those of a "
+        "build for debugging."
+    )
+    return Table(number, title, ("ratio",), tolerance, 2, tuple(rows), _TIME_COLUMNS, (first, *notes))
+
+
+def _times(number: str, key: str, measurements: Measurements) -> str:
+    """How many times as fast optimisation makes it."""
+    name = f"{number}/{key}"
+    return f"{measurements.unoptimised[name].median / measurements.optimised[name].median:.0f}"
+
+
+_OURS_AND_OTHERS = {
+    "plain_4x4": "Matrices 4x4, plain loops",
+    "sinew_affine": "Matrices 3x4, Sinew",
+    "sinew_quat_vec": "Quaternion-vector, Sinew",
+    "sinew_dual_quat": "Dual quaternions, Sinew",
+    "glm_4x4": "Matrices 4x4, GLM",
+    "glm_quat_vec": "Quaternion-vector, GLM",
+    "glm_dual_quat": "Dual quaternions, GLM",
+    "eigen_4x4": "Matrices 4x4, Eigen",
+    "eigen_3x4": "Matrices 3x4, Eigen",
+    "eigen_quat_vec": "Quaternion-vector, Eigen",
+}
+_GLM = {"sinew_quat_vec": "glm_quat_vec", "sinew_dual_quat": "glm_dual_quat"}
+
+
+def _seconds(of: dict[str, float]) -> dict[str, float]:
+    keys = {"affine": "plain_4x4", "quat_vec": "sinew_quat_vec", "dual_quat": "sinew_dual_quat"}
+    return {keys[name]: value for name, value in of.items()}
+
+
+def chain_times(measurements: Measurements | None) -> Table:
+    return _time_table(
+        "3.4",
+        "Time to combine six transforms, 100,000 times",
+        measurements,
+        _OURS_AND_OTHERS,
+        _seconds(printed.CHAIN_SECONDS),
+        _GLM,
+    )
+
+
+def point_times(measurements: Measurements | None) -> Table:
+    return _time_table(
+        "3.5",
+        "Time to move a point, 1,000,000 times",
+        measurements,
+        _OURS_AND_OTHERS,
+        _seconds(printed.POINT_SECONDS),
+        _GLM,
+    )
+
+
+def interpolation_times(measurements: Measurements | None) -> Table:
+    keys = {"matrix_linear": "plain_4x4"}
+    return _time_table(
+        "3.9",
+        "Time to interpolate between two transforms, 1,000,000 times",
+        measurements,
+        {
+            "plain_4x4": "Matrices 4x4 linear, plain loops",
+            "sinew_matrix_linear": "Matrices 3x4 linear, Sinew",
+            "sinew_matrix_polar": "Matrices 3x4 polar, Sinew",
+            "sinew_matrix_log": "Matrices 3x4 logarithm, Sinew",
+            "sinew_qv_nlerp": "Quaternion-vector nlerp, Sinew",
+            "sinew_qv_slerp": "Quaternion-vector slerp, Sinew",
+            "sinew_dlb": "Dual quaternions DLB, Sinew",
+            "sinew_sclerp": "Dual quaternions ScLERP, Sinew",
+            "glm_4x4": "Matrices 4x4 linear, GLM",
+            "glm_quat_vec_nlerp": "Quaternion-vector nlerp, GLM",
+            "glm_quat_vec_slerp": "Quaternion-vector slerp, GLM",
+            "glm_dual_quat": "Dual quaternions DLB, GLM",
+            "eigen_4x4": "Matrices 4x4 linear, Eigen",
+            "eigen_3x4": "Matrices 3x4 linear, Eigen",
+            "eigen_quat_vec_nlerp": "Quaternion-vector nlerp, Eigen",
+            "eigen_quat_vec_slerp": "Quaternion-vector slerp, Eigen",
+        },
+        {keys.get(name, f"sinew_{name}"): value for name, value in printed.INTERPOLATION_SECONDS.items()},
+        {
+            "sinew_qv_nlerp": "glm_quat_vec_nlerp",
+            "sinew_qv_slerp": "glm_quat_vec_slerp",
+            "sinew_dlb": "glm_dual_quat",
+            "sinew_sclerp": "sinew_sclerp",
+        },
+        ("Sinew's functions check more than the others: they also say whether the result is defined.",),
+    )
+
+
+def skinning_times(measurements: Measurements | None) -> Table:
+    keys = {"lbs": "plain_4x4"}
+    return _time_table(
+        "3.10",
+        "Time to blend three transforms and move a point, 1,000,000 times",
+        measurements,
+        {
+            "plain_4x4": "Matrix linear blending 4x4, plain loops",
+            "sinew_lbs": "Matrix linear blending 3x4, Sinew",
+            "sinew_qv": "Direct quaternion blending, Sinew",
+            "sinew_dq": "Dual quaternion linear blending, Sinew",
+            "kernel_lbs": "Matrix linear blending, Sinew's kernel",
+            "kernel_qv": "Direct quaternion blending, Sinew's kernel",
+            "kernel_dq": "Dual quaternion linear blending, Sinew's kernel",
+            "glm_4x4": "Matrix linear blending 4x4, GLM",
+            "glm_quat_vec": "Direct quaternion blending, GLM",
+            "glm_dual_quat": "Dual quaternion linear blending, GLM",
+            "eigen_4x4": "Matrix linear blending 4x4, Eigen",
+            "eigen_3x4": "Matrix linear blending 3x4, Eigen",
+            "eigen_quat_vec": "Direct quaternion blending, Eigen",
+        },
+        {keys.get(name, f"sinew_{name}"): value for name, value in printed.SKINNING_SECONDS.items()},
+        {"sinew_qv": "glm_quat_vec", "sinew_dq": "glm_dual_quat"},
+        (
+            "The report does not say how often; a million times is taken, as in Table 3.5. Sinew without a "
+            "kernel is the one vertex of native/sinew/skinning, written like the paper; a kernel does "
+            "meshes of 10,000 vertices, a hundred times, on one thread.",
+        ),
+    )
+
+
+# --- Accuracy
+
+
+def pair(
+    angle: float, axis: tuple[float, ...], shift: tuple[float, ...], dtype: type, normalise: str
+) -> np.ndarray:
+    """A quaternion-vector pair [7] built by normalising the `normalise`: "axis" or "quaternion".
+
+    angle  degrees
+    axis   as printed: rounded, and so not of unit length
+    """
+    half, direction = np.radians(angle) / 2, np.array(axis, np.float64)
+    if normalise == "axis":
+        direction /= np.linalg.norm(direction)
+    quaternion = np.array([np.cos(half), *(np.sin(half) * direction)])
+    quaternion /= np.linalg.norm(quaternion)
+    return np.array([*quaternion, *shift], dtype)
+
+
+def chain(name: str, dtype: type, normalise: str) -> np.ndarray:
+    """Transforms A to D of Table 3.7 in the representation `name`."""
+    pairs = np.array([pair(*row, dtype, normalise) for row in printed.CHAIN.values()])
+    return pairs if name == "quat_vec" else getattr(sinew.quat_vec, f"to_{name}")(pairs)
+
+
+def moved_one_by_one(name: str, dtype: type, normalise: str) -> np.ndarray:
+    """[4, 3]: the point (0, 0, 0) after each transform in turn."""
+    point, points = np.zeros(3, dtype), []
+    for transform in chain(name, dtype, normalise):
+        point = LAYOUTS[name].transform_point(transform, point)
+        points.append(point)
+    return np.array(points)
+
+
+def moved_combined(name: str, dtype: type, normalise: str) -> np.ndarray:
+    """[3]: the same by one transform, D C B A."""
+    module = LAYOUTS[name]
+    a, b, c, d = chain(name, dtype, normalise)
+    product = module.compose(d, module.compose(c, module.compose(b, a)))
+    return module.transform_point(product, np.zeros(3, dtype))
+
+
+def moved_by_one(name: str, dtype: type) -> np.ndarray:
+    """[3]: the point (0, 0, 0) after the transform of Table 3.6."""
+    motion = pair(*printed.TRANSLATION, dtype, AS_REPORT[name])
+    transform = motion if name == "quat_vec" else getattr(sinew.quat_vec, f"to_{name}")(motion)
+    return LAYOUTS[name].transform_point(transform, np.zeros(3, dtype))
+
+
+def _vector(numbers: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(number) for number in numbers)
+
+
+def _text(numbers: np.ndarray) -> str:
+    return ", ".join(f"{number:.7f}" for number in numbers)
+
+
+def translation() -> Table:
+    rows = []
+    for name, expected in printed.TRANSLATED.items():
+        single, double = moved_by_one(name, np.float32), moved_by_one(name, np.float64)
+        difference = error(single, expected)
+        agrees = difference <= TRANSLATION_TOLERANCE
+        rows.append(
+            Row(
+                printed.NAMES[name],
+                expected,
+                _vector(single),
+                agrees,
+                "" if agrees else f"It is {difference:.1e} off.",
+                {
+                    "difference": difference,
+                    "off (1, 0, 0.5) in float32": error(single, (1, 0, 0.5)),
+                    "in float64": error(double, (1, 0, 0.5)),
+                },
+            )
+        )
+    return Table(
+        "3.6",
+        "The translation of one transform: (0, 0, 0) turned about (0, 1, 1) by 80 degrees and moved by (1, "
+        "0, 0.5)",
+        ("x", "y", "z"),
+        f"A component agrees within {TRANSLATION_TOLERANCE:.1e}, two steps of float32 at 1.",
+        8,
+        tuple(rows),
+        ("difference", "off (1, 0, 0.5) in float32", "in float64"),
+        ("The dual quaternion's error is the rounding of 2 dual real*, in the last digit of float32.",),
+    )
+
+
+_SHORT_NAMES = {"affine": "matrices", "quat_vec": "pair", "dual_quat": "dual quaternions"}
+_CHAIN_COLUMNS = (
+    "difference",
+    "with unit axes",
+    "difference from unit axes",
+    "float32, off float64",
+)
+
+
+def _chain_row(
+    label: str, name: str, expected: tuple[float, ...], built: dict[tuple[str, type], np.ndarray]
+) -> Row:
+    """built  [3] by what was normalised and element type."""
+    ours = built[AS_REPORT[name], np.float64]
+    unit = built["axis", np.float64]
+    difference = error(ours, expected)
+    agrees = difference <= CHAIN_TOLERANCE
+    return Row(
+        label,
+        expected,
+        _vector(ours),
+        agrees,
+        "" if agrees else f"It is {difference:.1e} off.",
+        {
+            "difference": difference,
+            "with unit axes": _text(unit),
+            "difference from unit axes": error(unit, expected),
+            "float32, off float64": error(built[AS_REPORT[name], np.float32], ours),
+        },
+    )
+
+
+def _built(compute: object, name: str) -> dict[tuple[str, type], np.ndarray]:
+    return {
+        (normalise, dtype): compute(name, dtype, normalise)
+        for normalise in ("axis", "quaternion")
+        for dtype in (np.float32, np.float64)
+    }
+
+
+_CHAIN_TOLERANCE_TEXT = (
+    f"A component agrees within {CHAIN_TOLERANCE:.0e}, ten steps of float32 at 10.8; ours is float64, built "
+    "as the report's representation builds it."
+)
+
+
+def chain_spreads() -> dict[str, float]:
+    """The largest differences between the columns of Table 3.7, of what is printed and of ours.
+
+    as_report    ours, each built as in the report
+    unit_axes    ours in float64, all with unit axes; unit_axes_float32 likewise
+    quaternions  ours in float64, all with normalised quaternions
+    axis_error   how far from 1 the length of a printed axis is, at most
+    """
+
+    def spread(columns: dict[str, np.ndarray]) -> float:
+        values = list(columns.values())
+        return max(error(a, b) for a in values for b in values)
+
+    def ours(dtype: type, normalise: str) -> dict[str, np.ndarray]:
+        return {name: moved_one_by_one(name, dtype, normalise) for name in LAYOUTS}
+
+    return {
+        "printed": spread({name: np.array(points) for name, points in printed.ONE_BY_ONE.items()}),
+        "as_report": spread({n: moved_one_by_one(n, np.float64, AS_REPORT[n]) for n in LAYOUTS}),
+        "unit_axes": spread(ours(np.float64, "axis")),
+        "unit_axes_float32": spread(ours(np.float32, "axis")),
+        "quaternions": spread(ours(np.float64, "quaternion")),
+        "axis_error": max(abs(np.linalg.norm(axis) - 1) for _, axis, _ in printed.CHAIN.values()),
+    }
+
+
+def one_by_one() -> Table:
+    built = {name: _built(moved_one_by_one, name) for name in LAYOUTS}
+    rows = []
+    for step, letter in enumerate(printed.CHAIN):
+        for name in LAYOUTS:
+            here = {key: points[step] for key, points in built[name].items()}
+            label = f"{letter}, {_SHORT_NAMES[name]}"
+            rows.append(_chain_row(label, name, printed.ONE_BY_ONE[name][step], here))
+    s = chain_spreads()
+    notes = (
+        f"Why the printed columns differ by up to {s['printed']:.1e}: the printed axes are rounded, and up "
+        f"to {s['axis_error']:.1e} off unit length. The report's matrices normalise the axis, its "
+        "quaternions the whole quaternion, which is another rotation. Built so in float64, ours differ by "
+        f"{s['as_report']:.1e} too.",
+        "The other reading, all three with unit axes (or all with normalised quaternions): they agree to "
+        f"{s['unit_axes']:.0e} (or {s['quaternions']:.0e}) in float64 and to {s['unit_axes_float32']:.0e} in "
+        "float32. What is left is rounding.",
+    )
+    return Table(
+        "3.7",
+        "A point through a chain of transforms, one after the other",
+        ("x", "y", "z"),
+        _CHAIN_TOLERANCE_TEXT,
+        7,
+        tuple(rows),
+        _CHAIN_COLUMNS,
+        notes,
+    )
+
+
+def combined() -> Table:
+    rows, apart = [], []
+    for name, expected in printed.COMBINED.items():
+        built = _built(moved_combined, name)
+        rows.append(_chain_row(_SHORT_NAMES[name], name, expected, built))
+        key = AS_REPORT[name], np.float32
+        ours = error(built[key], moved_one_by_one(name, np.float32, key[0])[-1])
+        theirs = error(expected, printed.ONE_BY_ONE[name][-1])
+        apart.append(f"{printed.NAMES[name].lower()} {ours:.0g}, printed {theirs:.0g}")
+    return Table(
+        "3.8",
+        "The same chain combined into one transform",
+        ("x", "y", "z"),
+        _CHAIN_TOLERANCE_TEXT,
+        7,
+        tuple(rows),
+        _CHAIN_COLUMNS,
+        (f"How far combined is from one by one, in float32: {'; '.join(apart)}.",),
+    )

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <glm/gtx/dual_quaternion.hpp>
+
+#include "sinew/interpolate/methods.h"
+#include "sinew/skinning/dq.h"
+#include "sinew/skinning/lbs.h"
+#include "sinew/skinning/qv.h"
+#include "sinew/transform/make.h"
+
+namespace experiments {
+
+// A candidate is a representation as one library has it, with what it can do of
+//   make(rigid)                      from the same double for all
+//   compose(a, b), apply(a, point)   first b, then a; a point moved
+//   blend(transforms, weights)       of three, to the caller's knowledge with signs of quaternions free
+
+using Rigid = sinew::QuatVec<double>;
+using Weights = std::array<float, 3>;
+
+/// "Standard matrix math on 4x4 matrices" (Smith 2013, section 3.4.3): all sixteen numbers, three loops.
+struct Plain4x4 {
+    struct Transform {
+        float rows[4][4];
+    };
+    using Point = glm::vec3;
+
+    static Transform make(const Rigid& rigid) {
+        const sinew::Affine<double> a = sinew::to_affine(rigid);
+        Transform m{};
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) {
+                m.rows[row][column] = static_cast<float>(a.linear[column][row]);
+            }
+            m.rows[row][3] = static_cast<float>(a.translation[row]);
+        }
+        m.rows[3][3] = 1.0f;
+        return m;
+    }
+    static Transform compose(const Transform& a, const Transform& b) {
+        Transform product;
+        for (int row = 0; row < 4; ++row) {
+            for (int column = 0; column < 4; ++column) {
+                float sum = 0.0f;
+                for (int k = 0; k < 4; ++k) sum += a.rows[row][k] * b.rows[k][column];
+                product.rows[row][column] = sum;
+            }
+        }
+        return product;
+    }
+    static Point apply(const Transform& a, const Point& point) {
+        const float p[4] = {point.x, point.y, point.z, 1.0f};
+        float moved[4];
+        for (int row = 0; row < 4; ++row) {
+            moved[row] = 0.0f;
+            for (int k = 0; k < 4; ++k) moved[row] += a.rows[row][k] * p[k];
+        }
+        return {moved[0], moved[1], moved[2]};
+    }
+    static Transform linear(const Transform& a, const Transform& b, float t) {
+        Transform between;
+        for (int row = 0; row < 4; ++row) {
+            for (int column = 0; column < 4; ++column) {
+                between.rows[row][column] = (1.0f - t) * a.rows[row][column] + t * b.rows[row][column];
+            }
+        }
+        return between;
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        Transform sum{};
+        for (std::size_t k = 0; k < weights.size(); ++k) {
+            for (int row = 0; row < 4; ++row) {
+                for (int column = 0; column < 4; ++column) {
+                    sum.rows[row][column] += weights[k] * transforms[k].rows[row][column];
+                }
+            }
+        }
+        return sum;
+    }
+};
+
+/// A representation of Sinew's, by its operators.
+template <template <class> class Representation>
+struct Ours {
+    using Transform = Representation<float>;
+    using Point = glm::vec3;
+
+    static Transform make(const Rigid& rigid) { return sinew::cast<float>(sinew::to<Representation>(rigid)); }
+    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
+    static Point apply(const Transform& a, const Point& point) { return sinew::transform_point(a, point); }
+};
+
+struct Glm4x4 {
+    using Transform = glm::mat4;
+    using Point = glm::vec3;
+
+    static Transform make(const Rigid& rigid) {
+        const sinew::Affine<double> a = sinew::to_affine(rigid);
+        Transform m(glm::mat3(a.linear));
+        m[3] = glm::vec4(glm::vec3(a.translation), 1.0f);
+        return m;
+    }
+    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
+    static Point apply(const Transform& a, const Point& point) {
+        return glm::vec3(a * glm::vec4(point, 1.0f));
+    }
+    static Transform linear(const Transform& a, const Transform& b, float t) {
+        return (1.0f - t) * a + t * b;
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        return weights[0] * transforms[0] + weights[1] * transforms[1] + weights[2] * transforms[2];
+    }
+};
+
+struct GlmPair {
+    struct Transform {
+        glm::quat rotation;
+        glm::vec3 translation;
+    };
+    using Point = glm::vec3;
+
+    static Transform make(const Rigid& rigid) {
+        return {glm::quat(rigid.rotation), glm::vec3(rigid.translation)};
+    }
+    static Transform compose(const Transform& a, const Transform& b) {
+        return {a.rotation * b.rotation, a.rotation * b.translation + a.translation};
+    }
+    static Point apply(const Transform& a, const Point& point) { return a.rotation * point + a.translation; }
+    static Transform nlerp(const Transform& a, const Transform& b, float t) {
+        const float side = glm::dot(a.rotation, b.rotation) < 0.0f ? -1.0f : 1.0f;
+        return {glm::normalize(a.rotation * (1.0f - t) + b.rotation * (side * t)),
+                glm::mix(a.translation, b.translation, t)};
+    }
+    static Transform slerp(const Transform& a, const Transform& b, float t) {
+        return {glm::slerp(a.rotation, b.rotation, t), glm::mix(a.translation, b.translation, t)};
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        Transform sum{transforms[0].rotation * weights[0], transforms[0].translation * weights[0]};
+        for (std::size_t k = 1; k < weights.size(); ++k) {
+            const float side = glm::dot(transforms[0].rotation, transforms[k].rotation) < 0.0f ? -1.0f : 1.0f;
+            sum.rotation = sum.rotation + transforms[k].rotation * (side * weights[k]);
+            sum.translation += transforms[k].translation * weights[k];
+        }
+        return {glm::normalize(sum.rotation), sum.translation};
+    }
+};
+
+struct GlmDualQuat {
+    using Transform = glm::dualquat;
+    using Point = glm::vec3;
+
+    static Transform make(const Rigid& rigid) {
+        const sinew::DualQuat<double> d = sinew::to_dual_quat(rigid);
+        return {glm::quat(d.real), glm::quat(d.dual)};
+    }
+    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
+    static Point apply(const Transform& a, const Point& point) { return a * point; }
+    static Transform dlb(const Transform& a, const Transform& b, float t) {
+        return glm::normalize(glm::lerp(a, b, t));
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        Transform sum = transforms[0] * weights[0];
+        for (std::size_t k = 1; k < weights.size(); ++k) {
+            const float side = glm::dot(transforms[0].real, transforms[k].real) < 0.0f ? -1.0f : 1.0f;
+            sum = sum + transforms[k] * (side * weights[k]);
+        }
+        return glm::normalize(sum);
+    }
+};
+
+struct Eigen4x4 {
+    using Transform = Eigen::Matrix4f;
+    using Point = Eigen::Vector3f;
+
+    static Transform make(const Rigid& rigid) {
+        const Plain4x4::Transform m = Plain4x4::make(rigid);
+        return Eigen::Map<const Eigen::Matrix<float, 4, 4, Eigen::RowMajor>>(&m.rows[0][0]);
+    }
+    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
+    static Point apply(const Transform& a, const Point& point) {
+        const Eigen::Vector4f moved = a * point.homogeneous();
+        return moved.head<3>();
+    }
+    static Transform linear(const Transform& a, const Transform& b, float t) {
+        return (1.0f - t) * a + t * b;
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        return weights[0] * transforms[0] + weights[1] * transforms[1] + weights[2] * transforms[2];
+    }
+};
+
+/// 3x4, as Eigen has it for rigid motions.
+struct Eigen3x4 {
+    using Transform = Eigen::AffineCompact3f;
+    using Point = Eigen::Vector3f;
+
+    static Transform make(const Rigid& rigid) {
+        Transform m;
+        m.matrix() = Eigen4x4::make(rigid).topRows<3>();
+        return m;
+    }
+    static Transform compose(const Transform& a, const Transform& b) { return a * b; }
+    static Point apply(const Transform& a, const Point& point) { return a * point; }
+    static Transform linear(const Transform& a, const Transform& b, float t) {
+        Transform between;
+        between.matrix() = (1.0f - t) * a.matrix() + t * b.matrix();
+        return between;
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        Transform sum;
+        sum.matrix() = weights[0] * transforms[0].matrix() + weights[1] * transforms[1].matrix() +
+                       weights[2] * transforms[2].matrix();
+        return sum;
+    }
+};
+
+struct EigenPair {
+    struct Transform {
+        Eigen::Quaternionf rotation;
+        Eigen::Vector3f translation;
+    };
+    using Point = Eigen::Vector3f;
+
+    static Transform make(const Rigid& rigid) {
+        const auto& q = rigid.rotation;
+        const auto& v = rigid.translation;
+        return {Eigen::Quaterniond(q.w, q.x, q.y, q.z).cast<float>(),
+                Eigen::Vector3d(v.x, v.y, v.z).cast<float>()};
+    }
+    static Transform compose(const Transform& a, const Transform& b) {
+        return {a.rotation * b.rotation, a.rotation * b.translation + a.translation};
+    }
+    static Point apply(const Transform& a, const Point& point) { return a.rotation * point + a.translation; }
+    static Transform nlerp(const Transform& a, const Transform& b, float t) {
+        const float side = a.rotation.dot(b.rotation) < 0.0f ? -1.0f : 1.0f;
+        Transform between{Eigen::Quaternionf(), (1.0f - t) * a.translation + t * b.translation};
+        between.rotation.coeffs() =
+            ((1.0f - t) * a.rotation.coeffs() + (side * t) * b.rotation.coeffs()).normalized();
+        return between;
+    }
+    static Transform slerp(const Transform& a, const Transform& b, float t) {
+        return {a.rotation.slerp(t, b.rotation), (1.0f - t) * a.translation + t * b.translation};
+    }
+    static Transform blend(const Transform* transforms, const Weights& weights) {
+        Eigen::Vector4f rotation = weights[0] * transforms[0].rotation.coeffs();
+        Eigen::Vector3f translation = weights[0] * transforms[0].translation;
+        for (std::size_t k = 1; k < weights.size(); ++k) {
+            const float side = transforms[0].rotation.dot(transforms[k].rotation) < 0.0f ? -1.0f : 1.0f;
+            rotation += (side * weights[k]) * transforms[k].rotation.coeffs();
+            translation += weights[k] * transforms[k].translation;
+        }
+        return {Eigen::Quaternionf(rotation.normalized()), translation};
+    }
+};
+
+}  // namespace experiments

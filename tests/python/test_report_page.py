@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page of `sinew report`, made in quick mode: it needs nothing beside itself, and says what report.json
+says.
+
+SINEW_EXPERIMENTS is the folder of the built programs of experiments/; without it the page has no times.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import pytest
+from sinew_addon.core.report import measure, meshes, tables
+from sinew_addon.core.report.page import format_numbers
+
+PROGRAMS = os.environ.get("SINEW_EXPERIMENTS")
+TABLES = [f"3.{number}" for number in range(1, 11)]
+FIGURES = [f"3.{number}" for number in range(4, 12)]
+MEASURED = {"3.2", "3.3", "3.4", "3.5", "3.9", "3.10"}
+DRAWN = {"3.6", "3.7", "3.8", "3.9", "3.10", "3.11"}
+
+
+class Reader(HTMLParser):
+    """What a page refers to, its tags, and under each heading the rows of its tables and its text."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.references, self.tags, self.rows, self.text = [], [], {}, {}
+        self._section, self._cell = None, None
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        values = dict(attributes)
+        self.references += [values[name] for name in ("src", "href", "xlink:href", "data") if name in values]
+        self.references += re.findall(r"url\(([^)]*)\)", values.get("style") or "")
+        if tag in ("h1", "h2", "h3"):
+            self._section = values.get("id", tag)
+            self.rows[self._section], self.text[self._section] = [], ""
+        elif tag == "tr":
+            self.rows[self._section].append([])
+        elif tag in ("td", "th"):
+            self.rows[self._section][-1].append("")
+            self._cell = True
+
+    def handle_endtag(self, tag):
+        if tag in ("td", "th"):
+            self._cell = None
+
+    def handle_data(self, data):
+        if self._section is not None:
+            self.text[self._section] += data
+        if self._cell:
+            self.rows[self._section][-1][-1] += data
+
+
+def run_report(folder, *options, status=0):
+    command = [sys.executable, "-c", "from sinew_addon.cli import run; run()", "report", "--out", folder]
+    done = subprocess.run(
+        [*map(str, command), *map(str, options)], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == status, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Text of report.html, content of report.json, and what was said on the way."""
+    folder = tmp_path_factory.mktemp("report")
+    programs = ["--programs", PROGRAMS] if PROGRAMS else []
+    done = run_report(folder, "--quick", *programs)
+    assert done.stdout.split() == [str(folder / "report.html"), str(folder / "report.json")]
+    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "report.json"]
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    return html, json.loads((folder / "report.json").read_text(encoding="utf-8")), done.stderr
+
+
+def test_it_needs_nothing_beside_itself(made):
+    html, _content, _said = made
+    reader = Reader(html)
+    assert reader.tags.count("svg") == 4
+    assert not {"script", "link", "iframe", "object", "embed"} & set(reader.tags)
+    assert [reference for reference in reader.references if not reference.startswith(("#", "data:"))] == []
+    # Names of namespaces are not fetched.
+    addresses = set(re.findall(r"\w+://[^\s\"'<)]+", html))
+    assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+    assert "@import" not in html
+
+
+def test_every_table_and_figure_is_there(made):
+    html, content, _said = made
+    assert list(content["tables"]) == TABLES
+    assert list(content["figures"]) == FIGURES
+    headings = re.findall(r'<h3 id="([a-z]+-[\d.]+)">', html)
+    assert headings == [f"table-{number}" for number in TABLES] + [f"figure-{number}" for number in FIGURES]
+
+
+def test_the_page_says_what_the_json_says(made):
+    html, content, _said = made
+    reader = Reader(html)
+    seen = 0
+    for number, table in content["tables"].items():
+        rows = reader.rows[f"table-{number}"]
+        if table["missing"]:
+            assert table["missing"] in reader.text[f"table-{number}"]
+            continue
+        shown = {row[0]: row for row in rows[1:]}
+        assert list(shown) == [row["name"] for row in table["rows"]]
+        for row in table["rows"]:
+            cells = shown[row["name"]]
+            assert cells[1] == format_numbers(row["printed"], table["decimals"])
+            assert cells[2] == format_numbers(row["ours"], table["decimals"])
+            assert cells[3] == {True: "yes", False: "no", None: ""}[row["agrees"]]
+            assert row["why"] in ("", *cells)
+            seen += 1
+        for note in (table["tolerance"], *table["notes"]):
+            assert note in reader.text[f"table-{number}"]
+    assert seen >= 21
+    for number, figure in content["figures"].items():
+        text = reader.text[f"figure-{number}"]
+        for said in (*figure["pictures"], *figure["notes"], *[fact["ours"] for fact in figure["facts"]]):
+            assert said in text
+    for answer in content["answers"]:
+        assert answer["question"] in html.replace("&#x27;", "'").replace("&quot;", '"')
+
+
+def test_what_does_not_agree_says_why(made):
+    _html, content, _said = made
+    for number, table in content["tables"].items():
+        for row in table["rows"]:
+            assert bool(row["why"]) == (row["agrees"] is False), (number, row["name"])
+
+
+def test_what_is_missing_says_how_to_get_it(made):
+    _html, content, said = made
+    missing = {f"Table {number}" for number, table in content["tables"].items() if table["missing"]}
+    missing |= {f"Figure {number}" for number, figure in content["figures"].items() if figure["missing"]}
+    measured = set() if PROGRAMS else {f"Table {number}" for number in MEASURED}
+    assert missing == measured | {f"Figure {number}" for number in DRAWN}
+    for name in missing:
+        assert f"{name}: Not " in said
+        assert "./dev report" in said
+
+
+def test_quick_mode_warns(made):
+    html, content, _said = made
+    assert content["quick"] is True
+    assert "Made in quick mode" in html
+
+
+def test_a_folder_that_is_not_there_is_said_to_be(tmp_path):
+    done = run_report(tmp_path / "out", "--programs", tmp_path / "none", status=1)
+    assert done.stderr == f"sinew: {tmp_path / 'none'}: no such folder\n"
+    done = run_report(tmp_path / "out", "--programs", tmp_path, status=1)
+    assert "has no program operation_counts; ./dev report builds it" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_in_the_place_of_the_folder_is_left(tmp_path):
+    path = tmp_path / "out"
+    path.write_text("mine")
+    assert "is a file, expected a folder" in run_report(path, status=1).stderr
+    assert path.read_text() == "mine"
+
+
+def test_a_program_that_fails_is_said_to(tmp_path):
+    for name in measure.PROGRAMS:
+        (tmp_path / name).write_text("#!/bin/sh\necho no such processor >&2\nexit 3\n")
+        (tmp_path / name).chmod(0o755)
+    done = run_report(tmp_path / "out", "--programs", tmp_path, status=1)
+    assert done.stderr.endswith("operation_counts: failed with status 3: no such processor\n")
+
+
+def test_without_matplotlib_the_numbers_are_there(monkeypatch):
+    from sinew_addon.core.report import paths
+
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    figure = paths.figure_3_4()
+    assert figure.pictures == ()
+    assert "matplotlib" in figure.missing
+    assert all(fact.agrees for fact in figure.facts)
+
+
+def test_missing_figures_have_the_titles_of_drawn_ones():
+    assert [figure.number for figure in meshes.missing("why")] == sorted(
+        DRAWN, key=lambda number: int(number[2:])
+    )
+
+
+@pytest.fixture(scope="module")
+def measurements():
+    if not PROGRAMS:
+        pytest.skip("SINEW_EXPERIMENTS is not set: programs of experiments/ are not run")
+    from pathlib import Path
+
+    return measure.measure(Path(PROGRAMS), True, lambda what: None)
+
+
+def test_tables_3_2_and_3_3(measurements):
+    points = {row.name: row for row in tables.point_operations(measurements).rows}
+    assert points["Rigid transformation matrices"].ours == (9, 9, 18)
+    assert points["Quaternion-vector pair"].ours == (18, 15, 33)
+    assert points["Unit dual quaternions"].ours == (33, 31, 64)
+    assert [row.agrees for row in points.values()] == [True, True, False, None, None]
+    chains = {row.name: row for row in tables.chain_operations(measurements).rows}
+    assert chains["Rigid transformation matrices"].ours == (27, 36, 63)
+    assert chains["Quaternion-vector pair"].ours == (30, 31, 61)
+    assert chains["Unit dual quaternions"].ours == (40, 48, 88)
+    assert [row.agrees for row in chains.values()] == [True, False, False, None]
+
+
+@pytest.mark.parametrize("number", ["3.4", "3.5", "3.9", "3.10"])
+def test_times_are_ratios_to_the_first_row(measurements, number):
+    table = next(table for table in tables.tables(measurements) if table.number == number)
+    assert table.rows[0].ours == (1.0,)
+    names = [row.name for row in table.rows]
+    assert len(names) == len(set(names))
+    assert {maker for name in names for maker in ("Sinew", "GLM", "Eigen") if maker in name} == {
+        "Sinew",
+        "GLM",
+        "Eigen",
+    }
+    first = table.rows[0].more["ns each"]
+    for row in table.rows:
+        assert row.ours[0] == pytest.approx(row.more["ns each"] / first)
+        assert 0 < row.more["fastest ns"] <= row.more["ns each"]
+    with_ratio = [row for row in table.rows if row.printed]
+    assert all(row.more["printed s"] for row in with_ratio)
+    for row in with_ratio[1:]:
+        assert row.agrees == (abs(row.ours[0] / row.printed[0] - 1) <= tables.RATIO_TOLERANCE)
