@@ -84,9 +84,9 @@ def update(
     touched = changes.structure or bool(changes.armatures) or obj.session_uid in changes.objects
     if driven is None or touched or driven.mode != mode:
         _maintain(obj, changes)
+    if not source.is_ready(obj, depsgraph):
+        return driven
     driven = _current(obj, driven, depsgraph, changes)
-    if driven is None:
-        return None
     if touched or not driven.watched:
         driven.watched = {obj.session_uid, _uid(properties.of(obj).front), *driven.armatures}
     # Binding is not part of a frame's time: it happens once.
@@ -199,7 +199,7 @@ def _takes_part(flags: properties.SinewStandIn | bpy.types.Modifier, depsgraph: 
 
 def _current(
     obj: bpy.types.Object, driven: Driven | None, depsgraph: bpy.types.Depsgraph, changes: Changes
-) -> Driven | None:
+) -> Driven:
     """The object's state, bound anew where its mesh, weights, bones or modifiers changed."""
     if driven is None:
         return _bind(obj, depsgraph)
@@ -236,11 +236,9 @@ def _bones_changed(
     return changed
 
 
-def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | None = None) -> Driven | None:
+def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | None = None) -> Driven:
     """Reads mesh, weights and bones; keeps the old bindings where they came out the same."""
     read = source.read(obj, depsgraph)
-    if read is None:
-        return old
     pairs = drive.stand_ins(obj)
     bones = [_read_bones(stand_in.armature, depsgraph) for _modifier, stand_in in pairs]
     if (

@@ -19,13 +19,15 @@ from .changes import Changes
 class Source:
     """Read once, and again when it may be out of date.
 
-    points  float32 [vertices, 3], object space, without shape keys
+    points      float32 [vertices, 3], object space, without shape keys
+    from_front  read from what the modifiers in front make of the mesh
     """
 
     group_names: list[str]
     weights: GroupWeights
     points: np.ndarray
     shape_keys: ShapeKeys | None
+    from_front: bool = False
     key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
 
@@ -33,14 +35,18 @@ class Source:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
 
-def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source | None:
-    """None as long as Blender has not evaluated what stands in front."""
+def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """False as long as Blender has not evaluated what stands in front, as when it was just made."""
+    return properties.of(obj).front is None or front.evaluated_mesh(obj, depsgraph) is not None
+
+
+def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
+    """Requires is_ready."""
     names = [group.name for group in obj.vertex_groups]
     if properties.of(obj).front is not None:
         mesh = front.evaluated_mesh(obj, depsgraph)
-        if mesh is None:
-            return None
-        return Source(names, mesh_io.read_group_weights(mesh), mesh_io.read_points(mesh.vertices), None)
+        points = mesh_io.read_points(mesh.vertices)
+        return Source(names, mesh_io.read_group_weights(mesh), points, None, from_front=True)
     weights = mesh_io.read_group_weights(obj.data)
     points = mesh_io.read_points(obj.data.vertices)
     return Source(names, weights, points, mesh_io.read_shape_keys(obj, weights))
@@ -54,10 +60,10 @@ def has_changed(
     if obj.session_uid in changes.objects and [g.name for g in obj.vertex_groups] != source.group_names:
         return True
     helper = properties.of(obj).front
+    if (helper is not None) != source.from_front:
+        return True
     if helper is not None:
         mesh = front.evaluated_mesh(obj, depsgraph)
-        if mesh is None:
-            return False
         evaluated = helper.session_uid in changes.objects
         if len(mesh.vertices) != len(source.points):
             return True

@@ -160,7 +160,9 @@ def test_a_modifier_in_front_that_comes_changes_and_goes():
     def check():
         # The first update makes what the second one reads.
         bpy.context.view_layer.update()
+        assert not properties.of(obj).error
         bpy.context.scene.frame_set(7)
+        assert not properties.of(obj).error
         shown = scenes.final_points(obj)
         properties.of(obj).enabled = False
         expected = scenes.final_points(obj)
@@ -172,6 +174,14 @@ def test_a_modifier_in_front_that_comes_changes_and_goes():
     check()
     obj.modifiers.new("Front", "SUBSURF").levels = 1
     obj.modifiers.move(2, 0)
+    check()
+    # As many vertices as without it.
+    obj.modifiers.new("Same", "CAST").factor = 0.4
+    obj.modifiers.move(3, 0)
+    obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = False
+    check()
+    obj.modifiers.remove(obj.modifiers["Same"])
+    obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = True
     check()
     obj.modifiers["Front"].levels = 2
     check()
