@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clay pictures of meshes in the open file, without its own lights, materials and cameras.
+"""Pictures of meshes in the open file, in clay or as heat maps: without its own lights, materials, cameras.
 
 The open file's render settings, visibility and camera are changed: for files that are opened only to be
 looked at.
@@ -15,9 +15,12 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.compare import View, camera_axes
+from ..core.errors import SinewError
+from ..core.views import View, camera_axes
 
 CLAY = (0.72, 0.66, 0.6)
+HEAT = "sinew_heat"
+ENGINES = ("auto", "workbench", "cycles")
 _PROBE = (
     "import bpy; s = bpy.context.scene; s.render.engine = 'BLENDER_WORKBENCH'; "
     "s.render.resolution_x = s.render.resolution_y = 8; bpy.ops.render.render()"
@@ -39,18 +42,103 @@ def has_opengl() -> bool:
     return probe.returncode == 0
 
 
-def prepare(scene: bpy.types.Scene, meshes: list[bpy.types.Object], engine: str, size: int) -> None:
-    """Makes `scene` render nothing but `meshes`, in clay, `size` pixels square, on a clear background.
+def chosen_engine(wanted: str) -> str:
+    """ "workbench" or "cycles", for one of ENGINES. Raises SinewError where it can not render here."""
+    if wanted == "cycles":
+        return wanted
+    if has_opengl():
+        return "workbench"
+    if wanted == "workbench":
+        raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
+    return "cycles"
 
-    engine  "workbench" or "cycles"
+
+class Studio:
+    """Renders nothing but some meshes, on a clear background."""
+
+    def __init__(
+        self, scene: bpy.types.Scene, meshes: list[bpy.types.Object], engine: str, size: int
+    ) -> None:
+        """engine  "workbench" or "cycles"; size  pixels of a picture's longer side"""
+        self.scene, self.engine, self._size = scene, engine, size
+        for obj in scene.objects:
+            obj.hide_render = obj not in meshes
+        for obj in meshes:
+            obj.visible_camera = True
+            obj.display_type = "TEXTURED"
+            # Colours are those of one object.
+            if obj.data.users > 1:
+                obj.data = obj.data.copy()
+        _prepare_output(scene)
+        scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
+        scene.collection.objects.link(scene.camera)
+        if engine == "workbench":
+            _prepare_workbench(scene)
+        else:
+            self._clay, self._heat = _prepare_cycles(scene)
+        self.show_clay()
+
+    def show_clay(self) -> None:
+        if self.engine == "workbench":
+            self._shade("SINGLE", light="Default", gloss=True)
+        else:
+            self._override(self._clay)
+
+    def show_heat(self) -> None:
+        """From now on meshes have the colours that `paint` gave them."""
+        if self.engine == "workbench":
+            # Colours are to be read: of Blender's lights the most even one, and no gloss.
+            self._shade("VERTEX", light="paint.sl", gloss=False)
+        else:
+            self._override(self._heat)
+
+    def picture(self, view: View, path: Path) -> None:
+        """Renders what `view` sees to the PNG `path`."""
+        camera = self.scene.camera
+        right, up = camera_axes(view.direction)
+        matrix = np.identity(4)
+        matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = right, up, view.direction
+        matrix[:3, 3] = view.target + view.depth * view.direction
+        camera.matrix_world = Matrix(matrix.tolist())
+        camera.data.type = "ORTHO"
+        camera.data.sensor_fit = "AUTO"
+        camera.data.ortho_scale = max(view.width, view.height)
+        camera.data.clip_start = 1e-4 * view.depth
+        camera.data.clip_end = 2 * view.depth
+        render = self.scene.render
+        render.resolution_x, render.resolution_y = view.pixels(self._size)
+        render.filepath = str(path)
+        bpy.ops.render.render(write_still=True, scene=self.scene.name)
+
+    def _shade(self, colour: str, light: str, gloss: bool) -> None:
+        shading = self.scene.display.shading
+        shading.color_type, shading.studio_light = colour, light
+        shading.show_specular_highlight = shading.show_cavity = gloss
+
+    def _override(self, material: bpy.types.Material) -> None:
+        for layer in self.scene.view_layers:
+            layer.material_override = material
+
+
+def paint(mesh: bpy.types.Mesh, colours: np.ndarray) -> None:
+    """Gives a mesh the colour attribute HEAT, and makes it the one that is shown.
+
+    colours  [vertices, 3], sRGB in 0..1
     """
-    for obj in scene.objects:
-        obj.hide_render = obj not in meshes
-    for obj in meshes:
-        obj.visible_camera = True
-        obj.display_type = "TEXTURED"
+    attribute = mesh.color_attributes.get(HEAT)
+    if attribute is None:
+        attribute = mesh.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    values = np.ones((len(colours), 4), dtype=np.float32)
+    values[:, :3] = linear
+    attribute.data.foreach_set("color", values.ravel())
+    index = mesh.color_attributes.find(HEAT)
+    mesh.color_attributes.active_color_index = mesh.color_attributes.render_color_index = index
+    mesh.update_tag()
+
+
+def _prepare_output(scene: bpy.types.Scene) -> None:
     render = scene.render
-    render.resolution_x = render.resolution_y = size
     render.resolution_percentage = 100
     render.pixel_aspect_x = render.pixel_aspect_y = 1.0
     render.film_transparent = True
@@ -64,28 +152,6 @@ def prepare(scene: bpy.types.Scene, meshes: list[bpy.types.Object], engine: str,
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
-    scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
-    scene.collection.objects.link(scene.camera)
-    if engine == "workbench":
-        _prepare_workbench(scene)
-    else:
-        _prepare_cycles(scene)
-
-
-def picture(scene: bpy.types.Scene, view: View, path: Path) -> None:
-    """Renders what `view` sees to the PNG `path`."""
-    camera = scene.camera
-    right, up = camera_axes(view.direction)
-    matrix = np.identity(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = right, up, view.direction
-    matrix[:3, 3] = view.target + view.depth * view.direction
-    camera.matrix_world = Matrix(matrix.tolist())
-    camera.data.type = "ORTHO"
-    camera.data.ortho_scale = view.size
-    camera.data.clip_start = 1e-4 * view.depth
-    camera.data.clip_end = 2 * view.depth
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True, scene=scene.name)
 
 
 def _prepare_workbench(scene: bpy.types.Scene) -> None:
@@ -94,27 +160,18 @@ def _prepare_workbench(scene: bpy.types.Scene) -> None:
     shading = scene.display.shading
     shading.type = "SOLID"
     shading.light = "STUDIO"
-    shading.color_type = "SINGLE"
     shading.single_color = CLAY
-    shading.show_cavity = True
     shading.cavity_type = "BOTH"
     shading.show_shadows = shading.show_xray = shading.show_object_outline = False
     shading.show_backface_culling = False
 
 
-def _prepare_cycles(scene: bpy.types.Scene) -> None:
+def _prepare_cycles(scene: bpy.types.Scene) -> tuple[bpy.types.Material, bpy.types.Material]:
+    """Lights and noise; materials for clay and for heat."""
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     scene.cycles.samples = 16
     scene.cycles.use_denoising = False
-    clay = bpy.data.materials.new("Sinew Clay")
-    clay.diffuse_color = (*CLAY, 1.0)
-    clay.use_nodes = True
-    shader = next(node for node in clay.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = (*CLAY, 1.0)
-    shader.inputs["Roughness"].default_value = 0.6
-    for layer in scene.view_layers:
-        layer.material_override = clay
     scene.world = bpy.data.worlds.new("Sinew World")
     scene.world.color = (0.25, 0.26, 0.28)
     for name, energy, turn in (("Key", 2.0, (0.9, 0.2, 0.5)), ("Fill", 0.6, (1.0, 0.0, -0.9))):
@@ -122,3 +179,18 @@ def _prepare_cycles(scene: bpy.types.Scene) -> None:
         light.data.energy = energy
         light.rotation_euler = turn
         scene.collection.objects.link(light)
+    clay, _shader = _matt_material("Sinew Clay")
+    heat, shader = _matt_material("Sinew Heat")
+    colours = heat.node_tree.nodes.new("ShaderNodeVertexColor")
+    colours.layer_name = HEAT
+    heat.node_tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
+    return clay, heat
+
+
+def _matt_material(name: str) -> tuple[bpy.types.Material, bpy.types.ShaderNode]:
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (*CLAY, 1.0)
+    shader.inputs["Roughness"].default_value = 0.6
+    return material, shader

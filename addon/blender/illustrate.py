@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures of a comparison: methods beside each other, heat maps, close-ups of the worst places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..core.comparison import Comparison, Worst
+from ..core.heat import HeatScale
+from ..core.metrics import METRICS, Metric
+from ..core.page import Row, Sheet
+from ..core.views import View, close_view, of_one_size, whole_view
+from . import evaluate, measure
+from .measure import Subject
+from .render import Studio, paint
+
+
+@dataclass
+class HeatPlan:
+    """A heat map to draw: at the worst frame of its metric, of each method.
+
+    colours  by method, [vertices of all meshes, 3]
+    close    at the worst place
+    title    which place and frame that is
+    """
+
+    metric: Metric
+    scale: HeatScale
+    frame: float
+    colours: dict[str, np.ndarray]
+    close: View
+    where: str
+
+
+class Illustrator:
+    """Draws into a folder, one picture at a time."""
+
+    def __init__(self, subject: Subject, comparison: Comparison, studio: Studio, folder: Path) -> None:
+        self._subject, self._comparison = subject, comparison
+        self._studio, self._folder = studio, folder
+        self._methods = list(comparison.methods)
+
+    def plan(self, frame_count: int) -> None:
+        """Chooses frames and places: frames at which a measure is worst, and each metric's worst place."""
+        comparison = self._comparison
+        self.frames = comparison.worst_frames(frame_count)
+        self._heat = [
+            self._plan_heat(metric, worst)
+            for metric in METRICS.values()
+            if comparison.shows(metric.worst, (worst := comparison.worst(metric.worst)).value)
+        ]
+        self._whole = self.whole_views(sorted({*self.frames, *(heat.frame for heat in self._heat)}))
+
+    @property
+    def picture_count(self) -> int:
+        return len(self._methods) * (len(self.frames) + 3 * len(self._heat))
+
+    def draw(self):
+        """Draws all that was planned; yields after each picture. Then `sheets` has them."""
+        rows: dict[float, list[Path]] = {frame: [] for frame in self.frames}
+        heat_rows: list[list[list[Path]]] = [[[], [], []] for _ in self._heat]
+        for method in self._methods:
+            for frame in self.frames:
+                self._pose(method, frame)
+                rows[frame].append(self._picture(self._whole[frame], f"{method} {frame}"))
+                yield
+            for plan, (whole, close, clay) in zip(self._heat, heat_rows, strict=True):
+                self._pose(method, plan.frame)
+                self._paint(plan.colours[method])
+                name = f"{method} {plan.metric.name} {plan.frame}"
+                self._studio.show_heat()
+                whole.append(self._picture(self._whole[plan.frame], name))
+                yield
+                close.append(self._picture(plan.close, f"{name} close"))
+                yield
+                self._studio.show_clay()
+                clay.append(self._picture(plan.close, f"{name} close clay"))
+                yield
+        self.sheets = [
+            Sheet(
+                "Methods beside each other",
+                "The frames at which a measure is worst, with one camera for all methods.",
+                [Row(f"Frame {frame}", pictures) for frame, pictures in rows.items()],
+            ),
+            *(
+                self._heat_sheet(plan, *pictures)
+                for plan, pictures in zip(self._heat, heat_rows, strict=True)
+            ),
+        ]
+
+    def whole_views(self, frames: Sequence[float]) -> dict[float, View]:
+        """By frame, views of one size that hold all methods' final meshes."""
+        points = {frame: [] for frame in frames}
+        for method in self._methods:
+            for frame in frames:
+                self._pose(method, frame)
+                points[frame].append(evaluate.world_points(self._subject.meshes))
+        views = [whole_view(np.concatenate(shapes)) for shapes in points.values()]
+        return dict(zip(points, of_one_size(views), strict=True))
+
+    def _plan_heat(self, metric: Metric, worst: Worst) -> HeatPlan:
+        comparison, subject = self._comparison, self._subject
+        scale = HeatScale.over(metric, comparison.all_summaries(), comparison.rest.diagonal)
+        shapes = measure.shapes_at(subject, [*self._methods, comparison.reference], worst.frame)
+        reference = shapes[comparison.reference]
+        fields = {
+            method: subject.gauge.measure(shapes[method], reference).field(metric.name)
+            for method in self._methods
+        }
+        vertex = int(np.argmax(scale.severity(fields[worst.method])))
+        mesh, index = subject.owner_of(vertex)
+        where = f"vertex {index} of {mesh} under {comparison.methods[worst.method]}"
+        close = close_view(shapes[worst.method], shapes[worst.method][vertex])
+        colours = {method: scale.colours(field) for method, field in fields.items()}
+        return HeatPlan(metric, scale, worst.frame, colours, close, where)
+
+    def _heat_sheet(
+        self, plan: HeatPlan, whole: Sequence[Path], close: Sequence[Path], clay: Sequence[Path]
+    ) -> Sheet:
+        return Sheet(
+            f"{plan.metric.label} at frame {plan.frame}",
+            f"{plan.metric.text} The colours mean the same at all frames; this frame is the worst, and the "
+            f"close-ups show the worst place, {plan.where}.",
+            [Row("Whole", whole), Row("Worst place", close), Row("The same in clay", clay)],
+            plan.scale,
+        )
+
+    def _pose(self, method: str, frame: float) -> None:
+        evaluate.use_method_on(self._subject.meshes, method)
+        evaluate.set_frame(self._subject.scene, frame)
+
+    def _paint(self, colours: np.ndarray) -> None:
+        first = 0
+        for obj in self._subject.meshes:
+            count = len(obj.data.vertices)
+            paint(obj.data, colours[first : first + count])
+            first += count
+
+    def _picture(self, view: View, name: str) -> Path:
+        path = self._folder / f"{name.replace(' ', '-')}.png"
+        self._studio.picture(view, path)
+        return path
