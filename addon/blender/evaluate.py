@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SinewError
+from ..core.views import View, of_one_size, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 
 # The choice beside Sinew's methods: the Armature modifier as it stands in the file.
@@ -107,6 +108,19 @@ def length_unit(scene: bpy.types.Scene) -> str:
 def set_frame(scene: bpy.types.Scene, frame: float) -> None:
     whole = int(np.floor(frame))
     scene.frame_set(whole, subframe=float(frame - whole))
+
+
+def whole_views(
+    meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
+) -> list[View]:
+    """For each frame a view that holds the final meshes under all methods; all of one size."""
+    shapes: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
+    for method in methods:
+        use_method_on(meshes, method)
+        for frame, points in shapes.items():
+            set_frame(bpy.context.scene, frame)
+            points.append(world_points(meshes))
+    return of_one_size([whole_view(np.concatenate(points)) for points in shapes.values()])
 
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:

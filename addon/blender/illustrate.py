@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,8 @@ from ..core.comparison import Comparison, Worst
 from ..core.heat import HeatScale
 from ..core.metrics import METRICS, Metric
 from ..core.page import Row, Sheet
-from ..core.views import View, close_view, of_one_size, whole_view
+from ..core.sheet import Column, write_sheet
+from ..core.views import View, close_view
 from . import evaluate, measure
 from .measure import Subject
 from .render import Studio, paint
@@ -53,13 +54,15 @@ class Illustrator:
             for metric in METRICS.values()
             if comparison.shows(metric.worst, (worst := comparison.worst(metric.worst)).value)
         ]
-        self._whole = self.whole_views(sorted({*self.frames, *(heat.frame for heat in self._heat)}))
+        drawn = sorted({*self.frames, *(heat.frame for heat in self._heat)})
+        views = evaluate.whole_views(self._subject.meshes, self._methods, drawn)
+        self._whole = dict(zip(drawn, views, strict=True))
 
     @property
     def picture_count(self) -> int:
         return len(self._methods) * (len(self.frames) + 3 * len(self._heat))
 
-    def draw(self):
+    def draw(self) -> Iterator[None]:
         """Draws all that was planned; yields after each picture. Then `sheets` has them."""
         rows: dict[float, list[Path]] = {frame: [] for frame in self.frames}
         heat_rows: list[list[list[Path]]] = [[[], [], []] for _ in self._heat]
@@ -91,16 +94,6 @@ class Illustrator:
                 for plan, pictures in zip(self._heat, heat_rows, strict=True)
             ),
         ]
-
-    def whole_views(self, frames: Sequence[float]) -> dict[float, View]:
-        """By frame, views of one size that hold all methods' final meshes."""
-        points = {frame: [] for frame in frames}
-        for method in self._methods:
-            for frame in frames:
-                self._pose(method, frame)
-                points[frame].append(evaluate.world_points(self._subject.meshes))
-        views = [whole_view(np.concatenate(shapes)) for shapes in points.values()]
-        return dict(zip(points, of_one_size(views), strict=True))
 
     def _plan_heat(self, metric: Metric, worst: Worst) -> HeatPlan:
         comparison, subject = self._comparison, self._subject
@@ -144,3 +137,24 @@ class Illustrator:
         path = self._folder / f"{name.replace(' ', '-')}.png"
         self._studio.picture(view, path)
         return path
+
+
+def film(subject: Subject, comparison: Comparison, studio: Studio, folder: Path) -> Iterator[Path]:
+    """Draws each frame of the comparison into one picture, the methods side by side. Requires Pillow."""
+    methods = list(comparison.methods)
+    views = evaluate.whole_views(subject.meshes, methods, comparison.frames)
+    studio.show_clay()
+    # A method at a time would be faster by what changing it costs, and need all pictures at once.
+    for index, (frame, view) in enumerate(zip(comparison.frames, views, strict=True)):
+        columns = []
+        for method, label in comparison.methods.items():
+            evaluate.use_method_on(subject.meshes, method)
+            evaluate.set_frame(subject.scene, frame)
+            picture = folder / f"{method}.png"
+            studio.picture(view, picture)
+            change = comparison.summaries[method][index].volume_change
+            note = "" if change != change else f"volume {100 * (1 + change):.1f} % of rest"
+            columns.append(Column(f"{label} ({method})", note, [picture]))
+        path = folder / f"{index:06d}.png"
+        write_sheet(f"{comparison.file}, frame {frame}", columns, [""], path)
+        yield path

@@ -42,6 +42,11 @@ def has_opengl() -> bool:
     return probe.returncode == 0
 
 
+def check_size(size: int) -> None:
+    if not 64 <= size <= 4096:
+        raise SinewError(f"size: expected 64 to 4096 pixels, got {size}")
+
+
 def chosen_engine(wanted: str) -> str:
     """ "workbench" or "cycles", for one of ENGINES. Raises SinewError where it can not render here."""
     if wanted == "cycles":
@@ -120,6 +125,23 @@ class Studio:
             layer.material_override = material
 
 
+class OwnLook:
+    """Renders what the file's own camera sees, as the file says."""
+
+    def __init__(self, scene: bpy.types.Scene, path: Path) -> None:
+        if scene.camera is None:
+            raise SinewError(
+                f"{path}: has no camera to look through; leave --own-look away for clay pictures"
+            )
+        self._scene = scene
+        _prepare_png(scene)
+
+    def picture(self, _view: None, path: Path) -> None:
+        """Renders to the PNG `path`."""
+        self._scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True, scene=self._scene.name)
+
+
 def paint(mesh: bpy.types.Mesh, colours: np.ndarray) -> None:
     """Gives a mesh the colour attribute HEAT, and makes it the one that is shown.
 
@@ -144,14 +166,19 @@ def _prepare_output(scene: bpy.types.Scene) -> None:
     render.film_transparent = True
     render.use_border = render.use_compositing = render.use_sequencer = False
     render.use_freestyle = render.use_multiview = render.use_motion_blur = render.use_stamp = False
-    if hasattr(render.image_settings, "media_type"):
-        render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.image_settings.color_mode = "RGBA"
-    render.image_settings.color_depth = "8"
+    _prepare_png(scene)
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+
+
+def _prepare_png(scene: bpy.types.Scene) -> None:
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format = "PNG"
+    settings.color_mode = "RGBA"
+    settings.color_depth = "8"
 
 
 def _prepare_workbench(scene: bpy.types.Scene) -> None:

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..core.comparison import Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
@@ -12,8 +14,13 @@ from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.output import write_text
 from ..core.page import page
+from ..core.sheet import require_pillow
 from . import sheet
 from .console import Console
+
+if TYPE_CHECKING:
+    from ..blender.measure import Subject
+    from ..blender.render import Studio
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
@@ -21,8 +28,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "compare",
         help="show and measure methods beside each other",
         description="Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
-        "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots over "
-        "the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and the "
+        "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
+        "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and the "
         "pictures. With --out SHEET.png it draws one frame of one file into one picture instead.",
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
@@ -68,12 +75,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..blender import evaluate, render
+    from ..blender import evaluate, render, video
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     evaluate.check_methods([*methods, args.reference])
-    if args.size is not None and not 64 <= args.size <= 4096:
-        raise SinewError(f"size: expected 64 to 4096 pixels, got {args.size}")
+    if args.size is not None:
+        render.check_size(args.size)
     if args.out.suffix:
         return sheet.run(args, methods, console)
     frames = parse_frames(args.frames) if args.frames else None
@@ -81,6 +88,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
         if getattr(args, option) < 0:
             raise SinewError(f"{option}: expected 0 or more, got {getattr(args, option)}")
     _check_names(args.files)
+    if args.video:
+        require_pillow()
+        video.check_can_encode()
     engine = render.chosen_engine(args.engine) if args.pictures or args.video else None
     failed = False
     for path in args.files:
@@ -137,15 +147,33 @@ def _compare(
                 pass
             sheets = illustrator.sheets
         if args.video:
-            pass
+            _write_video(subject, comparison, studio, folder / "video.mp4", console)
     target = args.out / f"{path.stem}.html"
     write_text(target, page(comparison, sheets, "; ".join(f"Left out: {reason}" for reason in left_out)))
     console.say(str(target))
     return not left_out
 
 
+def _write_video(
+    subject: Subject, comparison: Comparison, studio: Studio, path: Path, console: Console
+) -> None:
+    from ..blender import illustrate, video
+
+    render = subject.scene.render
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = illustrate.film(subject, comparison, studio, Path(folder))
+        count = len(comparison.frames)
+        filmed = list(console.progress(pictures, count, f"Filming {comparison.file}"))
+        video.encode(filmed, render.fps / render.fps_base, path)
+
+
 def _measure(
-    path: Path, subject, methods: list[str], frames: list[float], args: argparse.Namespace, console: Console
+    path: Path,
+    subject: Subject,
+    methods: list[str],
+    frames: list[float],
+    args: argparse.Namespace,
+    console: Console,
 ) -> Comparison:
     from ..blender import evaluate, measure
 

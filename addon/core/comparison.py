@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, fields
 from .diagnostics import Finding
 from .metrics import METRICS, Gauge, Summary
 
-
 # Smaller parts of the diagonal, or of the value at rest, are rounding.
 ROUNDING = 1e-5
 LENGTHS = {"distance_max", "distance_rms", "bulge_min", "bulge_max", "bulge_worst"}
@@ -122,10 +121,16 @@ class Comparison:
         return max(candidates, key=lambda worst: abs(worst.value), default=nothing)
 
     def worst_frames(self, count: int) -> list[float]:
-        """At most `count` frames, in order: those at which a measure is worst, the measures in turn."""
+        """At most `count` frames, in order: those at which a measure is worst, the measures in turn, but for
+        those next to one that is there already."""
         entries = ["distance_max", "volume_change", *(metric.worst for metric in METRICS.values())]
-        worst = [w.frame for w in map(self.worst, entries) if self.shows(w.measure, w.value)]
-        return sorted(list(dict.fromkeys([*worst, self.frames[-1]]))[:count])
+        apart = (max(self.frames) - min(self.frames)) / 20
+        chosen: list[float] = []
+        for worst in map(self.worst, entries):
+            is_new = all(abs(worst.frame - frame) > apart for frame in chosen)
+            if is_new and len(chosen) < count and self.shows(worst.measure, worst.value):
+                chosen.append(worst.frame)
+        return sorted(chosen) or self.frames[:1]
 
     def median_time(self, method: str) -> float:
         return statistics.median(self.times[method])

@@ -73,8 +73,8 @@ def _about(comparison: Comparison) -> str:
     return (
         f"{escape(', '.join(comparison.meshes))}: {rest.vertices:,} vertices, {rest.triangles:,} triangles, "
         f"diagonal {comparison.length(rest.diagonal)}, {span}. Lengths are in {lengths}; shapes are "
-        "measured as the skinning leaves them, before the modifiers behind it. Distances are to "
-        f"{escape(_method(comparison, comparison.reference))}. {escape(rest.note)}"
+        "measured as the skinning leaves them, before the modifiers behind it. Distances are "
+        f"measured to: {escape(_method(comparison, comparison.reference))}. {escape(rest.note)}"
     )
 
 
@@ -105,7 +105,11 @@ def _overview_cells(comparison: Comparison, method: str) -> list[str]:
 
     def at(entry: str, text: Callable[[float], str]) -> str:
         worst = max(values(entry))
-        return f"{text(worst)} at {comparison.frames[values(entry).index(worst)]}" if comparison.shows(entry, worst) else "none"
+        return (
+            f"{text(worst)} at {comparison.frames[values(entry).index(worst)]}"
+            if comparison.shows(entry, worst)
+            else "none"
+        )
 
     own = comparison.median_own_time(method)
     return [

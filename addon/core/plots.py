@@ -66,10 +66,9 @@ def line_plot(
                     cx, cy = points.split(",")
                     parts.append(f'<circle cx="{cx}" cy="{cy}" r="3" fill="{colour}"/>')
                 else:
-                    parts.append(
-                        f'<polyline points="{points}" stroke="{colour}" stroke-width="{width:.1f}"><title>{escape(method)}</title>'
-                        "</polyline>"
-                    )
+                    stroke = f'stroke="{colour}" stroke-width="{width:.1f}"'
+                    name = f"<title>{escape(method)}</title>"
+                    parts.append(f'<polyline points="{points}" {stroke}>{name}</polyline>')
     parts.append("</svg>")
     return "".join(parts)
 

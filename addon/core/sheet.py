@@ -22,7 +22,7 @@ def require_pillow() -> None:
         import PIL  # noqa: F401
     except ImportError:
         raise SinewError(
-            "comparison sheets need Pillow, which this Python does not have; "
+            "sheets and videos need Pillow, which this Python does not have; "
             "install sinew-blender in a Python of its own and run `sinew compare` there"
         ) from None
 
@@ -48,8 +48,9 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
     cell = max(picture.width for column in pictures for picture in column)
     heights = [picture.height for picture in pictures[0]]
     head, label, row_label = 24 + 2 * MARGIN, 24 + 17 + 2 * MARGIN, 17 + MARGIN
-    width = len(columns) * (cell + MARGIN) + MARGIN
-    height = head + label + len(row_titles) * row_label + sum(heights) + MARGIN
+    # Even, as video needs it.
+    width = _even(len(columns) * (cell + MARGIN) + MARGIN)
+    height = _even(head + label + len(row_titles) * row_label + sum(heights) + MARGIN)
     sheet = Image.new("RGB", (width, height), BACKGROUND)
     draw = ImageDraw.Draw(sheet)
     draw.text((MARGIN, MARGIN), _fitted(draw, title, large, width - 2 * MARGIN), font=large, fill=TEXT)
@@ -64,6 +65,10 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
             draw.text((x, y), row_titles[row], font=small, fill=FAINT)
             sheet.paste(picture, (x + (cell - picture.width) // 2, y + row_label - MARGIN // 2), picture)
     write_whole(path, lambda unfinished: sheet.save(unfinished, format="PNG"))
+
+
+def _even(size: int) -> int:
+    return size + size % 2
 
 
 def _fitted(draw, text: str, font, width: int) -> str:
