@@ -29,8 +29,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def sinew_render(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., None]:
-    """sinew_render(file, golden, method=..., frames=..., tolerance=..., **options) fails where a frame of `file`
-    differs from its golden picture.
+    """sinew_render(file, golden, method=..., frames=..., tolerance=..., **options) fails where a frame of
+    `file` differs from its golden picture.
 
     file, golden  paths, from the test's own folder
     method        as of `sinew methods`, or "blender"

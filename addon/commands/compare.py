@@ -29,8 +29,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         help="show and measure methods beside each other",
         description="Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
         "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
-        "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and the "
-        "pictures. With --out SHEET.png it draws one frame of one file into one picture instead.",
+        "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
+        "the pictures. With --out SHEET.png it draws one frame of one file into one picture instead.",
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument(

@@ -30,8 +30,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         help="draw frames under one method, and compare them with golden pictures",
         description="Draws the armature-deformed meshes of a file in clay, a picture a frame, into DIR, with "
         "render.json that says how. With --against it does the same again (camera, engine, size and, where "
-        "not given, method and frames are those of the golden pictures) and compares each frame; the exit status "
-        "is 1 where one differs by more than the tolerance.",
+        "not given, method and frames are those of the golden pictures) and compares each frame; the exit "
+        "status is 1 where one differs by more than the tolerance.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument("--method", help="a method of `sinew methods`, or blender for the Armature modifier")

@@ -14,8 +14,8 @@ from .heat import viridis
 from .views import View
 
 SETTINGS = "render.json"
-# A pixel differs when a channel does by more than this part of its range. Along the edges of one mesh, Blender
-# 4.2 and 5.2 differ by up to 0.19.
+# A pixel differs when a channel does by more than this part of its range. Along the edges of one mesh,
+# Blender 4.2 and 5.2 differ by up to 0.19.
 VISIBLE = 0.2
 
 
