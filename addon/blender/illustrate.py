@@ -107,7 +107,8 @@ class Illustrator:
         vertex = int(np.argmax(scale.severity(fields[worst.method])))
         mesh, index = subject.owner_of(vertex)
         where = f"vertex {index} of {mesh} under {comparison.methods[worst.method]}"
-        close = close_view(shapes[worst.method], shapes[worst.method][vertex])
+        places = np.stack([shapes[method][vertex] for method in self._methods])
+        close = close_view(shapes[worst.method], places)
         colours = {method: scale.colours(field) for method, field in fields.items()}
         return HeatPlan(metric, scale, worst.frame, colours, close, where)
 

@@ -18,15 +18,19 @@ def check_can_encode() -> None:
         raise SinewError("this Blender is built without FFmpeg and can not write videos; leave --video away")
 
 
-def encode(pictures: Sequence[Path], frame_rate: float, path: Path) -> None:
-    """Writes an mp4 (H.264) of the pictures in one folder, one a frame, all of one even width and height."""
+def encode(pictures: Sequence[Path], fps: int, fps_base: float, path: Path) -> None:
+    """Writes an mp4 (H.264) of the pictures in one folder, one a frame, all of one even width and height.
+
+    fps, fps_base  as in a scene's render settings: fps / fps_base frames a second
+    """
     first = bpy.data.images.load(str(pictures[0]))
     size = tuple(first.size)
     bpy.data.images.remove(first)
     scene = bpy.data.scenes.new("Sinew Video")
     try:
         _show_one_after_the_other(scene, pictures)
-        _prepare_output(scene, size, frame_rate)
+        _prepare_output(scene, size)
+        scene.render.fps, scene.render.fps_base = fps, fps_base
 
         def write(unfinished: Path) -> None:
             scene.render.filepath = str(unfinished)
@@ -44,15 +48,16 @@ def _show_one_after_the_other(scene: bpy.types.Scene, pictures: Sequence[Path]) 
     strip = strips.new_image("Pictures", str(pictures[0]), channel=1, frame_start=1)
     for picture in pictures[1:]:
         strip.elements.append(picture.name)
+    # Elements that are appended do not make it longer; what does has another name since 5.1.
+    duration = "duration" if hasattr(strip, "duration") else "frame_final_duration"
+    setattr(strip, duration, len(pictures))
     scene.frame_start, scene.frame_end = 1, len(pictures)
 
 
-def _prepare_output(scene: bpy.types.Scene, size: tuple[int, int], frame_rate: float) -> None:
+def _prepare_output(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     render = scene.render
     render.resolution_x, render.resolution_y = size
     render.resolution_percentage = 100
-    render.fps = max(round(frame_rate), 1)
-    render.fps_base = render.fps / frame_rate
     render.use_sequencer, render.use_compositing = True, False
     # Up to 5.0 the ending is not taken from the path where frame numbers are added to it.
     render.use_file_extension = False

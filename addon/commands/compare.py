@@ -53,7 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         type=int,
         default=4,
         metavar="N",
-        help="frames to draw, the worst ones first; 0: no pictures at all (default: %(default)s)",
+        help="most frames to draw, of those at which a measure is worst; 0: none (default: %(default)s)",
     )
     parser.add_argument("--video", action="store_true", help="also write an mp4 of the methods side by side")
     parser.add_argument(
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     evaluate.check_methods([*methods, args.reference])
     if args.size is not None:
         render.check_size(args.size)
-    if args.out.suffix:
+    if args.out.suffix.lower() in sheet.PICTURES:
         return sheet.run(args, methods, console)
     frames = parse_frames(args.frames) if args.frames else None
     for option in ("pictures", "influences"):
@@ -164,7 +164,7 @@ def _write_video(
         pictures = illustrate.film(subject, comparison, studio, Path(folder))
         count = len(comparison.frames)
         filmed = list(console.progress(pictures, count, f"Filming {comparison.file}"))
-        video.encode(filmed, render.fps / render.fps_base, path)
+        video.encode(filmed, render.fps, render.fps_base, path)
 
 
 def _measure(

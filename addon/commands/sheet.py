@@ -15,6 +15,9 @@ from ..core.sheet import Column, require_pillow, write_sheet
 from ..core.views import close_view, place_of_difference, whole_view
 from .console import Console
 
+# Other names are those of folders.
+PICTURES = {".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf"}
+
 
 def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     """A column for each method, the same camera for all, framed on the mesh, with a close-up of the place
@@ -25,7 +28,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
 
     require_pillow()
     if args.out.suffix.lower() != ".png":
-        raise SinewError(f"{args.out}: expected a folder, or a name ending in .png for a sheet")
+        raise SinewError(f"{args.out}: a sheet is a PNG; give a name ending in .png, or a folder for pages")
     if len(args.files) != 1:
         raise SinewError(
             f"{args.out}: a sheet shows one file, got {len(args.files)}; give a folder for pages"
@@ -52,9 +55,8 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     views = [("Whole", whole_view(np.concatenate(final)))]
     place = place_of_difference(list(shapes.values()))
     if place is not None:
-        # Placed by the first method: a mean would be dragged along by one that tears the mesh apart.
-        first = shapes[methods[0]]
-        views.append(("Where the methods differ most", close_view(first, first[place])))
+        places = np.stack([points[place] for points in shapes.values()])
+        views.append(("Where the methods differ most", close_view(shapes[methods[0]], places)))
 
     studio = render.Studio(scene, meshes, render.chosen_engine(args.engine), args.size or 640)
     columns = []

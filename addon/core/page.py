@@ -53,7 +53,7 @@ def page(comparison: Comparison, sheets: Sequence[Sheet], note: str = "") -> str
         f'<p class="note">{escape(note)}</p>' if note else "",
         _overview(comparison),
         _diagnostics(comparison),
-        _plots(comparison),
+        _plots(comparison) if len(comparison.frames) > 1 else "",
         *(_sheet(sheet, comparison) for sheet in sheets),
         _numbers(comparison),
     ]
@@ -281,9 +281,9 @@ def _data(path: Path) -> str:
 
 _STYLE = """
 :root { color-scheme: light dark; --text: #1d1f23; --faint: #676c74; --line: #d5d8dd; --back: #fff;
-  --cell: #26282c; --warn: #8a5a00; }
+  --cell: #3a3d42; --warn: #8a5a00; }
 @media (prefers-color-scheme: dark) { :root { --text: #e8e8e8; --faint: #a0a4aa; --line: #43474e;
-  --back: #1b1d20; --cell: #26282c; --warn: #e3b341; } }
+  --back: #1b1d20; --warn: #e3b341; } }
 body { font: 14px/1.45 system-ui, sans-serif; color: var(--text); background: var(--back);
   margin: 24px auto; max-width: 1500px; padding: 0 24px; }
 h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 32px 0 8px; }

@@ -68,10 +68,15 @@ def place_of_difference(meshes: Sequence[np.ndarray]) -> int | None:
     return int(difference.argmax()) if difference.max(initial=0.0) > 1e-4 * diagonal else None
 
 
-def close_view(points: np.ndarray, target: np.ndarray) -> View:
-    """Close to `target`, seen from where least of `points` [n, 3] stands in front."""
+def close_view(points: np.ndarray, targets: np.ndarray) -> View:
+    """Close to all of `targets` [n, 3], seen from where least of `points` [m, 3] stands in front.
+
+    targets  a place of the mesh under each method: none is out of the picture
+    """
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    radius = 0.5 * CLOSE_UP * diagonal
+    low, high = targets.min(axis=0), targets.max(axis=0)
+    target = (low + high) / 2
+    radius = max(0.5 * CLOSE_UP * diagonal, 0.75 * float(np.linalg.norm(high - low)))
     return View(_clearest_direction(points - target, radius), target, 2 * radius, 2 * radius, diagonal)
 
 

@@ -151,7 +151,8 @@ def test_a_jump_is_one_in_the_deformed_mesh():
     points = []
     for degrees in frames:
         motions = np.array(turned(degrees))
-        points.append(reference.dq(np.array([1.0, 0, 0]), motions, motions[:, :3, :3], np.array([0.5, 0.5]))[0])
+        point, half = np.array([1.0, 0.0, 0.0]), np.array([0.5, 0.5])
+        points.append(reference.dq(point, motions, motions[:, :3, :3], half)[0])
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert found.frames == (3,)
     assert int(steps.argmax()) == 1

@@ -145,9 +145,7 @@ def test_a_rigid_motion_changes_nothing(tube):
     motion = random_motion(np.random.default_rng(1))
     axes = np.array([[[-1, 0, 0], [0, 0, 0]], [[0, 0, 0], [1, 0, 0]]], np.float64)
     gauge = Gauge(tube.surface, tube.influences)
-    gauge.set_frame(
-        FrameOfRig(tube.rest, axes, transform(motion, axes), np.tile(motion[:3, :3], (2, 1, 1)))
-    )
+    gauge.set_frame(FrameOfRig(tube.rest, axes, transform(motion, axes), np.tile(motion[:3, :3], (2, 1, 1))))
     measured = gauge.measure(transform(motion, tube.rest))
     summary = measured.summary()
     assert summary.flipped_faces == 0
@@ -172,7 +170,7 @@ def test_volume_and_area_are_those_of_trimesh(name):
     rng = np.random.default_rng(2)
     # Bent out of shape, and far from the origin.
     matrix = rng.normal(size=(3, 3)) + 2 * np.eye(3)
-    points = np.sin(1.3 * mesh.vertices) @ matrix.T + [100, -50, 30]
+    points = np.sin(1.3 * mesh.vertices) @ matrix.T + np.array([100, -50, 30])
     bent = trimesh.Trimesh(points, mesh.faces, process=False)
     surface = surface_of(mesh)
     assert (surface.caps.count, surface.clash_count) == (0, 0)
@@ -185,7 +183,7 @@ def test_holes_are_closed_by_fans_to_their_middle(name):
     mesh = MESHES[name]
     seeds = [int(np.argmax(mesh.vertices[:, 0])), int(np.argmin(mesh.vertices[:, 0]))]
     open_faces = mesh.faces[~np.isin(mesh.faces, seeds).any(axis=1)]
-    points = mesh.vertices + [5, 0, 0]
+    points = mesh.vertices + np.array([5, 0, 0])
     surface = Surface(len(points), open_faces.astype(np.int32), np.empty((0, 2), np.int32))
     assert surface.caps.count == 2
     assert surface.border_count == sum(len(mesh.vertex_neighbors[seed]) for seed in seeds)
@@ -220,7 +218,7 @@ def test_faces_that_wind_against_each_other_are_counted():
 def test_several_meshes_are_measured_as_one():
     a, b = MESHES["ball"], MESHES["box"]
     both = joined([surface_of(a), surface_of(b)])
-    points = np.concatenate([a.vertices, b.vertices + [9, 0, 0]])
+    points = np.concatenate([a.vertices, b.vertices + np.array([9, 0, 0])])
     assert volume(points, both) == pytest.approx(a.volume + b.volume, rel=1e-9)
     assert both.border_count == 0
 
