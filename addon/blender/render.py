@@ -208,6 +208,7 @@ def _prepare_cycles(scene: bpy.types.Scene) -> tuple[bpy.types.Material, bpy.typ
         scene.collection.objects.link(light)
     clay, _shader = _matt_material("Sinew Clay")
     heat, shader = _matt_material("Sinew Heat")
+    shader.inputs["Specular IOR Level"].default_value = 0.0
     colours = heat.node_tree.nodes.new("ShaderNodeVertexColor")
     colours.layer_name = HEAT
     heat.node_tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])

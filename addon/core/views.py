@@ -11,7 +11,7 @@ import numpy as np
 # A little to the character's left and above, from Blender's front (-Y).
 VIEW_DIRECTION = np.array([0.45, -1.0, 0.22])
 # Close-ups show this part of the mesh's diagonal.
-CLOSE_UP = 0.22
+CLOSE_UP = 0.28
 
 
 @dataclass(frozen=True)
