@@ -17,7 +17,7 @@ from ..core.sheet import Column, write_sheet
 from ..core.views import View, close_view
 from . import evaluate, measure
 from .measure import Subject
-from .render import Studio, paint
+from .render import Studio
 
 
 @dataclass
@@ -72,17 +72,20 @@ class Illustrator:
                 rows[frame].append(self._picture(self._whole[frame], f"{method} {frame}"))
                 yield
             for plan, (whole, close, clay) in zip(self._heat, heat_rows, strict=True):
-                self._pose(method, plan.frame)
-                self._paint(plan.colours[method])
                 name = f"{method} {plan.metric.name} {plan.frame}"
-                self._studio.show_heat()
-                whole.append(self._picture(self._whole[plan.frame], name))
-                yield
-                close.append(self._picture(plan.close, f"{name} close"))
-                yield
-                self._studio.show_clay()
+                self._pose(method, plan.frame)
                 clay.append(self._picture(plan.close, f"{name} close clay"))
                 yield
+                with measure.skinning_alone(self._subject.meshes):
+                    self._pose(method, plan.frame)
+                    copies = self._studio.painted(
+                        self._subject.meshes, self._subject.split(plan.colours[method])
+                    )
+                with copies:
+                    whole.append(self._picture(self._whole[plan.frame], name))
+                    yield
+                    close.append(self._picture(plan.close, f"{name} close"))
+                    yield
         self.sheets = [
             Sheet(
                 "Methods beside each other",
@@ -127,13 +130,6 @@ class Illustrator:
         evaluate.use_method_on(self._subject.meshes, method)
         evaluate.set_frame(self._subject.scene, frame)
 
-    def _paint(self, colours: np.ndarray) -> None:
-        first = 0
-        for obj in self._subject.meshes:
-            count = len(obj.data.vertices)
-            paint(obj.data, colours[first : first + count])
-            first += count
-
     def _picture(self, view: View, name: str) -> Path:
         path = self._folder / f"{name.replace(' ', '-')}.png"
         self._studio.picture(view, path)
@@ -144,7 +140,6 @@ def film(subject: Subject, comparison: Comparison, studio: Studio, folder: Path)
     """Draws each frame of the comparison into one picture, the methods side by side. Requires Pillow."""
     methods = list(comparison.methods)
     views = evaluate.whole_views(subject.meshes, methods, comparison.frames)
-    studio.show_clay()
     # A method at a time would be faster by what changing it costs, and need all pictures at once.
     for index, (frame, view) in enumerate(zip(comparison.frames, views, strict=True)):
         columns = []

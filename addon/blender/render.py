@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import bpy
@@ -71,9 +73,6 @@ class Studio:
         for obj in meshes:
             obj.visible_camera = True
             obj.display_type = "TEXTURED"
-            # Colours are those of one object.
-            if obj.data.users > 1:
-                obj.data = obj.data.copy()
         _prepare_output(scene)
         scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
         scene.collection.objects.link(scene.camera)
@@ -81,16 +80,43 @@ class Studio:
             _prepare_workbench(scene)
         else:
             self._clay, self._heat = _prepare_cycles(scene)
-        self.show_clay()
+        self._show_clay()
 
-    def show_clay(self) -> None:
+    def painted(
+        self, meshes: Sequence[bpy.types.Object], colours: Sequence[np.ndarray]
+    ) -> AbstractContextManager[None]:
+        """A context in which copies of the meshes, as they are evaluated now, stand in their place.
+
+        colours  for each mesh [vertices, 3], sRGB in 0..1
+        """
+        copies = [_painted_copy(obj, own) for obj, own in zip(meshes, colours, strict=True)]
+        return self._shown_instead(meshes, copies)
+
+    @contextmanager
+    def _shown_instead(
+        self, meshes: Sequence[bpy.types.Object], copies: Sequence[bpy.types.Object]
+    ) -> Iterator[None]:
+        for obj, copy in zip(meshes, copies, strict=True):
+            obj.hide_render = True
+            self.scene.collection.objects.link(copy)
+        self._show_heat()
+        try:
+            yield
+        finally:
+            self._show_clay()
+            for obj, copy in zip(meshes, copies, strict=True):
+                obj.hide_render = False
+                mesh = copy.data
+                bpy.data.objects.remove(copy)
+                bpy.data.meshes.remove(mesh)
+
+    def _show_clay(self) -> None:
         if self.engine == "workbench":
             self._shade("SINGLE", light="Default", gloss=True)
         else:
             self._override(self._clay)
 
-    def show_heat(self) -> None:
-        """From now on meshes have the colours that `paint` gave them."""
+    def _show_heat(self) -> None:
         if self.engine == "workbench":
             # Colours are to be read: of Blender's lights the most even one, and no gloss.
             self._shade("VERTEX", light="paint.sl", gloss=False)
@@ -142,21 +168,20 @@ class OwnLook:
         bpy.ops.render.render(write_still=True, scene=self._scene.name)
 
 
-def paint(mesh: bpy.types.Mesh, colours: np.ndarray) -> None:
-    """Gives a mesh the colour attribute HEAT, and makes it the one that is shown.
-
-    colours  [vertices, 3], sRGB in 0..1
-    """
-    attribute = mesh.color_attributes.get(HEAT)
-    if attribute is None:
-        attribute = mesh.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+def _painted_copy(obj: bpy.types.Object, colours: np.ndarray) -> bpy.types.Object:
+    """An object in no scene: the evaluated mesh of `obj`, with the colour attribute HEAT."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = bpy.data.meshes.new_from_object(evaluated)
+    attribute = mesh.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
     values = np.ones((len(colours), 4), dtype=np.float32)
-    values[:, :3] = linear
+    # Stored linear.
+    values[:, :3] = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
     attribute.data.foreach_set("color", values.ravel())
     index = mesh.color_attributes.find(HEAT)
     mesh.color_attributes.active_color_index = mesh.color_attributes.render_color_index = index
-    mesh.update_tag()
+    copy = bpy.data.objects.new(f"{obj.name} Sinew Heat", mesh)
+    copy.matrix_world = evaluated.matrix_world
+    return copy
 
 
 def _prepare_output(scene: bpy.types.Scene) -> None:

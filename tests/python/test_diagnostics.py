@@ -25,6 +25,7 @@ def bones_called(names):
         np.tile(np.eye(4, dtype=np.float32), (count, 1, 1)),
         np.ones(count, np.float32),
         np.ones(count, np.int32),
+        np.zeros(count, bool),
         np.full(count, -1, np.int32),
         Envelopes(no_vectors, no_vectors, zeros, zeros, zeros, zeros, np.zeros(count, bool)),
     )
