@@ -21,7 +21,8 @@ from sinew_addon.blender import pictures, video
 from test_command_line import run_sinew
 
 # Pictures take a third of a second each, and are much the same in all versions.
-newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="drawn with the newest Blender only")
+NEWEST = bpy.app.version >= (5, 2)
+newest_only = pytest.mark.skipif(not NEWEST, reason="drawn with the newest Blender only")
 
 
 def save(path):
@@ -83,6 +84,36 @@ def test_numbers_are_those_of_the_shapes(tmp_path):
     assert float(rows["dq", 11]["distance_max"]) > 0.05
     assert float(rows["dq", 11]["bulge_max"]) > float(rows["lbs", 11]["bulge_max"])
     assert "<img" not in (tmp_path / "arm.html").read_text(encoding="utf-8")
+
+
+def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
+    """Also a mesh that its parent deforms, which no modifier says."""
+    first, _armature = scenes.make_arm()
+    first.modifiers.new("Front", "SUBSURF").levels = 1
+    first.modifiers.move(1, 0)
+    second, armature = scenes.make_arm(name="Leg")
+    second.modifiers.clear()
+    second.parent, second.parent_type = armature, "ARMATURE"
+    second.location = (0.0, 3.0, 0.0)
+    bpy.context.scene.frame_set(11)
+    counts = [len(scenes.final_points(obj)) for obj in (first, second)]
+    assert counts[0] > 2 * counts[1]
+    path = save(tmp_path / "two.blend")
+    run_sinew(
+        *("compare", path, "--methods", "lbs,dq", "--frames", "1,11", "--pictures", int(NEWEST)),
+        *("--size", 64, "--engine", "cycles", "--out", tmp_path),
+    )
+    found = json.loads((tmp_path / "two" / "metrics.json").read_text(encoding="utf-8"))
+    assert found["meshes"] == ["Arm", "Leg"]
+    assert found["rest"]["vertices"] == sum(counts)
+    assert (found["rest"]["holes"], found["rest"]["clashes"]) == (0, 0)
+    at_rest, linear = found["summaries"]["lbs"]
+    _dual_at_rest, dual = found["summaries"]["dq"]
+    assert abs(at_rest["volume_change"]) + at_rest["stretch_rms"] + at_rest["bulge_max"] < 1e-4
+    assert linear["distance_max"] < 1e-4
+    assert dual["distance_max"] > 0.02
+    assert linear["bulge_min"] < -0.02
+    assert ((tmp_path / "two.html").read_text(encoding="utf-8").count("<img") > 2) == NEWEST
 
 
 def test_planted_faults_are_found(tmp_path):
