@@ -100,7 +100,7 @@ class Illustrator:
 
     def _plan_heat(self, metric: Metric, worst: Worst) -> HeatPlan:
         comparison, subject = self._comparison, self._subject
-        scale = HeatScale.over(metric, comparison.all_summaries(), comparison.rest.diagonal)
+        scale = HeatScale.over(metric, [*comparison.summaries.values()], comparison.rest.diagonal)
         shapes = measure.shapes_at(subject, [*self._methods, comparison.reference], worst.frame)
         reference = shapes[comparison.reference]
         fields = {

@@ -106,9 +106,6 @@ class Comparison:
         """Whether an entry of the summaries is more than rounding."""
         return abs(value) > ROUNDING * (self.rest.diagonal if entry in LENGTHS else 1.0)
 
-    def all_summaries(self) -> list[Summary]:
-        return [summary for summaries in self.summaries.values() for summary in summaries]
-
     def worst(self, entry: str) -> Worst:
         """Where an entry of the summaries is largest by magnitude; the first of equals."""
         candidates = [

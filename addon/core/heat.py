@@ -20,6 +20,8 @@ _VIRIDIS = bytes.fromhex(
 # Ratios beyond this many doublings or halvings share the last colour.
 MOST_DOUBLINGS = 2.0
 LEAST_DOUBLINGS = 0.1
+# Lengths of one method beyond this many times those of all others do so, too.
+BEYOND_OTHERS = 2.0
 
 
 def viridis(shares: np.ndarray) -> np.ndarray:
@@ -31,29 +33,37 @@ def viridis(shares: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class HeatScale:
-    """Which values the colours stand for: `low` the first, `high` the last."""
+    """Which values the colours stand for: `low` the first, `high` the last.
+
+    clipped  there are values beyond, which share the first or last colour
+    """
 
     metric: Metric
     low: float
     high: float
+    clipped: bool = False
 
     @classmethod
-    def over(cls, metric: Metric, summaries: Sequence[Summary], diagonal: float) -> HeatScale:
+    def over(cls, metric: Metric, methods: Sequence[Sequence[Summary]], diagonal: float) -> HeatScale:
         """Wide enough for the shapes summed up: those of one frame, or of all, so that colours compare.
 
+        methods   for each method its summaries; one that tears the mesh apart does not make all others pale
         diagonal  of the rest shape: differences below a ten thousandth of it are not blown up
         """
-        least = 1e-4 * diagonal if metric.unit == "length" else 0.0
-        if metric.scale == "log":
-            extremes = [value for s in summaries for value in s.extremes(metric.name) if value > 0.0]
-            doublings = max((abs(np.log2(value)) for value in extremes), default=0.0)
-            factor = 2.0 ** float(np.clip(doublings, LEAST_DOUBLINGS, MOST_DOUBLINGS))
-            return cls(metric, 1.0 / factor, factor)
         if metric.unit == "share":
             return cls(metric, 0.0, 1.0)
-        most = max((abs(v) for s in summaries for v in s.extremes(metric.name)), default=0.0)
-        most = max(most, least, 1e-12)
-        return cls(metric, -most if metric.scale == "signed" else 0.0, most)
+        largest = sorted((_largest(metric, summaries) for summaries in methods), reverse=True)
+        if metric.scale == "log":
+            doublings = max(largest, default=0.0)
+            factor = 2.0 ** float(np.clip(doublings, LEAST_DOUBLINGS, MOST_DOUBLINGS))
+            return cls(metric, 1.0 / factor, factor, doublings > MOST_DOUBLINGS)
+        least = max(1e-4 * diagonal, 1e-12)
+        most = max(largest, default=0.0)
+        if len(largest) > 1 and largest[1] > least:
+            most = min(most, BEYOND_OTHERS * largest[1])
+        most = max(most, least)
+        low = -most if metric.scale == "signed" else 0.0
+        return cls(metric, low, most, clipped=max(largest, default=0.0) > most)
 
     def colours(self, values: np.ndarray) -> np.ndarray:
         """float64 [n, 3], sRGB in 0..1."""
@@ -74,3 +84,12 @@ class HeatScale:
         if self.metric.scale == "log":
             return np.geomspace(self.low, self.high, count).tolist()
         return np.linspace(self.low, self.high, count).tolist()
+
+
+def _largest(metric: Metric, summaries: Sequence[Summary]) -> float:
+    """The largest magnitude; of a ratio in doublings or halvings."""
+    values = [value for summary in summaries for value in summary.extremes(metric.name)]
+    if metric.scale == "log":
+        # A face or an edge may have shrunk to nothing.
+        return max((abs(float(np.log2(max(value, 1e-12)))) for value in values), default=0.0)
+    return max((abs(value) for value in values), default=0.0)

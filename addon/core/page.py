@@ -204,10 +204,16 @@ def _legend(scale: HeatScale, unit: str) -> str:
 def legend_texts(scale: HeatScale, unit: str) -> list[str]:
     """The legend's numbers with their unit, from the low end to the high one."""
     if scale.metric.unit == "length":
-        return [f"{value:.3g} {unit}" for value in scale.ticks()]
-    if scale.metric.unit == "share":
-        return [f"{100 * value:.0f} %" for value in scale.ticks()]
-    return [_times(value) for value in scale.ticks()]
+        texts = [f"{value:.3g} {unit}" for value in scale.ticks()]
+    elif scale.metric.unit == "share":
+        texts = [f"{100 * value:.0f} %" for value in scale.ticks()]
+    else:
+        texts = [_times(value) for value in scale.ticks()]
+    if scale.clipped:
+        texts[-1] += " and more"
+        if scale.metric.scale != "linear":
+            texts[0] += " and less"
+    return texts
 
 
 def _numbers(comparison: Comparison) -> str:

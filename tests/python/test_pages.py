@@ -10,6 +10,7 @@ from sinew_addon.core import golden
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.heat import HeatScale, viridis
 from sinew_addon.core.metrics import METRICS, Summary
+from sinew_addon.core.page import legend_texts
 from sinew_addon.core.plots import HEIGHT, WIDTH, line_plot
 
 
@@ -36,9 +37,9 @@ def summary(**values):
 
 def test_ranges_hold_all_frames():
     frames = [summary(bulge_min=-0.3, bulge_max=0.1), summary(bulge_max=0.2, distance_max=0.7)]
-    bulge = HeatScale.over(METRICS["bulge"], frames, 1.0)
+    bulge = HeatScale.over(METRICS["bulge"], [frames], 1.0)
     assert (bulge.low, bulge.high) == (-0.3, 0.3)
-    distance = HeatScale.over(METRICS["distance"], frames, 1.0)
+    distance = HeatScale.over(METRICS["distance"], [frames], 1.0)
     assert (distance.low, distance.high) == (0.0, 0.7)
     assert distance.ticks(3) == pytest.approx([0.0, 0.35, 0.7])
     np.testing.assert_allclose(bulge.colours(np.array([0.0])), viridis([0.5]))
@@ -48,15 +49,25 @@ def test_ranges_hold_all_frames():
     ("least", "most", "high"), [(0.8, 1.5, 1.5), (0.5, 1.2, 2.0), (0.01, 50.0, 4.0), (0.999, 1.0, 2**0.1)]
 )
 def test_ratios_are_shown_around_one(least, most, high):
-    scale = HeatScale.over(METRICS["stretch"], [summary(stretch_min=least, stretch_max=most)], 1.0)
+    scale = HeatScale.over(METRICS["stretch"], [[summary(stretch_min=least, stretch_max=most)]], 1.0)
     assert (scale.low, scale.high) == pytest.approx((1 / high, high))
     np.testing.assert_allclose(scale.colours(np.array([1 / high, 1.0, high])), viridis([0.0, 0.5, 1.0]))
     np.testing.assert_array_equal(np.argsort(scale.severity(np.array([1.5, 0.25, 1.0]))), [2, 0, 1])
 
 
 def test_rounding_is_not_blown_up():
-    scale = HeatScale.over(METRICS["distance"], [summary(distance_max=1e-9)], 2.0)
+    scale = HeatScale.over(METRICS["distance"], [[summary(distance_max=1e-9)]], 2.0)
     assert scale.high == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize(
+    ("largest", "high"), [((0.0, 0.5, 0.04), 0.08), ((0.3, 0.5), 0.5), ((0.0, 0.5), 0.5), ((0.5,), 0.5)]
+)
+def test_a_torn_mesh_does_not_make_the_others_pale(largest, high):
+    scale = HeatScale.over(METRICS["distance"], [[summary(distance_max=most)] for most in largest], 1.0)
+    assert scale.high == pytest.approx(high)
+    assert scale.clipped == (high < max(largest))
+    assert legend_texts(scale, "m")[-1] == (f"{high:g} m and more" if scale.clipped else f"{high:g} m")
 
 
 def points_of(svg):
