@@ -121,7 +121,7 @@ class Comparison:
         """At most `count` frames, in order: those at which a measure is worst, the measures in turn, but for
         those next to one that is there already."""
         entries = ["distance_max", "volume_change", *(metric.worst for metric in METRICS.values())]
-        apart = (max(self.frames) - min(self.frames)) / 20
+        apart = (max(self.frames) - min(self.frames)) / 10
         chosen: list[float] = []
         for worst in map(self.worst, entries):
             is_new = all(abs(worst.frame - frame) > apart for frame in chosen)

@@ -194,10 +194,16 @@ def _legend(scale: HeatScale, unit: str) -> str:
         f"rgb({round(255 * r)},{round(255 * g)},{round(255 * b)})"
         for r, g, b in viridis([number / 16 for number in range(17)])
     )
-    ticks = "".join(f"<span>{escape(text)}</span>" for text in legend_texts(scale, unit))
+    texts = legend_texts(scale, unit)
+    ticks = []
+    for number, text in enumerate(texts):
+        place = 100 * number / (len(texts) - 1)
+        # Centred below its colour, but for those at the ends.
+        shift = {0: 0, len(texts) - 1: 100}.get(number, 50)
+        ticks.append(f'<span style="left:{place}%;transform:translateX(-{shift}%)">{escape(text)}</span>')
     return (
         f'<div class="legend"><div class="ramp" style="background:linear-gradient(to right, {stops})"></div>'
-        f'<div class="ticks">{ticks}</div></div>'
+        f'<div class="ticks">{"".join(ticks)}</div></div>'
     )
 
 
@@ -297,7 +303,8 @@ p { margin: 4px 0 10px; max-width: 100ch; } .faint { color: var(--faint); font-w
 .note { color: var(--warn); } .wide { overflow-x: auto; }
 table { border-collapse: collapse; } td, th { padding: 4px 12px 4px 0; text-align: left;
   vertical-align: top; border-bottom: 1px solid var(--line); font-variant-numeric: tabular-nums; }
-.sheet td, .sheet th { border: 0; padding: 4px 8px 4px 0; } .sheet tr > th:first-child { max-width: 9em; }
+.sheet td, .sheet th { border: 0; padding: 4px 8px 4px 0; }
+.sheet tr > th:first-child { min-width: 5em; max-width: 9em; }
 .sheet img { display: block; max-width: 100%; min-width: 160px; background: var(--cell); border-radius: 6px; }
 .key { display: inline-block; width: 14px; height: 10px; border-radius: 2px; margin-right: 6px; }
 .keys > span { margin-right: 20px; } .finding { margin: 10px 0; padding-left: 12px;
@@ -308,5 +315,6 @@ table { border-collapse: collapse; } td, th { padding: 4px 12px 4px 0; text-alig
 .plot polyline { fill: none; stroke-linejoin: round; }
 .plot .grid { stroke: var(--line); } .plot .axis { stroke: var(--faint); }
 .legend { max-width: 560px; margin: 6px 0 10px; } .ramp { height: 14px; border-radius: 3px; }
-.ticks { display: flex; justify-content: space-between; font-size: 12px; }
+.ticks { position: relative; height: 18px; font-size: 12px; }
+.ticks span { position: absolute; white-space: nowrap; }
 """
