@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SinewError
-from ..core.views import View, of_one_size, whole_view
+from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 
 # The choice beside Sinew's methods: the Armature modifier as it stands in the file.
@@ -114,13 +114,13 @@ def whole_views(
     meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
 ) -> list[View]:
     """For each frame a view that holds the final meshes under all methods; all of one size."""
-    shapes: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
+    extents: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
     for method in methods:
         use_method_on(meshes, method)
-        for frame, points in shapes.items():
+        for frame, own in extents.items():
             set_frame(bpy.context.scene, frame)
-            points.append(world_points(meshes))
-    return of_one_size([whole_view(np.concatenate(points)) for points in shapes.values()])
+            own.append(seen_extent(world_points(meshes)))
+    return of_one_size([whole_view(own) for own in extents.values()])
 
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.sheet import Column, require_pillow, write_sheet
-from ..core.views import close_view, place_of_difference, whole_view
+from ..core.views import close_view, place_of_difference
 from .console import Console
 
 # Other names are those of folders.
@@ -48,11 +48,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     shapes = measure.shapes_at(subject, methods, frame)
     rest = subject.gauge.rest.volume
     volumes = {method: subject.gauge.measure(points).shape.volume for method, points in shapes.items()}
-    final = []
-    for method in methods:
-        evaluate.use_method_on(meshes, method)
-        final.append(evaluate.world_points(meshes))
-    views = [("Whole", whole_view(np.concatenate(final)))]
+    views = [("Whole", evaluate.whole_views(meshes, methods, [frame])[0])]
     place = place_of_difference(list(shapes.values()))
     if place is not None:
         places = np.stack([points[place] for points in shapes.values()])

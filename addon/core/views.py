@@ -37,18 +37,25 @@ class View:
         return round(size * self.width / longer), round(size * self.height / longer)
 
 
-def whole_view(points: np.ndarray) -> View:
-    """Frames `points` [n, 3] from the front, all of them inside."""
+def whole_view(extents: Sequence[np.ndarray]) -> View:
+    """Frames from the front all that has one of `extents`, each as seen_extent gives it."""
     direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
-    right, up = camera_axes(direction)
-    seen = np.stack([points @ right, points @ up, points @ direction], axis=1)
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
     centre = (low + high) / 2
+    right, up = camera_axes(direction)
     target = centre[0] * right + centre[1] * up + centre[2] * direction
     width, height, depth = (float(side) for side in high - low)
     longer = max(width, height, 1e-6)
     width, height = max(width, longer / 2), max(height, longer / 2)
     return View(direction, target, width + 0.06 * longer, height + 0.06 * longer, depth + longer)
+
+
+def seen_extent(points: np.ndarray) -> np.ndarray:
+    """float64 [2, 3]: the lowest and highest coordinates of `points` [n, 3] to the whole view's right, up and
+    towards it."""
+    direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    seen = points @ np.stack([*camera_axes(direction), direction], axis=1)
+    return np.stack([seen.min(axis=0), seen.max(axis=0)])
 
 
 def of_one_size(views: Sequence[View]) -> list[View]:
