@@ -145,12 +145,15 @@ class Summary:
         return getattr(self, f"{metric}_min"), getattr(self, f"{metric}_max")
 
 
-def volume(points: np.ndarray, surface: Surface) -> float:
-    """Volume inside a mesh, in cubed units of `points` [vertices, 3]; positive where faces look outwards.
+def volume(points: np.ndarray, triangles: np.ndarray) -> float:
+    """Volume inside a triangle mesh, in cubed units of `points`; positive where faces look outwards.
+
+    points     [vertices, 3]
+    triangles  int [triangles, 3]
 
     The sum of signed tetrahedra (divergence theorem); holes are closed by fans to the mean of their border.
     """
-    return Shape(surface, points).volume
+    return Shape(Surface(len(points), triangles, np.empty((0, 2), np.int32)), points).volume
 
 
 class Gauge:
