@@ -22,7 +22,6 @@ from ..core.views import View, camera_axes
 
 CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
-ENGINES = ("auto", "workbench", "cycles")
 _PROBE = (
     "import bpy; s = bpy.context.scene; s.render.engine = 'BLENDER_WORKBENCH'; "
     "s.render.resolution_x = s.render.resolution_y = 8; bpy.ops.render.render()"
@@ -50,7 +49,7 @@ def check_size(size: int) -> None:
 
 
 def chosen_engine(wanted: str) -> str:
-    """ "workbench" or "cycles", for one of ENGINES. Raises SinewError where it can not render here."""
+    """ "workbench" or "cycles", wanted by name or "auto". Raises SinewError where it can not render here."""
     if wanted == "cycles":
         return wanted
     if has_opengl():

@@ -54,11 +54,6 @@ class Surface:
         return np.repeat(keys, lacking.clip(min=0)), keys[counts > 1]
 
     @property
-    def border_count(self) -> int:
-        """Sides of triangles without a neighbour: 0 for a closed mesh."""
-        return len(self._sides[0])
-
-    @property
     def clash_count(self) -> int:
         """Sides that two triangles run through in one direction: normals that disagree, or edges of more than
         two faces. Where there are any, volume means little."""

@@ -186,7 +186,7 @@ def test_holes_are_closed_by_fans_to_their_middle(name):
     points = mesh.vertices + np.array([5, 0, 0])
     surface = Surface(len(points), open_faces.astype(np.int32), np.empty((0, 2), np.int32))
     assert surface.caps.count == 2
-    assert surface.border_count == sum(len(mesh.vertex_neighbors[seed]) for seed in seeds)
+    assert len(surface.caps.starts) == sum(len(mesh.vertex_neighbors[seed]) for seed in seeds)
     # The same by trimesh: the vertex that was taken out, put back at the middle of its neighbours.
     closed = points.copy()
     for seed in seeds:
@@ -203,7 +203,7 @@ def test_seams_are_no_holes():
     no_edges = np.empty((0, 2), np.int32)
     assert Surface(len(points), triangles, no_edges).caps.count == len(triangles)
     surface = Surface(len(points), triangles, no_edges, same_places(points))
-    assert (surface.caps.count, surface.border_count) == (0, 0)
+    assert (surface.caps.count, len(surface.caps.starts)) == (0, 0)
     assert Shape(surface, points).volume == pytest.approx(mesh.volume, rel=1e-9)
 
 
@@ -220,7 +220,7 @@ def test_several_meshes_are_measured_as_one():
     both = joined([surface_of(a), surface_of(b)])
     points = np.concatenate([a.vertices, b.vertices + np.array([9, 0, 0])])
     assert Shape(both, points).volume == pytest.approx(a.volume + b.volume, rel=1e-9)
-    assert both.border_count == 0
+    assert both.caps.count == 0
 
 
 def test_flipped_faces_are_those_turned_against_their_bone():
