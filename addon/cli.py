@@ -14,7 +14,7 @@ _commands: list[object] = []
 
 def main(argv: list[str]) -> int:
     """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
-    from .commands import compare, console, inbetween, info, methods, points, report, reskin
+    from .commands import compare, console, inbetween, info, methods, points, render, report, reskin
 
     modules = {
         "methods": methods,
@@ -23,6 +23,7 @@ def main(argv: list[str]) -> int:
         "reskin": reskin,
         "inbetween": inbetween,
         "compare": compare,
+        "render": render,
         "report": report,
     }
     parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")

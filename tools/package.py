@@ -19,7 +19,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 ADDON = ROOT / "addon"
-NOT_SHIPPED = re.compile(r"pyproject\.toml|__pycache__|build|dist|\..*|.*\.(pyc|egg-info|blend\d+|orig|rej)")
+NOT_SHIPPED = re.compile(
+    r"pyproject\.toml|pytest_plugin\.py|__pycache__|build|dist|\..*|.*\.(pyc|egg-info|blend\d+|orig|rej)"
+)
 WHEEL_NAME = re.compile(r"[^-]+-(?P<version>[^-]+)(-\d[^-]*)?-(?P<python>[^-]+)-[^-]+-(?P<system>[^-]+)\.whl")
 PLATFORMS = {
     r"(manylinux.*|linux)_x86_64": ["linux-x64"],

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Final points and triangles of evaluated meshes, and the method they are deformed with."""
+"""Final points of evaluated meshes, and the method they are deformed with."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ..core.errors import SinewError
+from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 
 # The choice beside Sinew's methods: the Armature modifier as it stands in the file.
@@ -68,9 +70,57 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
         raise SinewError(properties.of(obj).error)
 
 
+def use_method_on(meshes: Iterable[bpy.types.Object], method: str) -> None:
+    for obj in meshes:
+        use_method(obj, method)
+
+
+def drivable_meshes(
+    scene: bpy.types.Scene, path: Path, methods: Iterable[str], name: str | None = None
+) -> tuple[list[bpy.types.Object], list[str]]:
+    """Those of deformed_meshes that take all `methods`, and a sentence for each of the others.
+
+    Raises SinewError that names the file `path` where none is left.
+    """
+    try:
+        meshes = deformed_meshes(scene, name)
+    except SinewError as error:
+        raise SinewError(f"{path}: {error}") from None
+    taken, reasons = [], []
+    for obj in meshes:
+        try:
+            for method in methods:
+                use_method(obj, method)
+            taken.append(obj)
+        except SinewError as error:
+            reasons.append(str(error))
+    if not taken:
+        raise SinewError(f"{path}: no mesh that Sinew can drive: {reasons[0]}")
+    return taken, reasons
+
+
+def length_unit(scene: bpy.types.Scene) -> str:
+    """What one unit of Blender is called in the file: "m", or "units" where it is no metre."""
+    units = scene.unit_settings
+    return "m" if units.system != "NONE" and units.scale_length == 1.0 else "units"
+
+
 def set_frame(scene: bpy.types.Scene, frame: float) -> None:
     whole = int(np.floor(frame))
     scene.frame_set(whole, subframe=float(frame - whole))
+
+
+def whole_views(
+    meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
+) -> list[View]:
+    """For each frame a view that holds the final meshes under all methods; all of one size."""
+    extents: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
+    for method in methods:
+        use_method_on(meshes, method)
+        for frame, own in extents.items():
+            set_frame(bpy.context.scene, frame)
+            own.append(seen_extent(world_points(meshes)))
+    return of_one_size([whole_view(own) for own in extents.values()])
 
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:
@@ -84,19 +134,6 @@ def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
     for obj in objects:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
         parts.append(final_points(obj) @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.concatenate(parts)
-
-
-def joined_triangles(objects: list[bpy.types.Object]) -> np.ndarray:
-    """int32 [triangles, 3]: corners of the triangles of several meshes, into world_points(objects)."""
-    parts, first = [], 0
-    for obj in objects:
-        mesh = _evaluated_mesh(obj)
-        mesh.calc_loop_triangles()
-        triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-        parts.append(triangles + first)
-        first += len(mesh.vertices)
     return np.concatenate(parts)
 
 

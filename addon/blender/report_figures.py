@@ -13,11 +13,12 @@ import bpy
 import numpy as np
 import sinew
 
-from ..core.compare import View, whole_view
 from ..core.metrics import volume
 from ..core.report import meshes
 from ..core.report.model import Figure, Picture
-from . import armature_io, drive, evaluate, files, mesh_io, render
+from ..core.views import View, seen_extent, whole_view
+from . import armature_io, drive, evaluate, files, measure, mesh_io
+from .render import Studio
 
 LINKS, MESH = "report_links.blend", "report_mesh.blend"
 # Keyframes of LINKS, and the frames of MESH where it is bent and where it is twisted most.
@@ -49,16 +50,16 @@ def _open(path: Path) -> bpy.types.Object:
     return evaluate.deformed_meshes(bpy.context.scene)[0]
 
 
-def _prepare(mesh: bpy.types.Object, engine: str, size: int) -> None:
-    scene = bpy.context.scene
-    render.prepare(scene, [mesh], engine, size)
+def _studio(mesh: bpy.types.Object, engine: str, size: int) -> Studio:
+    studio = Studio(bpy.context.scene, [mesh], engine, size)
     # In its own colours where the engine shows them: they show twists.
-    scene.display.shading.color_type = "MATERIAL"
+    studio.scene.display.shading.color_type = "MATERIAL"
+    return studio
 
 
-def _draw(view: View, scratch: Path) -> bytes:
+def _draw(studio: Studio, view: View, scratch: Path) -> bytes:
     path = scratch / "picture.png"
-    render.picture(bpy.context.scene, view, path)
+    studio.picture(view, path)
     return path.read_bytes()
 
 
@@ -77,7 +78,7 @@ def read_chain(mesh: bpy.types.Object) -> meshes.Chain:
     group_of = mesh_io.read_group_weights(mesh.data).groups
     return meshes.Chain(
         points=mesh_io.read_points(mesh.data.vertices).astype(np.float64),
-        triangles=evaluate.joined_triangles([mesh]),
+        triangles=measure.read_surface(mesh.data).triangles,
         bones=bones.of_groups([group.name for group in mesh.vertex_groups])[group_of],
         parents=np.array(parents, np.int32),
         rest=bones.rest.astype(np.float64),
@@ -91,14 +92,14 @@ def _hierarchies(path: Path, engine: str, size: int, scratch: Path) -> tuple[Fig
     chain = read_chain(mesh)
     shapes = {method: [chain.between(t, method) for t in meshes.TIMES] for method in meshes.HIERARCHIES}
     mesh.modifiers.clear()
-    _prepare(mesh, engine, size)
-    view = whole_view(np.concatenate([shape for row in shapes.values() for shape in row]))
+    studio = _studio(mesh, engine, size)
+    view = whole_view([seen_extent(shape) for row in shapes.values() for shape in row])
     drawn = []
     for row in shapes.values():
         for t, shape in zip(meshes.TIMES, row, strict=True):
             mesh.data.vertices.foreach_set("co", shape.astype(np.float32).ravel())
             mesh.data.update()
-            drawn.append(Picture(f"t = {t:g}", _draw(view, scratch)))
+            drawn.append(Picture(f"t = {t:g}", _draw(studio, view, scratch)))
     # All at once, so that the three figures have one scale.
     drawn = iter(meshes.trimmed(drawn))
     pictures = {method: [next(drawn) for _ in row] for method, row in shapes.items()}
@@ -110,7 +111,7 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
     scene = bpy.context.scene
     evaluate.set_frame(scene, scene.frame_start)
     rest = evaluate.world_points([mesh])
-    triangles = evaluate.joined_triangles([mesh])
+    triangles = measure.read_surface(mesh.data).triangles
     groups = mesh_io.read_group_weights(mesh.data)
     skin = meshes.Skin(
         rest=rest,
@@ -126,19 +127,20 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
         for method in meshes.SKINS:
             evaluate.use_method(mesh, method)
             of_methods[method] = evaluate.world_points([mesh])
-    _prepare(mesh, engine, size)
+    studio = _studio(mesh, engine, size)
     pictures: dict[int, list[Picture]] = {}
     labels = {method.name: method.label for method in sinew.methods()}
     for frame, of_methods in shapes.items():
         evaluate.set_frame(scene, frame)
-        view = whole_view(np.concatenate(list(of_methods.values())))
+        view = whole_view([seen_extent(shape) for shape in of_methods.values()])
         pictures[frame] = []
         for letter, method in zip("abc", meshes.SKINS, strict=True):
             evaluate.use_method(mesh, method)
-            pictures[frame].append(Picture(f"({letter}) {labels[method]}", _draw(view, scratch)))
+            pictures[frame].append(Picture(f"({letter}) {labels[method]}", _draw(studio, view, scratch)))
         pictures[frame] = meshes.trimmed(pictures[frame])
     evaluate.set_frame(scene, scene.frame_start)
-    at_rest = Picture("At rest: links, each with a bone", _draw(whole_view(rest), scratch))
+    view = whole_view([seen_extent(rest)])
+    at_rest = Picture("At rest: links, each with a bone", _draw(studio, view, scratch))
     return (
         meshes.figure_3_9(skin, *meshes.trimmed([at_rest])),
         meshes.figure_3_10(skin, shapes[BENT], pictures[BENT]),

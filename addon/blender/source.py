@@ -90,7 +90,9 @@ def has_changed(
 def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """float32 [vertices, 3] at this evaluation; the same array as before where nothing changed."""
     if properties.of(obj).front is not None:
-        points = mesh_io.read_points(front.evaluated_mesh(obj, depsgraph).vertices)
+        mesh = front.evaluated_mesh(obj, depsgraph)
+        # While Sinew was off nothing needed what stands in front: it is evaluated next, and comes again.
+        points = source.points if mesh is None else mesh_io.read_points(mesh.vertices)
         if not np.array_equal(points, source.points):
             source.points = points
         return source.points

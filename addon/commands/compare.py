@@ -1,132 +1,207 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare`: one picture of a frame under several methods."""
+"""`sinew compare`: a page for each file that shows and measures methods beside each other."""
 
 from __future__ import annotations
 
 import argparse
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..core.compare import Column, close_view, require_pillow, whole_view, write_sheet
+from ..core.comparison import Comparison, RestFacts
+from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
-from ..core.metrics import volume
+from ..core.output import write_text
+from ..core.page import page
+from ..core.sheet import require_pillow
+from . import sheet
 from .console import Console
+
+if TYPE_CHECKING:
+    from ..blender.measure import Subject
+    from ..blender.render import Studio
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         "compare",
-        help="draw a frame under several methods, side by side",
-        description="Draws one sheet: a column for each method, the same camera for all, framed on the mesh, "
-        "with a close-up of the place where the methods differ most and the volume against the rest pose.",
+        help="show and measure methods beside each other",
+        description="Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
+        "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
+        "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
+        "the pictures. With --out SHEET.png it draws one frame of one file into one picture instead.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument(
         "--methods",
         default="lbs,qv,dq",
         help="of `sinew methods`, and blender for the Armature modifier (default: %(default)s)",
     )
-    parser.add_argument("--frame", required=True, help="the frame to draw")
+    parser.add_argument(
+        "--reference",
+        default="blender",
+        metavar="METHOD",
+        help="what distances are measured to (default: %(default)s, the file's Armature modifier)",
+    )
+    parser.add_argument(
+        "--frames", "--frame", help="such as 1,12,40-48 (default: the file's frame range; a sheet needs one)"
+    )
     parser.add_argument("--object", metavar="NAME", help="only this mesh")
-    parser.add_argument("--size", type=int, default=640, help="pixels of each picture (default: %(default)s)")
+    parser.add_argument(
+        "--pictures",
+        type=int,
+        default=4,
+        metavar="N",
+        help="most frames to draw, of those at which a measure is worst; 0: none (default: %(default)s)",
+    )
+    parser.add_argument("--video", action="store_true", help="also write an mp4 of the methods side by side")
+    parser.add_argument(
+        "--influences",
+        type=int,
+        default=USUAL_INFLUENCES,
+        metavar="N",
+        help="how many bones a vertex may have before it is reported (default: %(default)s)",
+    )
+    parser.add_argument("--size", type=int, help="pixels of each picture (default: 480; 640 in a sheet)")
     parser.add_argument(
         "--engine",
         choices=("auto", "workbench", "cycles"),
         default="auto",
         help="auto: Workbench, or Cycles where there is no OpenGL",
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="SHEET.png")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="a folder, or SHEET.png")
     return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    import bpy
+    from ..blender import evaluate, render, video
 
-    from ..blender import evaluate, files, render
-
-    require_pillow()
-    methods = [name.strip() for name in args.methods.split(",")]
-    evaluate.check_methods(methods)
-    frames = parse_frames(args.frame)
-    if len(frames) != 1:
-        raise SinewError(f"frame: expected one frame, got {args.frame!r}")
-    if not 64 <= args.size <= 4096:
-        raise SinewError(f"size: expected 64 to 4096 pixels, got {args.size}")
-    if args.out.suffix.lower() != ".png":
-        raise SinewError(f"{args.out}: expected a name ending in .png")
-    files.open_file(args.file)
-    scene = bpy.context.scene
-    try:
-        meshes = evaluate.deformed_meshes(scene, args.object)
-    except SinewError as error:
-        raise SinewError(f"{args.file}: {error}") from None
-    evaluate.set_frame(scene, frames[0])
-
-    left_out = []
-    for obj in list(meshes):
+    methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
+    evaluate.check_methods([*methods, args.reference])
+    if args.size is not None:
+        render.check_size(args.size)
+    if args.out.suffix.lower() in sheet.PICTURES:
+        return sheet.run(args, methods, console)
+    frames = parse_frames(args.frames) if args.frames else None
+    for option in ("pictures", "influences"):
+        if getattr(args, option) < 0:
+            raise SinewError(f"{option}: expected 0 or more, got {getattr(args, option)}")
+    _check_names(args.files)
+    if args.video:
+        require_pillow()
+        video.check_can_encode()
+    engine = render.chosen_engine(args.engine) if args.pictures or args.video else None
+    failed = False
+    for path in args.files:
         try:
-            for method in methods:
-                evaluate.use_method(obj, method)
+            complete = _compare(path, methods, frames, engine, args, console)
         except SinewError as error:
-            console.complain(f"{args.file}: left out: {error}")
-            left_out.append(obj)
-            meshes.remove(obj)
-    if not meshes:
-        raise SinewError(f"{args.file}: no mesh that Sinew can drive")
-
-    shapes = {}
-    for method in methods:
-        for obj in meshes:
-            evaluate.use_method(obj, method)
-        shapes[method] = evaluate.world_points(meshes)
-    triangles = evaluate.joined_triangles(meshes)
-    rest_volume = _rest_volume(meshes, triangles)
-    points = list(shapes.values())
-    if any(shape.shape != points[0].shape for shape in points):
-        raise SinewError(f"{args.file}: a modifier changes the topology from method to method")
-    views = [("Whole", whole_view(np.concatenate(points)))]
-    close = close_view(points)
-    if close is not None:
-        views.append(("Where the methods differ most", close))
-
-    engine = args.engine
-    if engine == "auto":
-        engine = "workbench" if render.has_opengl() else "cycles"
-    render.prepare(scene, meshes, engine, args.size)
-    columns = []
-    with tempfile.TemporaryDirectory() as folder:
-        for method in console.progress(methods, len(methods), f"Drawing {args.file.name}"):
-            for obj in meshes:
-                evaluate.use_method(obj, method)
-            pictures = []
-            for index, (_title, view) in enumerate(views):
-                pictures.append(Path(folder) / f"{method}-{index}.png")
-                render.picture(scene, view, pictures[-1])
-            note = f"volume {100 * volume(shapes[method], triangles) / rest_volume:.1f} % of rest"
-            columns.append(Column(f"{evaluate.method_label(method)} ({method})", note, pictures))
-        names = ", ".join(obj.name for obj in meshes)
-        title = f"{args.file.name}: {names}, frame {frames[0]}"
-        write_sheet(title, columns, [name for name, _view in views], args.out)
-    console.say(str(args.out))
-    return 1 if left_out else 0
+            console.complain(error)
+            complete = False
+        failed |= not complete
+    return 1 if failed else 0
 
 
-def _rest_volume(meshes: list, triangles: np.ndarray) -> float:
-    """The volume of the meshes with their armatures in rest position."""
+def _check_names(files: list[Path]) -> None:
+    known: dict[str, Path] = {}
+    for path in files:
+        other = known.setdefault(path.stem, path)
+        if other is not path:
+            raise SinewError(f"{other} and {path} would both be written to {path.stem}.html")
+
+
+def _compare(
+    path: Path,
+    methods: list[str],
+    frames: list[float] | None,
+    engine: str | None,
+    args: argparse.Namespace,
+    console: Console,
+) -> bool:
+    """Writes one file's page; false where a mesh was left out."""
     import bpy
 
-    from ..blender import drive, evaluate
+    from ..blender import evaluate, files, illustrate, measure, render
 
-    armatures = {drive.armature_of(obj).data for obj in meshes}
-    before = {armature: armature.pose_position for armature in armatures}
-    for armature in armatures:
-        armature.pose_position = "REST"
-    bpy.context.view_layer.update()
-    rest = volume(evaluate.world_points(meshes), triangles)
-    for armature, position in before.items():
-        armature.pose_position = position
-    bpy.context.view_layer.update()
-    return rest if rest != 0.0 else float("nan")
+    files.open_file(path)
+    scene = bpy.context.scene
+    frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
+    evaluate.set_frame(scene, frames[0])
+    played = [*methods, args.reference]
+    meshes, left_out = evaluate.drivable_meshes(scene, path, played, args.object)
+    for reason in left_out:
+        console.complain(f"{path}: left out: {reason}")
+    subject = measure.gather(scene, meshes)
+    comparison = _measure(path, subject, methods, frames, args, console)
+    folder = args.out / path.stem
+    write_text(folder / "metrics.csv", comparison.to_csv())
+    write_text(folder / "metrics.json", comparison.to_json())
+    sheets = []
+    if engine is not None:
+        studio = render.Studio(scene, subject.meshes, engine, args.size or 480)
+        if args.pictures:
+            illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
+            illustrator.plan(args.pictures)
+            count = illustrator.picture_count
+            for _ in console.progress(illustrator.draw(), count, f"Drawing {path.name}"):
+                pass
+            sheets = illustrator.sheets
+        if args.video:
+            _write_video(subject, comparison, studio, folder / "video.mp4", console)
+    target = args.out / f"{path.stem}.html"
+    write_text(target, page(comparison, sheets, "; ".join(f"Left out: {reason}" for reason in left_out)))
+    console.say(str(target))
+    return not left_out
+
+
+def _write_video(
+    subject: Subject, comparison: Comparison, studio: Studio, path: Path, console: Console
+) -> None:
+    from ..blender import illustrate, video
+
+    render = subject.scene.render
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = illustrate.film(subject, comparison, studio, Path(folder))
+        count = len(comparison.frames)
+        filmed = list(console.progress(pictures, count, f"Filming {comparison.file}"))
+        video.encode(filmed, render.fps, render.fps_base, path)
+
+
+def _measure(
+    path: Path,
+    subject: Subject,
+    methods: list[str],
+    frames: list[float],
+    args: argparse.Namespace,
+    console: Console,
+) -> Comparison:
+    from ..blender import evaluate, measure
+
+    batches = measure.batches(subject, frames, len(methods) + 1)
+    summaries, times, own = ({method: [] for method in methods} for _ in range(3))
+    rest = None
+    for batch in console.progress(batches, len(batches), f"Measuring {path.name}"):
+        measured = measure.measure(subject, methods, args.reference, batch)
+        if rest is None:
+            rest = RestFacts.of(subject.gauge)
+        for method in methods:
+            summaries[method] += measured.summaries[method]
+            times[method] += measured.times[method]
+            own[method] += measured.own[method]
+    return Comparison(
+        path.name,
+        [obj.name for obj in subject.meshes],
+        {method: evaluate.method_label(method) for method in methods},
+        args.reference,
+        evaluate.length_unit(subject.scene),
+        rest,
+        frames,
+        summaries,
+        times,
+        own,
+        {
+            part.obj.name: [*part.check_weights(args.influences), *part.pose_check.findings()]
+            for part in subject.parts
+        },
+    )

@@ -104,9 +104,7 @@ def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
         )
     from ..blender import render, report_figures
 
-    engine = args.engine
-    if engine == "auto":
-        engine = "workbench" if render.has_opengl() else "cycles"
+    engine = render.chosen_engine(args.engine)
     size = QUICK_PICTURE_SIZE if args.quick else PICTURE_SIZE
     with tempfile.TemporaryDirectory() as scratch:
         return report_figures.figures(args.blend_files, engine, size, Path(scratch), console.note)

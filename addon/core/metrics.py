@@ -1,22 +1,382 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures of a deformed mesh."""
+"""Measures of a deformed mesh against its rest shape; docs/metrics.md defines each.
+
+Bind a Gauge to a mesh, tell it each frame's rest shape and bones, measure any number of shapes:
+
+    gauge = Gauge(surface, influences)
+    gauge.set_frame(frame)
+    measured = gauge.measure(points, other)
+    measured.summary(), measured.field("stretch")
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
+
+from .influences import Influences
+from .quaternions import cross, dots, rotated, rotations_of
+from .rig import Bones
+from .surface import Surface
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A measure that each vertex has, to be shown as a heat map.
+
+    name       what programs say, Measured.field among them
+    label      what people read
+    unit       "length" (that of the points), "ratio" or "share"
+    scale      how values become colours: "linear" from 0, "signed" around 0, "log" around 1
+    worst      the entry of a summary that says how bad a frame is: largest by magnitude is worst
+    text       one sentence
+    """
+
+    name: str
+    label: str
+    unit: str
+    scale: str
+    worst: str
+    text: str
+
+
+METRICS = {
+    metric.name: metric
+    for metric in (
+        Metric(
+            "distance",
+            "Distance",
+            "length",
+            "linear",
+            "distance_max",
+            "How far each vertex lies from where the method compared with puts it.",
+        ),
+        Metric(
+            "bulge",
+            "Bulge",
+            "length",
+            "signed",
+            "bulge_worst",
+            "How much farther from its bone's axis a vertex lies than at rest: above zero the limb swells, "
+            "below zero it collapses.",
+        ),
+        Metric(
+            "stretch",
+            "Edge stretch",
+            "ratio",
+            "log",
+            "stretch_rms",
+            "The length of a vertex's most changed edge, as a part of its length at rest.",
+        ),
+        Metric(
+            "area",
+            "Area",
+            "ratio",
+            "log",
+            "area_rms",
+            "The area of the faces around a vertex, as a part of their area at rest.",
+        ),
+        Metric(
+            "flips",
+            "Flipped faces",
+            "share",
+            "linear",
+            "flipped_area",
+            "The share of a vertex's faces that are turned against the bones that hold them.",
+        ),
+    )
+}
+
+
+@dataclass(frozen=True)
+class FrameOfRig:
+    """What one frame's shapes are measured against; all in one space, whose unit lengths come out in.
+
+    rest        [vertices, 3], the shape that the bones deform
+    rest_axes   [bones, 2, 3], head and tail of each bone that influences name, at rest
+    posed_axes  [bones, 2, 3], the same in the pose
+    motions     [bones, 3, 3], linear part of posed_from_rest
+    """
+
+    rest: np.ndarray
+    rest_axes: np.ndarray
+    posed_axes: np.ndarray
+    motions: np.ndarray
+
+    @cached_property
+    def rotations(self) -> np.ndarray:
+        """Unit quaternions, float64 [4, bones]."""
+        return rotations_of(self.motions)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One shape in numbers; docs/metrics.md says how each is defined. Lengths in the unit of the points."""
+
+    distance_max: float
+    distance_rms: float
+    volume: float
+    volume_change: float
+    area: float
+    area_change: float
+    area_rms: float
+    area_min: float
+    area_max: float
+    stretch_min: float
+    stretch_max: float
+    stretch_rms: float
+    flipped_faces: int
+    flipped_area: float
+    bulge_min: float
+    bulge_max: float
+
+    @property
+    def bulge_worst(self) -> float:
+        return max(self.bulge_max, -self.bulge_min)
+
+    def extremes(self, metric: str) -> tuple[float, float]:
+        """The least and largest value of one of METRICS at any vertex, or beyond."""
+        if metric == "distance":
+            return 0.0, self.distance_max
+        if metric == "flips":
+            return 0.0, float(self.flipped_faces > 0)
+        return getattr(self, f"{metric}_min"), getattr(self, f"{metric}_max")
 
 
 def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Volume enclosed by a triangle mesh, in cubed units of `points`; positive where faces look outwards.
+    """Volume inside a triangle mesh, in cubed units of `points`; positive where faces look outwards.
 
     points     [vertices, 3]
     triangles  int [triangles, 3]
 
-    The sum of signed tetrahedra from the mesh's centre, by the divergence theorem. For an open mesh it is
-    the volume closed by a cone from that centre over each hole.
+    The sum of signed tetrahedra (divergence theorem); holes are closed by fans to the mean of their border.
     """
-    if len(triangles) == 0:
-        return 0.0
-    centred = points.astype(np.float64) - points.mean(axis=0, dtype=np.float64)
-    a, b, c = (centred[triangles[:, corner]] for corner in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+    return Shape(Surface(len(points), triangles, np.empty((0, 2), np.int32)), points).volume
+
+
+class Gauge:
+    """Measures shapes of one mesh against its rest shape."""
+
+    def __init__(self, surface: Surface, influences: Influences) -> None:
+        """influences  of every vertex of the surface, over the bones of FrameOfRig's arrays"""
+        self.surface = surface
+        self.rest: Shape | None = None
+        self._influences = influences
+        # Vertices that bones hold, and where the influences of each begin.
+        self._held = np.flatnonzero(influences.counts)
+        self._starts = influences.offsets[self._held].astype(np.int64)
+        self._heaviest = _heaviest_bones(influences, self._held, self._starts)
+
+    def set_frame(self, frame: FrameOfRig) -> None:
+        """What the shapes measured from now on are measured against."""
+        rest = _by_axis(frame.rest)
+        # Unless shape keys move it, or the object moves, it is that of the last frame.
+        if self.rest is None or not np.array_equal(rest, self.rest.points):
+            self.rest = Shape(self.surface, frame.rest)
+        self._posed_axes = frame.posed_axes
+        self._rest_distances = self._distances_from_axes(rest, frame.rest_axes)
+        self._carried = self._carried_normals(frame.rotations)
+
+    def measure(self, points: np.ndarray, other: np.ndarray | None = None) -> Measured:
+        """A shape [vertices, 3] in the frame set last, and how far it is from the shape `other`."""
+        shape = Shape(self.surface, points)
+        distance, bulge = np.zeros((2, self.surface.vertex_count))
+        if other is not None:
+            apart = shape.points - _by_axis(other)
+            distance = np.sqrt(dots(apart, apart))
+        bulge[self._held] = self._distances_from_axes(shape.points, self._posed_axes) - self._rest_distances
+        flipped = dots(shape.normals, self._carried) < 0.0
+        return Measured(self.rest, shape, distance, bulge, flipped)
+
+    def _distances_from_axes(self, points: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """float64 [held vertices]: from the segment of the bone that holds each most."""
+        heads = np.ascontiguousarray(axes[:, 0].T, dtype=np.float64)
+        bones = np.ascontiguousarray((axes[:, 1] - axes[:, 0]).T, dtype=np.float64)
+        along = bones.take(self._heaviest, axis=1)
+        from_head = points.take(self._held, axis=1) - heads.take(self._heaviest, axis=1)
+        squared = dots(along, along)
+        share = np.divide(dots(from_head, along), squared, out=np.zeros_like(squared), where=squared > 0.0)
+        offset = from_head - share.clip(0.0, 1.0) * along
+        return np.sqrt(dots(offset, offset))
+
+    def _carried_normals(self, rotations: np.ndarray) -> np.ndarray:
+        """float64 [3, triangles]: rest normals, of any length, turned with the bones of their corners.
+
+        rotations  unit quaternions [4, bones]
+        """
+        turns = np.zeros((4, self.surface.vertex_count))
+        turns[0] = 1.0
+        if len(self._held):
+            bones, weights = self._influences.bones, self._influences.weights.astype(np.float64)
+            heaviest = np.repeat(self._heaviest, self._influences.counts[self._held])
+            terms = rotations.take(bones, axis=1)
+            # All on the side of the heaviest: a sum of two then never cancels.
+            terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
+            sums = np.add.reduceat(terms, self._starts, axis=1)
+            turns[:, self._held] = sums / np.maximum(np.sqrt(dots(sums, sums)), 1e-12)
+        first, second, third = (turns.take(corner, axis=1) for corner in self.surface.corners)
+        total = first + np.where(dots(first, second) < 0.0, -1.0, 1.0) * second
+        total += np.where(dots(first, third) < 0.0, -1.0, 1.0) * third
+        return rotated(total, self.rest.normals)
+
+
+class Shape:
+    """A surface at given points.
+
+    points   float64 [3, vertices]
+    normals  float64 [3, triangles], outwards, twice the triangle's area long
+    areas    float64 [triangles]
+    lengths  float64 [edges]
+    """
+
+    def __init__(self, surface: Surface, points: np.ndarray) -> None:
+        """points  [vertices, 3]"""
+        self.surface = surface
+        self.points = _by_axis(points)
+        a, b, c = (self.points.take(corner, axis=1) for corner in surface.corners)
+        self.normals = cross(b - a, c - a)
+        self.areas = 0.5 * np.sqrt(dots(self.normals, self.normals))
+        first, second = (self.points.take(end, axis=1) for end in surface.ends)
+        along = second - first
+        self.lengths = np.sqrt(dots(along, along))
+
+    @cached_property
+    def volume(self) -> float:
+        if len(self.surface.triangles) == 0:
+            return 0.0
+        # Far from the origin the terms of a small mesh would be large and cancel.
+        points = self.points - self.points.mean(axis=1, keepdims=True)
+        inside = np.einsum("ij,ij->", points.take(self.surface.corners[0], axis=1), self.normals)
+        return (float(inside) + self.surface.caps.volume(points)) / 6.0
+
+    @cached_property
+    def area(self) -> float:
+        return float(self.areas.sum())
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Of the bounding box."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=1))) if self.surface.vertex_count else 0.0
+
+
+class Measured:
+    """One shape beside its rest shape: numbers, and the fields of METRICS."""
+
+    def __init__(
+        self, rest: Shape, shape: Shape, distance: np.ndarray, bulge: np.ndarray, flipped: np.ndarray
+    ) -> None:
+        """distance, bulge [vertices]; flipped [triangles]"""
+        self.rest, self.shape = rest, shape
+        self.distance, self.bulge, self.flipped = distance, bulge, flipped
+        self.stretch = _ratios(shape.lengths, rest.lengths)
+        self.area_ratios = _ratios(shape.areas, rest.areas)
+
+    def summary(self) -> Summary:
+        rest, shape = self.rest, self.shape
+        return Summary(
+            distance_max=float(self.distance.max(initial=0.0)),
+            distance_rms=_rms(self.distance),
+            volume=shape.volume,
+            volume_change=_change(shape.volume, rest.volume),
+            area=shape.area,
+            area_change=_change(shape.area, rest.area),
+            area_min=float(self.area_ratios.min(initial=1.0)),
+            area_max=float(self.area_ratios.max(initial=1.0)),
+            area_rms=_rms(self.area_ratios - 1.0, rest.areas),
+            stretch_min=float(self.stretch.min(initial=1.0)),
+            stretch_max=float(self.stretch.max(initial=1.0)),
+            stretch_rms=_rms(self.stretch - 1.0, rest.lengths),
+            bulge_min=float(self.bulge.min(initial=0.0)),
+            bulge_max=float(self.bulge.max(initial=0.0)),
+            flipped_faces=int(self.flipped.sum()),
+            flipped_area=_share(float(rest.areas[self.flipped].sum()), rest.area),
+        )
+
+    def field(self, name: str) -> np.ndarray:
+        """float64 [vertices]: one of METRICS at each vertex."""
+        surface = self.shape.surface
+        if name == "distance":
+            return self.distance
+        if name == "bulge":
+            return self.bulge
+        if name == "stretch":
+            return self._most_changed_edges()
+        around = [_sums(surface, values) for values in self._per_triangle(name)]
+        return np.divide(*around, out=np.full(len(around[0]), float(name == "area")), where=around[1] > 0.0)
+
+    def _per_triangle(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """What the vertices' shares are made of: parts and wholes, [triangles]."""
+        if name == "area":
+            return self.shape.areas, self.rest.areas
+        if name == "flips":
+            return self.flipped.astype(np.float64), np.ones(len(self.flipped))
+        raise ValueError(f"field: expected one of {', '.join(METRICS)}, got {name!r}")
+
+    def _most_changed_edges(self) -> np.ndarray:
+        ends = self.shape.surface.ends
+        longest, shortest = np.ones((2, self.shape.surface.vertex_count))
+        for end in ends:
+            np.maximum.at(longest, end, self.stretch)
+            np.minimum.at(shortest, end, self.stretch)
+        return np.where(longest * shortest >= 1.0, longest, shortest)
+
+
+def bone_axes(bones: Bones, matrices: np.ndarray) -> np.ndarray:
+    """float64 [bones + joints, 2, 3]: where the axis of each begins and ends, in the space of `matrices`.
+
+    matrices  [bones + joints, 4, 4], of the bones at rest or posed
+
+    The axis of a bendy bone's joint runs to its next joint, that of the last one from the joint before.
+    """
+    matrices = matrices.astype(np.float64)
+    heads, count = matrices[:, :3, 3], len(bones.names)
+    tails = heads.copy()
+    tails[:count] += bones.lengths[:, None] * matrices[:count, :3, 1]
+    for bone in np.flatnonzero(bones.segments > 1):
+        joints = slice(bones.first_joints[bone], bones.first_joints[bone] + bones.segments[bone] + 1)
+        tails[joints] = np.concatenate([heads[joints][1:], heads[joints][-2:-1]])
+    return np.stack([heads, tails], axis=1)
+
+
+def _by_axis(points: np.ndarray) -> np.ndarray:
+    """float64 [3, n] of [n, 3]: axis by axis numpy computes, and gathers by take, several times faster."""
+    return np.ascontiguousarray(points.T, dtype=np.float64)
+
+
+def _heaviest_bones(influences: Influences, held: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """int [held]: the bone of the largest weight of each vertex, the first of equals."""
+    if len(held) == 0:
+        return np.empty(0, dtype=np.int64)
+    largest = np.repeat(np.maximum.reduceat(influences.weights, starts), influences.counts[held])
+    places = np.where(influences.weights == largest, np.arange(len(largest)), len(largest))
+    return influences.bones[np.minimum.reduceat(places, starts)].astype(np.int64)
+
+
+def _ratios(values: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
+    """`values` as parts of those at rest; 1 where there was nothing at rest."""
+    return np.divide(values, at_rest, out=np.ones_like(values), where=at_rest > 0.0)
+
+
+def _rms(values: np.ndarray, weights: np.ndarray | None = None) -> float:
+    if weights is None:
+        weights = np.ones_like(values)
+    # Not by `@`: BLAS would start its threads for this, which takes longer than the sum.
+    return float(np.sqrt(_share(float((weights * values * values).sum()), float(weights.sum()))))
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole != 0.0 else 0.0
+
+
+def _change(value: float, at_rest: float) -> float:
+    """As a part of that at rest, 0 for none; NaN where there was nothing at rest."""
+    return value / at_rest - 1.0 if at_rest != 0.0 else float("nan")
+
+
+def _sums(surface: Surface, values: np.ndarray) -> np.ndarray:
+    """float64 [vertices]: `values` of triangles, summed at each of their corners."""
+    return sum(
+        np.bincount(corner, weights=values, minlength=surface.vertex_count) for corner in surface.corners
+    )

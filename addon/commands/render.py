@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew render`: pictures of frames under one method, and their comparison with golden ones."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+from ..core.errors import SinewError
+from ..core.frames import parse_frames
+from ..core.golden import (
+    SETTINGS,
+    RenderSettings,
+    difference,
+    difference_picture,
+    differing_share,
+    picture_name,
+)
+from ..core.output import write_text, write_whole
+from .console import Console
+
+# In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
+USUAL_TOLERANCE = 0.05
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "render",
+        help="draw frames under one method, and compare them with golden pictures",
+        description="Draws the armature-deformed meshes of a file in clay, a picture a frame, into DIR, with "
+        "render.json that says how. With --against it does the same again (camera, engine, size and, where "
+        "not given, method and frames are those of the golden pictures) and compares each frame; the exit "
+        "status is 1 where one differs by more than the tolerance.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    parser.add_argument("--method", help="a method of `sinew methods`, or blender for the Armature modifier")
+    parser.add_argument("--frames", help="such as 1,12,40-48")
+    parser.add_argument("--object", metavar="NAME", help="only this mesh")
+    parser.add_argument("--size", type=int, help="pixels of a picture's longer side (default: 640)")
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "workbench", "cycles"),
+        help="auto, the default: Workbench, or Cycles where there is no OpenGL",
+    )
+    parser.add_argument(
+        "--own-look",
+        action="store_true",
+        help="the file's own camera, lights, materials and render settings in the place of clay",
+    )
+    parser.add_argument("--against", type=Path, metavar="DIR", help="golden pictures to compare with")
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        default=USUAL_TOLERANCE,
+        metavar="PERCENT",
+        help="how many of the pixels may differ visibly (default: %(default)s percent)",
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the pictures")
+    return parser
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    from ..blender import evaluate
+
+    if not args.tolerance >= 0.0:
+        raise SinewError(f"tolerance: expected a percentage of 0 or more, got {args.tolerance}")
+    golden = None
+    if args.against is not None:
+        if args.against.resolve() == args.out.resolve():
+            raise SinewError(f"{args.out}: would replace the golden pictures; choose another --out")
+        golden = RenderSettings.read(args.against)
+    method = args.method or (golden and golden.method)
+    frames = parse_frames(args.frames) if args.frames else golden and golden.frames
+    if method is None or frames is None:
+        raise SinewError("render: --method and --frames are needed where there is no --against")
+    evaluate.check_methods([method])
+    if golden is not None:
+        _check_fits(args, golden, frames)
+    settings = _draw(args, method, frames, golden, console)
+    write_text(args.out / SETTINGS, settings.to_json())
+    console.say(f"{len(frames)} picture{'s' if len(frames) > 1 else ''} in {args.out}")
+    return _judge(args, frames, console) if golden is not None else 0
+
+
+def _check_fits(args: argparse.Namespace, golden: RenderSettings, frames: list[float]) -> None:
+    missing = [frame for frame in frames if frame not in golden.frames]
+    if missing:
+        raise SinewError(f"{args.against}: has no picture of frame {missing[0]}; make the golden ones anew")
+    for name, wanted in (("size", golden.size), ("engine", golden.engine)):
+        if getattr(args, name) not in (None, "auto", wanted):
+            raise SinewError(f"{name}: the golden pictures have {wanted}, got {getattr(args, name)}")
+    if args.own_look != golden.own_look:
+        raise SinewError(
+            f"{args.against}: was made with{'' if golden.own_look else 'out'} --own-look; do the same here"
+        )
+
+
+def _draw(
+    args: argparse.Namespace,
+    method: str,
+    frames: list[float],
+    golden: RenderSettings | None,
+    console: Console,
+) -> RenderSettings:
+    import bpy
+
+    from ..blender import evaluate, files, render
+
+    size = args.size or (golden.size if golden else 640)
+    render.check_size(size)
+    files.open_file(args.file)
+    scene = bpy.context.scene
+    evaluate.set_frame(scene, frames[0])
+    meshes, left_out = evaluate.drivable_meshes(scene, args.file, [method], args.object)
+    if left_out:
+        raise SinewError(f"{args.file}: {left_out[0]}")
+    evaluate.use_method_on(meshes, method)
+    if args.own_look:
+        studio = render.OwnLook(scene, args.file)
+        engine, views = scene.render.engine, []
+    else:
+        engine = render.chosen_engine(golden.engine if golden else args.engine or "auto")
+        if golden is not None:
+            views = [golden.views[golden.frames.index(frame)] for frame in frames]
+        else:
+            views = evaluate.whole_views(meshes, [method], frames)
+        studio = render.Studio(scene, meshes, engine, size)
+    for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
+        evaluate.set_frame(scene, frame)
+        draw = partial(studio.picture, views[index] if views else None)
+        write_whole(args.out / picture_name(frame), draw)
+    names = [obj.name for obj in meshes]
+    return RenderSettings(args.file.name, method, frames, engine, size, args.own_look, names, views)
+
+
+def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> int:
+    """Compares pictures, shows a table, draws what differs; exit status."""
+    from ..blender import pictures
+
+    rows, failures = [], 0
+    for frame in frames:
+        name = picture_name(frame)
+        drawn = pictures.read_picture(args.out / name)
+        golden = pictures.read_picture(args.against / name)
+        shown = args.out / f"{Path(name).stem}.difference.png"
+        shown.unlink(missing_ok=True)
+        if drawn.shape != golden.shape:
+            failures += 1
+            (height, width), (golden_height, golden_width) = drawn.shape[:2], golden.shape[:2]
+            result = f"{width} x {height} pixels, not {golden_width} x {golden_height}"
+            rows.append((str(frame), "", result))
+            continue
+        differences = difference(drawn, golden)
+        percent = 100.0 * differing_share(differences)
+        passed = percent <= args.tolerance
+        if not passed:
+            failures += 1
+            pictures.write_picture(shown, difference_picture(differences, golden))
+        rows.append((str(frame), f"{percent:.3f} %", "as before" if passed else str(shown)))
+    console.table(("frame", "pixels that differ", "result"), rows)
+    same = len(frames) - failures
+    console.say(f"{same} of {len(frames)} pictures within {args.tolerance:g} % of {args.against}")
+    return 1 if failures else 0

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew compare --out SHEET.png`: one picture of a frame under several methods."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ..core.errors import SinewError
+from ..core.frames import parse_frames
+from ..core.sheet import Column, require_pillow, write_sheet
+from ..core.views import close_view, place_of_difference
+from .console import Console
+
+# Other names are those of folders.
+PICTURES = {".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf"}
+
+
+def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
+    """A column for each method, the same camera for all, framed on the mesh, with a close-up of the place
+    where the methods differ most and the volume against the rest pose."""
+    import bpy
+
+    from ..blender import evaluate, files, measure, render
+
+    require_pillow()
+    if args.out.suffix.lower() != ".png":
+        raise SinewError(f"{args.out}: a sheet is a PNG; give a name ending in .png, or a folder for pages")
+    if len(args.files) != 1:
+        raise SinewError(
+            f"{args.out}: a sheet shows one file, got {len(args.files)}; give a folder for pages"
+        )
+    frames = parse_frames(args.frames or "")
+    if len(frames) != 1:
+        raise SinewError(f"frame: expected one frame, got {args.frames!r}")
+    (path,), (frame,) = args.files, frames
+    files.open_file(path)
+    scene = bpy.context.scene
+    evaluate.set_frame(scene, frame)
+    meshes, left_out = evaluate.drivable_meshes(scene, path, methods, args.object)
+    for reason in left_out:
+        console.complain(f"{path}: left out: {reason}")
+
+    subject = measure.gather(scene, meshes)
+    shapes = measure.shapes_at(subject, methods, frame)
+    rest = subject.gauge.rest.volume
+    volumes = {method: subject.gauge.measure(points).shape.volume for method, points in shapes.items()}
+    views = [("Whole", evaluate.whole_views(meshes, methods, [frame])[0])]
+    place = place_of_difference(list(shapes.values()))
+    if place is not None:
+        places = np.stack([points[place] for points in shapes.values()])
+        views.append(("Where the methods differ most", close_view(shapes[methods[0]], places)))
+
+    studio = render.Studio(scene, meshes, render.chosen_engine(args.engine), args.size or 640)
+    columns = []
+    with tempfile.TemporaryDirectory() as folder:
+        for method in console.progress(methods, len(methods), f"Drawing {path.name}"):
+            evaluate.use_method_on(meshes, method)
+            pictures = []
+            for index, (_title, view) in enumerate(views):
+                pictures.append(Path(folder) / f"{method}-{index}.png")
+                studio.picture(view, pictures[-1])
+            note = f"volume {100 * volumes[method] / rest:.1f} % of rest" if rest else "no volume"
+            columns.append(Column(f"{evaluate.method_label(method)} ({method})", note, pictures))
+        names = ", ".join(obj.name for obj in meshes)
+        title = f"{path.name}: {names}, frame {frame}"
+        write_sheet(title, columns, [name for name, _view in views], args.out)
+    console.say(str(args.out))
+    return 1 if left_out else 0

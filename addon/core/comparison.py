@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a comparison of methods found: numbers of each frame, worst frames, diagnostics; as CSV and JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import statistics
+from dataclasses import asdict, dataclass, fields
+
+from .diagnostics import Finding
+from .metrics import METRICS, Gauge, Summary
+
+# Smaller parts of the diagonal, or of the value at rest, are rounding.
+ROUNDING = 1e-5
+LENGTHS = {"distance_max", "distance_rms", "bulge_min", "bulge_max", "bulge_worst"}
+
+
+@dataclass(frozen=True)
+class RestFacts:
+    """The rest shape of all meshes together."""
+
+    vertices: int
+    triangles: int
+    diagonal: float
+    volume: float
+    area: float
+    holes: int
+    clashes: int
+
+    @classmethod
+    def of(cls, gauge: Gauge) -> RestFacts:
+        """At the frame that `gauge` was set to last."""
+        surface, rest = gauge.surface, gauge.rest
+        return cls(
+            surface.vertex_count,
+            len(surface.triangles),
+            rest.diagonal,
+            rest.volume,
+            rest.area,
+            surface.caps.count,
+            surface.clash_count,
+        )
+
+    @property
+    def note(self) -> str:
+        """What to know of the volume, one sentence; empty for a closed mesh."""
+        if self.clashes:
+            return (
+                f"{self.clashes:,} edges have faces that wind against each other, or more than two: the "
+                "volume means little; recalculate the normals (Mesh > Normals > Recalculate Outside)."
+            )
+        if self.holes:
+            return (
+                f"The mesh has {self.holes:,} hole{'s' if self.holes > 1 else ''}: the volume is that with "
+                "each closed by a fan to the middle of its border."
+            )
+        return ""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A frame and method of a measure's largest value."""
+
+    measure: str
+    frame: float
+    method: str
+    value: float
+
+
+@dataclass
+class Comparison:
+    """Methods beside each other on the meshes of one file.
+
+    methods    name -> label, in order
+    reference  the method that distances are measured to
+    unit       of lengths
+    summaries  by method, for each frame
+    times      by method, for each frame: milliseconds that Blender took for the whole frame
+    own        by method, for each frame: milliseconds of these that Sinew took
+    findings   by mesh
+    """
+
+    file: str
+    meshes: list[str]
+    methods: dict[str, str]
+    reference: str
+    unit: str
+    rest: RestFacts
+    frames: list[float]
+    summaries: dict[str, list[Summary]]
+    times: dict[str, list[float]]
+    own: dict[str, list[float]]
+    findings: dict[str, list[Finding]]
+
+    def values(self, method: str, entry: str) -> list[float]:
+        """One entry of the summaries, for each frame."""
+        return [getattr(summary, entry) for summary in self.summaries[method]]
+
+    def length(self, value: float) -> str:
+        """With its unit; what is rounding is 0."""
+        return f"{value if abs(value) > ROUNDING * self.rest.diagonal else 0.0:.3g} {self.unit}"
+
+    def shows(self, entry: str, value: float) -> bool:
+        """Whether an entry of the summaries is more than rounding."""
+        return abs(value) > ROUNDING * (self.rest.diagonal if entry in LENGTHS else 1.0)
+
+    def worst(self, entry: str) -> Worst:
+        """Where an entry of the summaries is largest by magnitude; the first of equals."""
+        candidates = [
+            Worst(entry, frame, method, value)
+            for method in self.methods
+            for frame, value in zip(self.frames, self.values(method, entry), strict=True)
+            if value == value
+        ]
+        nothing = Worst(entry, self.frames[0], next(iter(self.methods)), 0.0)
+        return max(candidates, key=lambda worst: abs(worst.value), default=nothing)
+
+    def worst_frames(self, count: int) -> list[float]:
+        """At most `count` frames, in order: those at which a measure is worst, the measures in turn, but for
+        those next to one that is there already."""
+        entries = ["distance_max", "volume_change", *(metric.worst for metric in METRICS.values())]
+        apart = (max(self.frames) - min(self.frames)) / 10
+        chosen: list[float] = []
+        for worst in map(self.worst, entries):
+            is_new = all(abs(worst.frame - frame) > apart for frame in chosen)
+            if is_new and len(chosen) < count and self.shows(worst.measure, worst.value):
+                chosen.append(worst.frame)
+        return sorted(chosen) or self.frames[:1]
+
+    def median_time(self, method: str) -> float:
+        return statistics.median(self.times[method])
+
+    def median_own_time(self, method: str) -> float:
+        return statistics.median(self.own[method])
+
+    def to_csv(self) -> str:
+        """A row for each frame and method, the entries of Summary and the times in columns."""
+        names = [field.name for field in fields(Summary)]
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["file", "method", "frame", *names, "milliseconds", "milliseconds_of_sinew"])
+        for method in self.methods:
+            rows = zip(self.frames, self.summaries[method], self.times[method], self.own[method], strict=True)
+            for frame, summary, taken, own in rows:
+                values = asdict(summary).values()
+                writer.writerow([self.file, method, frame, *values, f"{taken:.3f}", f"{own:.3f}"])
+        return text.getvalue()
+
+    def to_json(self) -> str:
+        """Everything, the vertices of the findings among it."""
+        return json.dumps(
+            {
+                "file": self.file,
+                "meshes": self.meshes,
+                "methods": self.methods,
+                "reference": self.reference,
+                "unit": self.unit,
+                "rest": asdict(self.rest),
+                "frames": self.frames,
+                "summaries": {
+                    method: [_finite(asdict(summary)) for summary in summaries]
+                    for method, summaries in self.summaries.items()
+                },
+                "milliseconds": self.times,
+                "milliseconds_of_sinew": self.own,
+                "findings": {
+                    mesh: [finding.to_dict() for finding in findings]
+                    for mesh, findings in self.findings.items()
+                },
+            },
+            indent=1,
+            ensure_ascii=False,
+            allow_nan=False,
+        )
+
+
+def _finite(values: dict[str, float]) -> dict[str, float | None]:
+    """JSON knows no NaN and no infinity."""
+    return {name: value if math.isfinite(value) else None for name, value in values.items()}

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures compared with golden ones: a number for how much they differ, and a picture that shows where."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import SinewError
+from .heat import viridis
+from .views import View
+
+SETTINGS = "render.json"
+# A pixel differs when a channel does by more than this part of its range. Along the edges of one mesh,
+# Blender 4.2 and 5.2 differ by up to 0.19.
+VISIBLE = 0.2
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """What made a folder of pictures, kept beside them: the same again can be compared with it.
+
+    engine   "workbench" or "cycles"; with own_look what the file says
+    size     pixels of the longer side
+    views    one for each frame; none with own_look
+    """
+
+    file: str
+    method: str
+    frames: list[float]
+    engine: str
+    size: int
+    own_look: bool
+    meshes: list[str]
+    views: list[View]
+
+    def to_json(self) -> str:
+        return json.dumps(asdict(self), indent=1, default=lambda array: array.tolist())
+
+    @classmethod
+    def read(cls, folder: Path) -> RenderSettings:
+        """Raises SinewError where `folder` was not written by `sinew render`."""
+        path = folder / SETTINGS
+        try:
+            values = json.loads(path.read_text(encoding="utf-8"))
+            views = [
+                View(np.array(v.pop("direction")), np.array(v.pop("target")), **v)
+                for v in values.pop("views")
+            ]
+            return cls(views=views, **values)
+        except OSError as error:
+            raise SinewError(
+                f"{path}: can not be read: {error.strerror}; make golden pictures with `sinew render … --out "
+                f"{folder}` first"
+            ) from None
+        except (ValueError, TypeError, KeyError, AttributeError):
+            raise SinewError(f"{path}: is not what `sinew render` writes; make the pictures again") from None
+
+
+def picture_name(frame: float) -> str:
+    """Sorts by frame: 0001.png, 0006.50.png."""
+    whole = int(np.floor(frame))
+    part = f"{frame - whole:.2f}"[1:] if frame != whole else ""
+    return f"{whole:04d}{part}.png"
+
+
+def difference(picture: np.ndarray, golden: np.ndarray) -> np.ndarray:
+    """float [height, width]: the largest difference of a channel, 0..1, over pixels of [height, width, 4] in
+    0..1 whose alpha is not yet multiplied into their colour."""
+    return np.abs(_over_black(picture) - _over_black(golden)).max(axis=2)
+
+
+def differing_share(differences: np.ndarray) -> float:
+    """The share of pixels that differ visibly."""
+    return float(np.mean(differences > VISIBLE))
+
+
+def difference_picture(differences: np.ndarray, golden: np.ndarray) -> np.ndarray:
+    """float [height, width, 4]: what differs in colour, towards yellow, over the golden picture in grey."""
+    grey = 0.15 + 0.25 * _over_black(golden)[:, :, :3].mean(axis=2)
+    result = np.ones((*differences.shape, 4))
+    result[:, :, :3] = grey[:, :, None]
+    seen = differences > VISIBLE
+    result[seen, :3] = viridis(0.4 + 0.6 * differences[seen])
+    return result
+
+
+def _over_black(picture: np.ndarray) -> np.ndarray:
+    result = picture.astype(np.float64)
+    result[:, :, :3] *= result[:, :, 3:]
+    return result

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values as colours: the range that is shown, a perceptually uniform colour map, the legend's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .metrics import Metric, Summary
+
+# Every fifth colour of viridis (S. van der Walt, N. Smith, 2015; CC0), sRGB.
+_VIRIDIS = bytes.fromhex(
+    "44015446085c471063481769481d6f482475472a7a46307e453781433d844142873f48893d4e8a3a538b38598c355e8d"
+    "33638d31688e2e6d8e2c718e2a768e297b8e27808e25848e23898e218e8d20928c1f978b1e9c891fa18821a58524aa83"
+    "28ae802eb37c35b7793dbc7446c06f50c46a5ac86465cb5e70cf577cd25089d54895d840a2da37b0dd2fbddf26cae11f"
+    "d8e219e5e419f1e51dfde725"
+)
+# Ratios beyond this many doublings or halvings share the last colour.
+MOST_DOUBLINGS = 2.0
+LEAST_DOUBLINGS = 0.1
+# Lengths of one method beyond this many times those of all others do so, too.
+BEYOND_OTHERS = 2.0
+
+
+def viridis(shares: np.ndarray) -> np.ndarray:
+    """float64 [n, 3], sRGB in 0..1: dark violet at 0, green at 0.5, yellow at 1; clipped outside."""
+    stops = np.frombuffer(_VIRIDIS, dtype=np.uint8).reshape(-1, 3) / 255.0
+    places = np.linspace(0.0, 1.0, len(stops))
+    return np.stack([np.interp(shares, places, channel) for channel in stops.T], axis=-1)
+
+
+@dataclass(frozen=True)
+class HeatScale:
+    """Which values the colours stand for: `low` the first, `high` the last.
+
+    clipped  there are values beyond, which share the first or last colour
+    """
+
+    metric: Metric
+    low: float
+    high: float
+    clipped: bool = False
+
+    @classmethod
+    def over(cls, metric: Metric, methods: Sequence[Sequence[Summary]], diagonal: float) -> HeatScale:
+        """Wide enough for the shapes summed up: those of one frame, or of all, so that colours compare.
+
+        methods   for each method its summaries; one that tears the mesh apart does not make all others pale
+        diagonal  of the rest shape: differences below a ten thousandth of it are not blown up
+        """
+        if metric.unit == "share":
+            return cls(metric, 0.0, 1.0)
+        largest = sorted((_largest(metric, summaries) for summaries in methods), reverse=True)
+        if metric.scale == "log":
+            doublings = max(largest, default=0.0)
+            factor = 2.0 ** float(np.clip(doublings, LEAST_DOUBLINGS, MOST_DOUBLINGS))
+            return cls(metric, 1.0 / factor, factor, doublings > MOST_DOUBLINGS)
+        least = max(1e-4 * diagonal, 1e-12)
+        most = max(largest, default=0.0)
+        if len(largest) > 1 and largest[1] > least:
+            most = min(most, BEYOND_OTHERS * largest[1])
+        most = max(most, least)
+        low = -most if metric.scale == "signed" else 0.0
+        return cls(metric, low, most, clipped=max(largest, default=0.0) > most)
+
+    def colours(self, values: np.ndarray) -> np.ndarray:
+        """float64 [n, 3], sRGB in 0..1."""
+        if self.metric.scale == "log":
+            values, low, high = np.log(np.maximum(values, 1e-12)), np.log(self.low), np.log(self.high)
+        else:
+            low, high = self.low, self.high
+        return viridis((values - low) / (high - low))
+
+    def severity(self, values: np.ndarray) -> np.ndarray:
+        """How far each value is from that of an undeformed mesh; largest where it is worst."""
+        if self.metric.scale == "log":
+            return np.abs(np.log(np.maximum(values, 1e-12)))
+        return np.abs(values)
+
+    def ticks(self, count: int = 5) -> list[float]:
+        """Values at even distances along the legend, from the low end to the high one."""
+        if self.metric.scale == "log":
+            return np.geomspace(self.low, self.high, count).tolist()
+        return np.linspace(self.low, self.high, count).tolist()
+
+
+def _largest(metric: Metric, summaries: Sequence[Summary]) -> float:
+    """The largest magnitude; of a ratio in doublings or halvings."""
+    values = [value for summary in summaries for value in summary.extremes(metric.name)]
+    if metric.scale == "log":
+        # A face or an edge may have shrunk to nothing.
+        return max((abs(float(np.log2(max(value, 1e-12)))) for value in values), default=0.0)
+    return max((abs(value) for value in values), default=0.0)

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes files so that a reader never finds half of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from .errors import SinewError
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Has `write` make a file beside `path`, then renames it; its folder is made where it is missing.
+
+    Raises SinewError where it can not be written.
+    """
+    # The ending stays: some writers go by it.
+    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(unfinished)
+        unfinished.replace(path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise SinewError(f"{path}: can not be written: {error.strerror or error}") from None
+
+
+def write_text(path: Path, text: str) -> None:
+    write_whole(path, lambda unfinished: unfinished.write_text(text, encoding="utf-8", newline="\n"))

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The faces and edges of a mesh: what measuring needs of them, worked out once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .quaternions import cross
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The topology of a mesh, or of several that are measured as one.
+
+    vertex_count  of all meshes
+    triangles     int32 [triangles, 3], counter-clockwise seen from outside
+    edges         int32 [edges, 2], the mesh's own: no diagonals of its quads
+    same_place    int [vertices], one vertex of all that lie in one place at rest; None for all alone.
+                  Files for games are cut open at seams of texture coordinates: those are no holes
+    """
+
+    vertex_count: int
+    triangles: np.ndarray
+    edges: np.ndarray
+    same_place: np.ndarray | None = None
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """int64 [3, triangles]: each corner's vertex, in memory corner by corner."""
+        return np.ascontiguousarray(self.triangles.T, dtype=np.int64)
+
+    @cached_property
+    def ends(self) -> np.ndarray:
+        """int64 [2, edges]: each end's vertex."""
+        return np.ascontiguousarray(self.edges.T, dtype=np.int64)
+
+    @cached_property
+    def _sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sides of triangles from vertex to vertex, int64 [n]: those that lack a neighbour running the other
+        way, as often as they lack it, and those that occur more than once."""
+        corners = self.corners if self.same_place is None else self.same_place[self.corners]
+        starts, stops = corners.ravel(), np.roll(corners, -1, axis=0).ravel()
+        keys, counts = np.unique(starts * self.vertex_count + stops, return_counts=True)
+        opposite = keys % self.vertex_count * self.vertex_count + keys // self.vertex_count
+        at = np.searchsorted(keys, opposite).clip(max=max(len(keys) - 1, 0))
+        found = keys[at] == opposite if len(keys) else np.zeros(0, dtype=bool)
+        lacking = counts - np.where(found, counts[at], 0)
+        # Faces that shrank to an edge or a point at rest.
+        lacking[keys == opposite] = 0
+        return np.repeat(keys, lacking.clip(min=0)), keys[counts > 1]
+
+    @property
+    def clash_count(self) -> int:
+        """Sides that two triangles run through in one direction: normals that disagree, or edges of more than
+        two faces. Where there are any, volume means little."""
+        return len(self._sides[1])
+
+    @cached_property
+    def caps(self) -> Caps:
+        """What closes the holes."""
+        borders = self._sides[0]
+        return Caps.over(borders // self.vertex_count, borders % self.vertex_count)
+
+
+@dataclass(frozen=True)
+class Caps:
+    """A fan of triangles over each hole, from its border to the mean of its border's vertices.
+
+    starts, stops  int64 [borders], the border's vertices, in the direction of the mesh's own triangles
+    vertices       int64 [n], the vertices of all borders
+    holes          int64 [n], the hole that each belongs to; borders that touch are one hole
+    hole_of        int64 [borders]
+    count          of holes
+    """
+
+    starts: np.ndarray
+    stops: np.ndarray
+    vertices: np.ndarray
+    holes: np.ndarray
+    hole_of: np.ndarray
+    count: int
+
+    @classmethod
+    def over(cls, starts: np.ndarray, stops: np.ndarray) -> Caps:
+        vertices, index = np.unique(np.concatenate([starts, stops]), return_inverse=True)
+        first, second = index.reshape(2, -1)
+        holes = np.arange(len(vertices))
+        while True:
+            # Each hole takes the smallest number met along its border; doubling the steps keeps this short.
+            least = np.minimum(holes[first], holes[second])
+            spread = holes.copy()
+            np.minimum.at(spread, first, least)
+            np.minimum.at(spread, second, least)
+            spread = spread[spread]
+            if np.array_equal(spread, holes):
+                break
+            holes = spread
+        numbers, holes = np.unique(holes, return_inverse=True)
+        return cls(starts, stops, vertices, holes, holes[first], len(numbers))
+
+    def volume(self, points: np.ndarray) -> float:
+        """What the fans add to six times the volume, for float64 points [3, vertices]."""
+        if self.count == 0:
+            return 0.0
+        sizes = np.bincount(self.holes, minlength=self.count)
+        centres = np.stack(
+            [np.bincount(self.holes, axis[self.vertices], self.count) / sizes for axis in points]
+        )
+        a, b, c = points[:, self.stops], points[:, self.starts], centres[:, self.hole_of]
+        return float(np.einsum("ij,ij->", a, cross(b, c)))
+
+
+def joined(surfaces: Sequence[Surface]) -> Surface:
+    """Several meshes as one, their vertices one after the other."""
+    triangles, edges, same_place, first = [], [], [], 0
+    for surface in surfaces:
+        triangles.append(surface.triangles + first)
+        edges.append(surface.edges + first)
+        own = surface.same_place
+        same_place.append((np.arange(surface.vertex_count) if own is None else own) + first)
+        first += surface.vertex_count
+    return Surface(first, *map(np.concatenate, (triangles, edges, same_place)))
+
+
+def same_places(points: np.ndarray) -> np.ndarray:
+    """int [vertices]: the first vertex that lies exactly where each of `points` [vertices, 3] does."""
+    # Adding zero turns -0.0 into 0.0.
+    rows = np.ascontiguousarray(points + 0.0).view([("", points.dtype)] * 3).ravel()
+    _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
+    return first[inverse.ravel()]

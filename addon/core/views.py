@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where cameras stand: around a whole mesh, or close to one place of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+# A little to the character's left and above, from Blender's front (-Y).
+VIEW_DIRECTION = np.array([0.45, -1.0, 0.22])
+# Close-ups show this part of the mesh's diagonal.
+CLOSE_UP = 0.28
+
+
+@dataclass(frozen=True)
+class View:
+    """An orthographic camera.
+
+    direction  unit, from the target towards the camera
+    target     what the camera looks at
+    width      how much is seen from left to right
+    height     and from top to bottom
+    depth      how far before and behind the target is seen
+    """
+
+    direction: np.ndarray
+    target: np.ndarray
+    width: float
+    height: float
+    depth: float
+
+    def pixels(self, size: int) -> tuple[int, int]:
+        """Width and height of a picture whose longer side has `size` pixels."""
+        longer = max(self.width, self.height)
+        return round(size * self.width / longer), round(size * self.height / longer)
+
+
+def whole_view(extents: Sequence[np.ndarray]) -> View:
+    """Frames from the front all that has one of `extents`, each as seen_extent gives it."""
+    direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
+    centre = (low + high) / 2
+    right, up = camera_axes(direction)
+    target = centre[0] * right + centre[1] * up + centre[2] * direction
+    width, height, depth = (float(side) for side in high - low)
+    longer = max(width, height, 1e-6)
+    width, height = max(width, longer / 2), max(height, longer / 2)
+    return View(direction, target, width + 0.06 * longer, height + 0.06 * longer, depth + longer)
+
+
+def seen_extent(points: np.ndarray) -> np.ndarray:
+    """float64 [2, 3]: the lowest and highest coordinates of `points` [n, 3] to the whole view's right, up and
+    towards it."""
+    direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    seen = points @ np.stack([*camera_axes(direction), direction], axis=1)
+    return np.stack([seen.min(axis=0), seen.max(axis=0)])
+
+
+def of_one_size(views: Sequence[View]) -> list[View]:
+    """The views, each as wide, high and deep as the largest: what they show can be compared by eye."""
+    largest = {name: max(getattr(view, name) for view in views) for name in ("width", "height", "depth")}
+    return [replace(view, **largest) for view in views]
+
+
+def place_of_difference(meshes: Sequence[np.ndarray]) -> int | None:
+    """The vertex at which the methods differ most, None where they do not.
+
+    meshes  one [vertices, 3] for each method, of one topology
+    """
+    first = meshes[0]
+    difference = np.max([np.linalg.norm(points - first, axis=1) for points in meshes], axis=0)
+    diagonal = float(np.linalg.norm(np.ptp(first, axis=0)))
+    return int(difference.argmax()) if difference.max(initial=0.0) > 1e-4 * diagonal else None
+
+
+def close_view(points: np.ndarray, targets: np.ndarray) -> View:
+    """Close to all of `targets` [n, 3], seen from where least of `points` [m, 3] stands in front.
+
+    targets  a place of the mesh under each method: none is out of the picture
+    """
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    low, high = targets.min(axis=0), targets.max(axis=0)
+    target = (low + high) / 2
+    radius = max(0.5 * CLOSE_UP * diagonal, 0.75 * float(np.linalg.norm(high - low)))
+    return View(_clearest_direction(points - target, radius), target, 2 * radius, 2 * radius, diagonal)
+
+
+def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
+    """Unit: from where the origin is least hidden by `points`; of equals, nearest to the whole view's.
+
+    Hidden means behind points that stand in front of the sphere of `radius` around the origin.
+    """
+    front = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.radians([10, 35, -15]))
+    directions = np.stack([np.sin(turn) * np.cos(rise), -np.cos(turn) * np.cos(rise), np.sin(rise)], axis=-1)
+    candidates = [front, *directions.reshape(-1, 3)]
+
+    def hidden(direction: np.ndarray) -> float:
+        along = points @ direction
+        across = np.linalg.norm(points - np.outer(along, direction), axis=1)
+        return float(np.count_nonzero((along > 0.6 * radius) & (across < 0.6 * radius)))
+
+    return min(candidates, key=lambda direction: (hidden(direction), -float(direction @ front)))
+
+
+def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Right and up of a camera that stands in `direction` from its target, up as near to +Z as can be."""
+    world_up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(world_up, direction)
+    right /= np.linalg.norm(right)
+    return right, np.cross(direction, right)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A pytest fixture for render tests of one's own rigs; loaded by pytest where sinew-blender is installed.
+
+    def test_elbow(sinew_render):
+        sinew_render("hero.blend", "golden/hero", method="dq", frames="1,12,24")
+
+`pytest --sinew-update` makes or renews the golden pictures.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+PROGRAM = "from sinew_addon.cli import run; run()"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.getgroup("sinew").addoption(
+        "--sinew-update",
+        action="store_true",
+        help="draw golden pictures anew where sinew_render would compare with them",
+    )
+
+
+@pytest.fixture
+def sinew_render(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., None]:
+    """sinew_render(file, golden, method=..., frames=..., tolerance=..., **options) fails where a frame of
+    `file` differs from its golden picture.
+
+    file, golden  paths, from the test's own folder
+    method        as of `sinew methods`, or "blender"
+    frames        such as "1,12,40-48"
+    tolerance     percent of the pixels that may differ visibly
+    options       others of `sinew render`: object="Body", size=320, engine="cycles", own_look=True
+    """
+    here = request.path.parent
+    calls = iter(range(1_000_000))
+
+    def render(
+        file: str | Path,
+        golden: str | Path,
+        *,
+        method: str,
+        frames: str | int,
+        tolerance: float | None = None,
+        **options: object,
+    ) -> None:
+        __tracebackhide__ = True
+        file, golden = here / file, here / golden
+        arguments = ["render", file, "--method", method, "--frames", frames, *_as_arguments(options)]
+        if request.config.getoption("--sinew-update"):
+            arguments += ["--out", golden]
+        elif not golden.is_dir():
+            pytest.fail(f"{golden}: no golden pictures; make them with pytest --sinew-update", pytrace=False)
+        else:
+            arguments += ["--against", golden, "--out", tmp_path / f"render-{next(calls)}"]
+            if tolerance is not None:
+                arguments += ["--tolerance", tolerance]
+        # A process of its own: it opens files, and the test may have one open.
+        result = subprocess.run(
+            [sys.executable, "-c", PROGRAM, *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            check=False,
+        )
+        if result.returncode != 0:
+            pytest.fail(f"{result.stdout}{result.stderr}".strip(), pytrace=False)
+
+    return render
+
+
+def _as_arguments(options: dict[str, object]) -> list[object]:
+    arguments: list[object] = []
+    for name, value in options.items():
+        if value is True:
+            arguments.append(f"--{name.replace('_', '-')}")
+        elif value not in (None, False):
+            arguments += [f"--{name.replace('_', '-')}", value]
+    return arguments

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew compare` and `sinew render`: what they measure, find and draw, on files whose answers are known."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import trimesh
+from conftest import REPOSITORY
+from sinew_addon.blender import pictures, video
+from sinew_addon.commands import compare, render
+from sinew_addon.commands.console import Console
+from sinew_addon.core.errors import SinewError
+from test_command_line import run_sinew
+
+# Pictures take a third of a second each, and are much the same in all versions.
+NEWEST = bpy.app.version >= (5, 2)
+newest_only = pytest.mark.skipif(not NEWEST, reason="drawn with the newest Blender only")
+
+
+def save(path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def triangles_of(obj):
+    obj.data.calc_loop_triangles()
+    triangles = np.empty((len(obj.data.loop_triangles), 3), dtype=np.int32)
+    obj.data.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return triangles
+
+
+def test_numbers_are_those_of_the_shapes(tmp_path):
+    """Against Blender's modifier, both ways, and trimesh; a modifier behind the skinning changes nothing."""
+    obj, armature = scenes.make_arm()
+    armature.location, armature.rotation_euler = (3.0, -2.0, 1.0), (0.3, 0.2, 0.1)
+    obj.location = (0.0, 0.0, 0.5)
+    obj.scale = (2.0, 2.0, 2.0)
+    frames = [1, 6, 11]
+    linear = scenes.modifier_shapes(obj, frames, preserve_volume=False)
+    dual = scenes.modifier_shapes(obj, frames, preserve_volume=True)
+    rest, triangles = scenes.rest_points(obj), triangles_of(obj)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    path = save(tmp_path / "arm.blend")
+    run_sinew(
+        "compare",
+        path,
+        "--methods",
+        "blender,lbs,dq",
+        "--frames",
+        "1,6,11",
+        "--pictures",
+        0,
+        "--out",
+        tmp_path,
+    )
+    with open(tmp_path / "arm" / "metrics.csv", newline="", encoding="utf-8") as file:
+        rows = {(row["method"], int(row["frame"])): row for row in csv.DictReader(file)}
+    assert set(rows) == {(method, frame) for method in ("blender", "lbs", "dq") for frame in frames}
+    world = 2.0
+    at_rest = trimesh.Trimesh(world * rest, triangles, process=False)
+    for index, frame in enumerate(frames):
+        for method, shape in (("blender", linear[index]), ("lbs", linear[index]), ("dq", dual[index])):
+            row = {
+                name: float(v) for name, v in rows[method, frame].items() if name not in ("file", "method")
+            }
+            mesh = trimesh.Trimesh(world * shape.astype(np.float64), triangles, process=False)
+            apart = world * np.linalg.norm(shape.astype(np.float64) - linear[index], axis=1)
+            assert row["volume"] == pytest.approx(mesh.volume, rel=1e-4)
+            assert row["volume_change"] == pytest.approx(mesh.volume / at_rest.volume - 1, abs=1e-4)
+            assert row["area"] == pytest.approx(mesh.area, rel=1e-4)
+            assert row["distance_max"] == pytest.approx(apart.max(), abs=2e-5)
+            assert row["milliseconds"] > 0.0
+            if frame == 1:
+                assert abs(row["bulge_max"]) + abs(row["bulge_min"]) + abs(row["stretch_rms"]) < 1e-4
+                assert row["flipped_faces"] == 0
+    assert float(rows["dq", 11]["distance_max"]) > 0.05
+    assert float(rows["dq", 11]["bulge_max"]) > float(rows["lbs", 11]["bulge_max"])
+    assert "<img" not in (tmp_path / "arm.html").read_text(encoding="utf-8")
+
+
+def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
+    """Also a mesh that its parent deforms, which no modifier says."""
+    first, _armature = scenes.make_arm()
+    first.modifiers.new("Front", "SUBSURF").levels = 1
+    first.modifiers.move(1, 0)
+    second, armature = scenes.make_arm(name="Leg")
+    second.modifiers.clear()
+    second.parent, second.parent_type = armature, "ARMATURE"
+    second.location = (0.0, 3.0, 0.0)
+    bpy.context.scene.frame_set(11)
+    counts = [len(scenes.final_points(obj)) for obj in (first, second)]
+    assert counts[0] > 2 * counts[1]
+    path = save(tmp_path / "two.blend")
+    run_sinew(
+        *("compare", path, "--methods", "lbs,dq", "--frames", "1,11", "--pictures", int(NEWEST)),
+        *("--size", 64, "--engine", "cycles", "--out", tmp_path),
+    )
+    found = json.loads((tmp_path / "two" / "metrics.json").read_text(encoding="utf-8"))
+    assert found["meshes"] == ["Arm", "Leg"]
+    assert found["rest"]["vertices"] == sum(counts)
+    assert (found["rest"]["holes"], found["rest"]["clashes"]) == (0, 0)
+    at_rest, linear = found["summaries"]["lbs"]
+    _dual_at_rest, dual = found["summaries"]["dq"]
+    assert abs(at_rest["volume_change"]) + at_rest["stretch_rms"] + at_rest["bulge_max"] < 1e-4
+    assert linear["distance_max"] < 1e-4
+    assert dual["distance_max"] > 0.02
+    assert linear["bulge_min"] < -0.02
+    assert ((tmp_path / "two.html").read_text(encoding="utf-8").count("<img") > 2) == NEWEST
+
+
+def test_planted_faults_are_found(tmp_path):
+    obj, armature = scenes.make_arm()
+    scenes.forget_keys(armature)
+    for group in obj.vertex_groups:
+        group.remove([0, 1, 2])
+        group.add([40, 41], 0.001, "REPLACE")
+    obj.vertex_groups.new(name="nobody").add([9], 1.0, "REPLACE")
+    for bone in armature.data.bones:
+        obj.vertex_groups.new(name=f"old {bone.name}")
+    path = save(tmp_path / "faulty.blend")
+    run_sinew("compare", path, "--frames", "1-2", "--pictures", 0, "--influences", 2, "--out", tmp_path)
+    found = json.loads((tmp_path / "faulty" / "metrics.json").read_text(encoding="utf-8"))["findings"]["Arm"]
+    assert {finding["name"]: finding["vertices"] for finding in found} == {
+        "no_weights": [0, 1, 2],
+        "small_sums": [40, 41],
+        "boneless_groups": [9],
+    }
+    assert found[-1]["groups"] == ["nobody", "old bone.0", "old bone.1"]
+    page = (tmp_path / "faulty.html").read_text(encoding="utf-8")
+    for finding in found:
+        assert finding["advice"].replace(">", "&gt;").replace("'", "&#x27;") in page
+
+
+def opaque_pixels(path):
+    """float64 [n, 3], sRGB in 0..255."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        pixels = np.asarray(image.convert("RGBA"), dtype=np.float64)
+    return pixels[pixels[:, :, 3] == 255][:, :3]
+
+
+@newest_only
+def test_a_page_holds_its_pictures_and_a_video(tmp_path):
+    path = REPOSITORY / "blend_files" / "wrist.blend"
+    run_sinew(
+        *("compare", path, "--methods", "lbs,dq", "--frames", "1,12,24", "--pictures", 2, "--size", 128),
+        *("--video", "--out", tmp_path),
+    )
+    page = (tmp_path / "wrist.html").read_text(encoding="utf-8")
+    # Nothing is fetched from anywhere.
+    assert re.findall(r'(?:src|href)="(?!data:image/png;base64,)', page) == []
+    drawn = sorted((tmp_path / "wrist" / "pictures").glob("*.png"))
+    assert page.count("<img") == len(drawn)
+    # Every measure is worst at the half turn.
+    assert {p.name for p in drawn if p.stem.count("-") == 1} == {"lbs-24.png", "dq-24.png"}
+    for picture in drawn:
+        assert len(opaque_pixels(picture)) > 500, picture
+    # The file's own modifier is linear blend: no distance, all of it in the first colour, a violet.
+    red, green, blue = opaque_pixels(tmp_path / "wrist" / "pictures" / "lbs-distance-24-close.png").mean(
+        axis=0
+    )
+    assert green < 0.4 * red < 0.4 * blue
+    colours = opaque_pixels(tmp_path / "wrist" / "pictures" / "dq-distance-24-close.png")
+    yellow = (colours[:, 0] > 150) & (colours[:, 1] > 150) & (colours[:, 2] < 110)
+    assert yellow.mean() > 0.02
+    clip = bpy.data.movieclips.load(str(tmp_path / "wrist" / "video.mp4"))
+    assert clip.frame_duration == 3
+    assert clip.size[0] > 2 * 128
+
+
+def test_a_video_shows_one_picture_after_the_other(tmp_path):
+    """Read back by Blender's own sequencer."""
+    colours = [(0.9, 0.1, 0.1), (0.1, 0.9, 0.1), (0.1, 0.1, 0.9), (0.9, 0.9, 0.1)]
+    paths = [tmp_path / f"{number:06d}.png" for number in range(len(colours))]
+    for path, colour in zip(paths, colours, strict=True):
+        pictures.write_picture(path, np.broadcast_to((*colour, 1.0), (48, 64, 4)))
+    video.encode(paths, 25, 1.0, tmp_path / "video.mp4")
+    clip = bpy.data.movieclips.load(str(tmp_path / "video.mp4"))
+    assert (tuple(clip.size), clip.frame_duration, clip.fps) == ((64, 48), 4, 25.0)
+    scene = bpy.context.scene
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    strips.new_movie("Movie", str(tmp_path / "video.mp4"), channel=1, frame_start=1)
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.view_settings.view_transform = "Standard"
+    scene.render.filepath = str(tmp_path / "frame.png")
+    for frame, colour in enumerate(colours, start=1):
+        scene.frame_set(frame)
+        bpy.ops.render.render(write_still=True)
+        shown = pictures.read_picture(tmp_path / "frame.png")[24, 32, :3]
+        np.testing.assert_allclose(shown, colour, atol=0.05)
+
+
+def test_golden_pictures(tmp_path):
+    _obj, armature = scenes.make_arm()
+    path = save(tmp_path / "arm.blend")
+    run_sinew(
+        "render", path, "--method", "dq", "--frames", "1,11", "--size", 128, "--out", tmp_path / "golden"
+    )
+    assert {p.name for p in (tmp_path / "golden").iterdir()} == {"0001.png", "0011.png", "render.json"}
+    # All methods leave the rest pose as it is; frame 11 is bent.
+    result = run_sinew(
+        *("render", path, "--method", "lbs", "--against", tmp_path / "golden", "--out", tmp_path / "now"),
+        status=1,
+    )
+    assert "1 of 2 pictures within" in result.stdout
+    assert {p.name for p in (tmp_path / "now").glob("*.difference.png")} == {"0011.difference.png"}
+    assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
+    percent = float(re.search(r"\b11\b.*?(\d+\.\d+) %", result.stdout).group(1))
+    assert 0.5 < percent < 50.0
+    # The golden camera is kept: what moves farther at one frame does not change the framing of others.
+    for frame, scale in ((1, 1.0), (11, 3.0)):
+        armature.pose.bones[1].scale = (scale, scale, scale)
+        armature.pose.bones[1].keyframe_insert("scale", frame=frame)
+    save(path)
+    result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
+    assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
+    assert "1 of 2 pictures within" in result.stdout
+
+
+def test_wrong_use_is_one_sentence(tmp_path):
+    scenes.make_arm()
+    path = save(tmp_path / "arm.blend")
+    (tmp_path / "other").mkdir()
+    out = tmp_path / "out"
+    cases = [
+        (["compare", path, tmp_path / "other" / "arm.glb", "--out", out], "would both be written"),
+        (["compare", path, "--reference", "best", "--out", out], "expected one of"),
+        (["compare", path, path, "--frame", "1", "--out", tmp_path / "a.png"], "a sheet shows one file"),
+        (["compare", path, "--pictures", "-1", "--out", out], "expected 0 or more"),
+        (["render", path, "--method", "dq", "--out", out], "--method and --frames are needed"),
+        (["render", path, "--against", tmp_path / "other", "--out", out], "sinew render"),
+        (["render", path, "--against", out, "--out", out], "would replace the golden pictures"),
+        (["render", path, "--method", "dq", "--frames", "1", "--own-look", "--out", out], "no camera"),
+        (["render", path, "--method", "dq", "--frames", "1", "--size", 9, "--out", out], "64 to 4096"),
+    ]
+    parser = argparse.ArgumentParser()
+    subparsers = parser.add_subparsers(dest="command")
+    for module in (compare, render):
+        module.add_parser(subparsers)
+    for arguments, sentence in cases:
+        args = parser.parse_args([*map(str, arguments)])
+        with pytest.raises(SinewError, match=re.escape(sentence)) as error:
+            {"compare": compare, "render": render}[args.command].run(
+                args, Console(io.StringIO(), io.StringIO())
+            )
+        assert "\n" not in str(error.value)
+    assert not out.exists()
+
+
+TESTS = """
+def test_same(sinew_render):
+    sinew_render("arm.blend", "golden", method="dq", frames="1,11", size=96)
+
+def test_other_method(sinew_render):
+    sinew_render("arm.blend", "golden", method="lbs", frames=11, size=96)
+
+def test_tolerant(sinew_render):
+    sinew_render("arm.blend", "golden", method="lbs", frames=11, size=96, tolerance=60)
+"""
+
+
+@newest_only
+def test_the_pytest_fixture(tmp_path):
+    def run_pytest(*options):
+        # The installed plugin would come a second time under its own name.
+        environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "sinew_addon.pytest_plugin",
+            "-p",
+            "no:cacheprovider",
+        ]
+        return subprocess.run(
+            [*command, "-q", "--rootdir", str(tmp_path), *options, str(tmp_path)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+
+    scenes.make_arm()
+    save(tmp_path / "arm.blend")
+    (tmp_path / "test_rig.py").write_text(TESTS)
+    without = run_pytest("-k", "same")
+    assert "no golden pictures; make them with pytest --sinew-update" in without.stdout
+    assert without.returncode == 1
+    assert run_pytest("-k", "same", "--sinew-update").returncode == 0
+    result = run_pytest()
+    assert "1 failed, 2 passed" in result.stdout, result.stdout
+    assert "FAILED" in result.stdout
+    assert "test_other_method" in result.stdout
+    assert "0011.difference.png" in result.stdout
+
+
+def test_pytest_is_told_of_the_fixture():
+    project = tomllib.loads((REPOSITORY / "addon" / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["entry-points"]["pytest11"] == {"sinew": "sinew_addon.pytest_plugin"}
+    from sinew_addon import pytest_plugin
+
+    assert callable(pytest_plugin.sinew_render)

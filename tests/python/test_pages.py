@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colours, plots and the comparison of pictures."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from sinew_addon.core import golden
+from sinew_addon.core.errors import SinewError
+from sinew_addon.core.heat import HeatScale, viridis
+from sinew_addon.core.metrics import METRICS, Summary
+from sinew_addon.core.page import legend_texts
+from sinew_addon.core.plots import HEIGHT, WIDTH, line_plot
+
+
+def lightness(colours):
+    """CIE L* of sRGB colours."""
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    luminance = linear @ [0.2126, 0.7152, 0.0722]
+    return np.where(luminance > 216 / 24389, 116 * np.cbrt(luminance) - 16, luminance * 24389 / 27)
+
+
+def test_colours_grow_evenly_lighter():
+    """Perceptually uniform: lightness is a straight line over the values."""
+    shares = np.linspace(0, 1, 101)
+    light = lightness(viridis(shares))
+    straight = np.polyval(np.polyfit(shares, light, 1), shares)
+    assert np.abs(light - straight).max() < 2.0
+    assert light[-1] - light[0] > 70
+    np.testing.assert_array_equal(viridis([-1.0, 2.0]), viridis([0.0, 1.0]))
+
+
+def summary(**values):
+    return Summary(**{field: values.get(field, 0) for field in Summary.__dataclass_fields__})
+
+
+def test_ranges_hold_all_frames():
+    frames = [summary(bulge_min=-0.3, bulge_max=0.1), summary(bulge_max=0.2, distance_max=0.7)]
+    bulge = HeatScale.over(METRICS["bulge"], [frames], 1.0)
+    assert (bulge.low, bulge.high) == (-0.3, 0.3)
+    distance = HeatScale.over(METRICS["distance"], [frames], 1.0)
+    assert (distance.low, distance.high) == (0.0, 0.7)
+    assert distance.ticks(3) == pytest.approx([0.0, 0.35, 0.7])
+    np.testing.assert_allclose(bulge.colours(np.array([0.0])), viridis([0.5]))
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "high"), [(0.8, 1.5, 1.5), (0.5, 1.2, 2.0), (0.01, 50.0, 4.0), (0.999, 1.0, 2**0.1)]
+)
+def test_ratios_are_shown_around_one(least, most, high):
+    scale = HeatScale.over(METRICS["stretch"], [[summary(stretch_min=least, stretch_max=most)]], 1.0)
+    assert (scale.low, scale.high) == pytest.approx((1 / high, high))
+    np.testing.assert_allclose(scale.colours(np.array([1 / high, 1.0, high])), viridis([0.0, 0.5, 1.0]))
+    np.testing.assert_array_equal(np.argsort(scale.severity(np.array([1.5, 0.25, 1.0]))), [2, 0, 1])
+
+
+def test_rounding_is_not_blown_up():
+    scale = HeatScale.over(METRICS["distance"], [[summary(distance_max=1e-9)]], 2.0)
+    assert scale.high == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize(
+    ("largest", "high"), [((0.0, 0.5, 0.04), 0.08), ((0.3, 0.5), 0.5), ((0.0, 0.5), 0.5), ((0.5,), 0.5)]
+)
+def test_a_torn_mesh_does_not_make_the_others_pale(largest, high):
+    scale = HeatScale.over(METRICS["distance"], [[summary(distance_max=most)] for most in largest], 1.0)
+    assert scale.high == pytest.approx(high)
+    assert scale.clipped == (high < max(largest))
+    assert legend_texts(scale, "m")[-1] == (f"{high:g} m and more" if scale.clipped else f"{high:g} m")
+
+
+def points_of(svg):
+    found = [element for element in ElementTree.fromstring(svg) if element.tag in ("polyline", "circle")]
+    lines = []
+    for element in found:
+        if element.tag == "circle":
+            lines.append([(float(element.get("cx")), float(element.get("cy")))])
+        else:
+            lines.append([tuple(map(float, pair.split(","))) for pair in element.get("points").split()])
+    return lines
+
+
+def test_a_plot_is_drawn_to_scale():
+    values = [0.0, 1.0, 2.0, -1.0]
+    (line,) = points_of(line_plot("A <b>", "m", [1, 2, 3, 4], {"one & two": [values]}))
+    x, y = np.array(line).T
+    np.testing.assert_allclose(np.diff(x), np.diff(x)[0], atol=0.2)
+    assert np.corrcoef(y, values)[0, 1] == pytest.approx(-1.0, abs=1e-5)
+    assert (x > 0).all()
+    assert (x < WIDTH).all()
+    assert (y > 0).all()
+    assert (y < HEIGHT).all()
+
+
+def test_gaps_and_single_values_are_drawn():
+    svg = line_plot("Gaps", "", [1, 2, 3, 4, 5], {"a": [[1.0, 2.0, float("nan"), 3.0, float("inf")]]})
+    assert [len(line) for line in points_of(svg)] == [2, 1]
+    assert len(points_of(line_plot("One", "%", [7], {"a": [[0.0]], "b": [[5.0]]}))) == 2
+    assert points_of(line_plot("None", "", [1, 2], {"a": [[float("nan")] * 2]})) == []
+
+
+def test_marks_of_a_plot_are_round_and_told_apart():
+    for high in (1e-7, 0.003, 0.7, 12, 4567, 3e6):
+        svg = line_plot("Marks", "", [1, 2], {"a": [[0.0, high]]})
+        marks = re.findall(r'text-anchor="end">([^<]*)<', svg)
+        assert 3 <= len(marks) <= 8
+        assert len(set(marks)) == len(marks)
+        assert float(marks[-1]) >= high * 0.999
+        assert float(marks[0]) == 0.0
+
+
+def test_only_what_differs_visibly_counts():
+    picture = np.zeros((10, 20, 4))
+    picture[2:8, 5:15] = [0.5, 0.5, 0.5, 1.0]
+    other = picture.copy()
+    # The colour behind no alpha is not seen; a little is along every edge.
+    other[0, 0] = [1.0, 1.0, 1.0, 0.0]
+    other[2, 5] = [0.6, 0.6, 0.6, 1.0]
+    assert golden.differing_share(golden.difference(picture, other)) == 0.0
+    other[7, 5:9] = 0.0
+    differences = golden.difference(picture, other)
+    assert golden.differing_share(differences) == pytest.approx(4 / 200)
+    shown = golden.difference_picture(differences, picture)
+    coloured = np.ptp(shown[:, :, :3], axis=2) > 0.1
+    assert coloured.sum() == 4
+    assert coloured[7, 5:9].all()
+
+
+def test_names_of_pictures_sort_by_frame():
+    frames = [-3, 1, 6.5, 6.25, 12, 1234]
+    assert [golden.picture_name(f) for f in frames[1:]] == [
+        "0001.png",
+        "0006.50.png",
+        "0006.25.png",
+        "0012.png",
+        "1234.png",
+    ]
+    assert len({golden.picture_name(f) for f in [*frames, -2.5, 6.75]}) == 8
+
+
+def test_a_folder_that_holds_no_golden_pictures_is_named(tmp_path):
+    with pytest.raises(SinewError, match="sinew render"):
+        golden.RenderSettings.read(tmp_path)
+    (tmp_path / golden.SETTINGS).write_text('{"frames": 3}')
+    with pytest.raises(SinewError, match="make the pictures again"):
+        golden.RenderSettings.read(tmp_path)
