@@ -36,7 +36,8 @@ class Source:
 
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """False as long as Blender has not evaluated what stands in front, as when it was just made."""
+    """False as long as Blender has not evaluated what stands in front: when it was just made, or Sinew was off
+    and nothing needed it."""
     return properties.of(obj).front is None or front.evaluated_mesh(obj, depsgraph) is not None
 
 
@@ -88,11 +89,12 @@ def has_changed(
 
 
 def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """float32 [vertices, 3] at this evaluation; the same array as before where nothing changed."""
+    """float32 [vertices, 3] at this evaluation; the same array as before where nothing changed.
+
+    Requires is_ready.
+    """
     if properties.of(obj).front is not None:
-        mesh = front.evaluated_mesh(obj, depsgraph)
-        # While Sinew was off nothing needed what stands in front: it is evaluated next, and comes again.
-        points = source.points if mesh is None else mesh_io.read_points(mesh.vertices)
+        points = mesh_io.read_points(front.evaluated_mesh(obj, depsgraph).vertices)
         if not np.array_equal(points, source.points):
             source.points = points
         return source.points
