@@ -36,8 +36,8 @@ class Source:
 
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """False as long as Blender has not evaluated what stands in front: when it was just made, or Sinew was off
-    and nothing needed it."""
+    """False as long as Blender has not evaluated what stands in front: it was just made, or Sinew was off and
+    nothing needed it."""
     return properties.of(obj).front is None or front.evaluated_mesh(obj, depsgraph) is not None
 
 
