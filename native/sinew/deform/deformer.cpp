@@ -12,6 +12,7 @@
 #include "sinew/deform/kernels.h"
 #include "sinew/deform/thread_pool.h"
 #include "sinew/transform/convert.h"
+#include "sinew/transform/split_scale.h"
 
 namespace sinew {
 namespace {
@@ -114,6 +115,11 @@ Deformer::Deformer(MethodId method, const BindData& data) : method_(method) {
     }
     influence_count_ = influences.size();
     mesh_ = pack(data.rest_points, offsets, influences);
+    for (const std::int32_t bone : mesh_.used_bones) {
+        if (!has_unit_axes(cast<double>(rest_bones_[static_cast<std::size_t>(bone)]))) {
+            stretched_bones_.push_back(bone);
+        }
+    }
 }
 
 void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
@@ -130,7 +136,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     assert(points.size() == vertex_count_);
     // One for each thread that deforms, kept for its next frame: nothing is allocated and nothing locked.
     thread_local Palette palette;
-    prepare(method_, mesh_.used_bones, posed_from_rest.first(bone_count_), rest_bones_,
+    prepare(method_, mesh_.used_bones, stretched_bones_, posed_from_rest.first(bone_count_), rest_bones_,
             options.bones_from_model, palette);
 
     Frame frame{method_, &mesh_, &palette, nullptr, nullptr, points.data()};

@@ -66,6 +66,7 @@ private:
     MethodId method_;
     PackedMesh mesh_;
     std::vector<Affine<float>> rest_bones_;
+    std::vector<std::int32_t> stretched_bones_;  // used, and with axes that are not of unit length
     std::size_t vertex_count_ = 0;
     std::size_t influence_count_ = 0;
     std::size_t bone_count_ = 0;

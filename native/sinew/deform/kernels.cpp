@@ -18,6 +18,7 @@
 //
 #include "hwy/highway.h"
 #include "sinew/deform/lbs-inl.h"
+#include "sinew/deform/palette-inl.h"
 #include "sinew/deform/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -32,6 +33,15 @@ void deform(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
+void prepare_bones(MethodId method, std::span<const std::int32_t> used,
+                   std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    if (method == MethodId::dq) {
+        prepare_rigid<DqKernel>(used, posed_from_rest, palette);
+    } else {
+        prepare_rigid<QvKernel>(used, posed_from_rest, palette);
+    }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
@@ -43,19 +53,22 @@ namespace {
 
 struct Target {
     std::int64_t bit;
-    void (*deform)(const Frame&, std::size_t, std::size_t);
+    decltype(&HWY_STATIC_DISPATCH(deform)) deform;
+    decltype(&HWY_STATIC_DISPATCH(prepare_bones)) prepare;
 
     [[nodiscard]] std::string_view name() const { return hwy::TargetName(bit); }
 };
 
 // Highway's own choice (HWY_DYNAMIC_DISPATCH) needs libhwy, which Debian ships as a shared library only: a
 // wheel would then need it on the user's machine. Its headers do without; so the choice is made here.
+#define SINEW_TARGET(name) \
+    { HWY_##name, HWY_CHOOSE_##name(deform), HWY_CHOOSE_##name(prepare_bones) }
 constexpr Target kTargets[] = {
-    {HWY_AVX3, HWY_CHOOSE_AVX3(deform)},
-    {HWY_AVX2, HWY_CHOOSE_AVX2(deform)},
-    {HWY_SSE4, HWY_CHOOSE_SSE4(deform)},
-    {HWY_SSSE3, HWY_CHOOSE_SSSE3(deform)},
-    {HWY_STATIC_TARGET, &HWY_STATIC_DISPATCH(deform)},
+    SINEW_TARGET(AVX3),
+    SINEW_TARGET(AVX2),
+    SINEW_TARGET(SSE4),
+    SINEW_TARGET(SSSE3),
+    {HWY_STATIC_TARGET, &HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare_bones)},
 };
 
 bool runs_here(std::int64_t bit) {
@@ -103,6 +116,11 @@ std::atomic<const Target*>& chosen() {
 
 void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) noexcept {
     chosen().load(std::memory_order_relaxed)->deform(frame, begin, end);
+}
+
+void prepare_rigid(MethodId method, std::span<const std::int32_t> used,
+                   std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    chosen().load(std::memory_order_relaxed)->prepare(method, used, posed_from_rest, palette);
 }
 
 std::vector<std::string_view> simd_targets() {

@@ -21,6 +21,11 @@ struct Frame {
     Vec3<float>* points;
 };
 
+/// Writes the rows of the bones `used` to `palette.bones` as if each were rigid, in the method `qv` or `dq`,
+/// and adds those to `palette.scaled` that are not.
+void prepare_rigid(MethodId method, std::span<const std::int32_t> used,
+                   std::span<const Affine<float>> posed_from_rest, Palette& palette);
+
 /// Deforms the blocks [begin, end) on the instruction set in use. What a method means is in skinning/;
 /// the kernels agree with it.
 ///

@@ -36,6 +36,11 @@ HWY_INLINE Points<D> load_points(D d, const Lanes<float>* rows, std::size_t lane
             hn::Load(d, rows[2].lane.data() + lane)};
 }
 
+template <class D>
+HWY_INLINE Points<D> add(const Points<D>& a, const Points<D>& b) {
+    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
 /// rows  [3] of `displacement`, each (x, y, z, shift)
 template <class D>
 HWY_INLINE Points<D> displacement(D d, const float* rows, const Points<D>& p) {
@@ -49,8 +54,7 @@ HWY_INLINE Points<D> displacement(D d, const float* rows, const Points<D>& p) {
 
 template <class D>
 HWY_INLINE Points<D> displaced(D d, const float* rows, const Points<D>& p) {
-    const Points<D> by = displacement(d, rows, p);
-    return {hn::Add(p.x, by.x), hn::Add(p.y, by.y), hn::Add(p.z, by.z)};
+    return add<D>(p, displacement(d, rows, p));
 }
 
 template <class D>
@@ -73,6 +77,57 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
     return {hn::MulAdd(scale, b.x, a.x), hn::MulAdd(scale, b.y, a.y), hn::MulAdd(scale, b.z, a.z)};
 }
 
+#if HWY_TARGET == HWY_AVX3
+
+/// x y z x y z ... of the points, in three vectors.
+struct Interleaved {
+    Vec<Full> part[3];
+};
+
+HWY_INLINE Interleaved interleave(const Points<Full>& p) {
+    // Six permutes of two sources, where StoreInterleaved3 takes fifteen operations.
+    alignas(64) static constexpr std::int32_t kXy[3][16] = {
+        {0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5},
+        {21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26},
+        {0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0}};
+    alignas(64) static constexpr std::int32_t kZ[3][16] = {
+        {0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15},
+        {0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15},
+        {26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31}};
+    Interleaved result;
+    for (int i = 0; i < 3; ++i) {
+        const __m512 xy = _mm512_permutex2var_ps(p.x.raw, _mm512_load_si512(kXy[i]), p.y.raw);
+        result.part[i].raw = _mm512_permutex2var_ps(xy, _mm512_load_si512(kZ[i]), p.z.raw);
+    }
+    return result;
+}
+
+HWY_INLINE void store_consecutive(Full d, const Points<Full>& p, float* to) {
+    const Interleaved points = interleave(p);
+    for (std::size_t i = 0; i < 3; ++i) hn::StoreU(points.part[i], d, to + kLanes * i);
+}
+
+/// Whole vectors with all but the run's own floats masked out.
+HWY_INLINE void store_runs(Full, const Frame& frame, const Block& block, const Points<Full>& p) {
+    const Interleaved points = interleave(p);
+    const Run* const runs = &frame.mesh->runs[block.place];
+    for (std::size_t r = 0; r < block.runs; ++r) {
+        float* const to = &frame.points->x + 3 * static_cast<std::ptrdiff_t>(runs[r].origin);
+        for (std::size_t i = 0; i < 3; ++i) {
+            _mm512_mask_storeu_ps(to + kLanes * i, runs[r].floats[i], points.part[i].raw);
+        }
+    }
+}
+
+#else
+
+template <class D>
+HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
+    hn::StoreInterleaved3(p.x, p.y, p.z, d, to);
+}
+
+#endif
+
 /// Apart from store_points, so that its stack is not that of every block.
 template <class D>
 HWY_NOINLINE void scatter_points(D d, const std::int32_t* place, Vec3<float>* points, Vec<D> x, Vec<D> y,
@@ -94,20 +149,38 @@ HWY_INLINE void store_points(D d, const Frame& frame, std::size_t b, std::size_t
     const std::int32_t* const place = frame.mesh->vertices[b].lane.data() + lane;
     if constexpr (hn::MaxLanes(D()) == 1) {
         frame.points[*place] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
-    } else if (block.consecutive) {
-        hn::StoreInterleaved3(p.x, p.y, p.z, d,
-                              &frame.points[static_cast<std::size_t>(block.first_vertex) + lane].x);
     } else {
+        if (block.consecutive) {
+            return store_consecutive(d, p, &frame.points[block.place + lane].x);
+        }
+#if HWY_TARGET == HWY_AVX3
+        if (block.runs > 0) return store_runs(d, frame, block, p);
+#endif
         scatter_points(d, place, frame.points, p.x, p.y, p.z);
     }
 }
 
-inline void keep_block(const Frame& frame, std::size_t b) {
+/// Blocks [begin, end), which have no bones.
+inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
-    const Block& block = frame.mesh->blocks[b];
-    for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-        store_points(d, frame, b, lane, load_points(d, &frame.mesh->rows[block.first_row], lane));
+    for (std::size_t b = begin; b < end; ++b) {
+        const Block& block = frame.mesh->blocks[b];
+        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
+            store_points(d, frame, b, lane, load_points(d, &frame.mesh->rows[block.first_row], lane));
+        }
     }
+}
+
+/// The first block after `b` that has other bones, or `end`.
+inline std::size_t end_of_set(const Frame& frame, std::size_t b, std::size_t end) {
+    const Block* const blocks = frame.mesh->blocks.data();
+    std::size_t after = b + 1;
+    // A set without bones has no place in PackedMesh::bones of its own.
+    while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
+           blocks[after].influences == blocks[b].influences) {
+        ++after;
+    }
+    return after;
 }
 
 }  // namespace HWY_NAMESPACE

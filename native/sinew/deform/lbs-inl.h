@@ -26,23 +26,22 @@ HWY_INLINE V in_register(V v) {
     return v;
 }
 
-/// Adds to `sum` what the bone with these columns makes of its share of `p`.
+/// What the bone with these columns adds to `p`.
 template <class D>
-HWY_INLINE void add_bone(D d, const float* columns, Vec<D> weight, const Points<D>& p, Points<D>& sum) {
+HWY_INLINE Points<D> moved_by(D d, const float* columns, const Points<D>& p) {
     const Vec<D> x = hn::MulAdd(hn::Set(d, columns[8]), p.z, hn::Set(d, columns[12]));
     const Vec<D> y = hn::MulAdd(hn::Set(d, columns[9]), p.z, hn::Set(d, columns[13]));
     const Vec<D> z = hn::MulAdd(hn::Set(d, columns[10]), p.z, hn::Set(d, columns[14]));
     const Vec<D> x2 = hn::MulAdd(hn::Set(d, columns[4]), p.y, x);
     const Vec<D> y2 = hn::MulAdd(hn::Set(d, columns[5]), p.y, y);
     const Vec<D> z2 = hn::MulAdd(hn::Set(d, columns[6]), p.y, z);
-    sum.x = hn::MulAdd(weight, hn::MulAdd(hn::Set(d, columns[0]), p.x, x2), sum.x);
-    sum.y = hn::MulAdd(weight, hn::MulAdd(hn::Set(d, columns[1]), p.x, y2), sum.y);
-    sum.z = hn::MulAdd(weight, hn::MulAdd(hn::Set(d, columns[2]), p.x, z2), sum.z);
+    return {hn::MulAdd(hn::Set(d, columns[0]), p.x, x2), hn::MulAdd(hn::Set(d, columns[1]), p.x, y2),
+            hn::MulAdd(hn::Set(d, columns[2]), p.x, z2)};
 }
 
-/// Lanes [lane, lane + kVectors * N) of block `b`.
+/// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
 ///
-/// columns_of  columns of the bone of an influence, the same for all these lanes
+/// columns_of  columns of the bone of an influence
 /// kCount      the number of influences, or 0 for any
 template <std::size_t kCount, std::size_t kVectors, class D, class ColumnsOf>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, std::size_t b, std::size_t lane,
@@ -50,17 +49,28 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, std::size_t b, std::size_t
     const Block& block = frame.mesh->blocks[b];
     const Lanes<float>* const rows = &frame.mesh->rows[block.first_row];
     const std::size_t step = hn::Lanes(d);
+    const std::size_t last = (kCount > 0 ? kCount : block.influences) - 1;
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, rows, lane + v * step);
-    for (std::size_t k = 0; k < (kCount > 0 ? kCount : block.influences); ++k) {
+    for (std::size_t k = 0; k < last; ++k) {
         const float* const columns = columns_of(k);
         const float* const weights = rows[3 + k].lane.data() + lane;
         for (std::size_t v = 0; v < kVectors; ++v) {
-            add_bone(d, columns, in_register(hn::Load(d, weights + v * step)), p[v], sum[v]);
+            const Vec<D> weight = in_register(hn::Load(d, weights + v * step));
+            sum[v] = add_scaled<D>(sum[v], weight, moved_by(d, columns, p[v]));
         }
     }
-    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, frame, b, lane + v * step, sum[v]);
+    const float* const columns = columns_of(last);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        Vec<D> left = hn::Set(d, 1.0f);
+        for (std::size_t k = 0; k < last; ++k) {
+            left = hn::Sub(left, hn::Load(d, rows[3 + k].lane.data() + lane + v * step));
+        }
+        const Points<D> moved = moved_by(d, columns, p[v]);
+        sum[v] = kCount == 1 ? add<D>(sum[v], moved) : add_scaled<D>(sum[v], left, moved);
+        store_points(d, frame, b, lane + v * step, sum[v]);
+    }
 }
 
 HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
@@ -124,29 +134,32 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
 inline void deform_mixed(const Frame& frame, std::size_t b) {
     const Block& block = frame.mesh->blocks[b];
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const One d;
+        const Lanes<float>* const rows = &frame.mesh->rows[block.first_row];
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
-        deform_lanes<0, 1>(One(), frame, b, lane,
-                           [&](std::size_t k) { return columns_of_bone(frame, bones[k]); });
+        const Points<One> p = load_points(d, rows, lane);
+        Points<One> sum = p;
+        for (std::size_t k = 0; k < block.influences; ++k) {
+            const Vec<One> weight = hn::Load(d, rows[3 + k].lane.data() + lane);
+            sum = add_scaled<One>(sum, weight, moved_by(d, columns_of_bone(frame, bones[k]), p));
+        }
+        store_points(d, frame, b, lane, sum);
     }
 }
 
 #endif
 
 inline void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
-    const Block* const blocks = frame.mesh->blocks.data();
     for (std::size_t b = begin; b < end;) {
-        const Block& block = blocks[b];
+        const Block& block = frame.mesh->blocks[b];
         if (block.mixed) {
             deform_mixed(frame, b++);
             continue;
         }
-        std::size_t after = b + 1;
-        while (after < end && !blocks[after].mixed && blocks[after].influences == block.influences &&
-               blocks[after].first_bone == block.first_bone) {
-            ++after;
-        }
+        const std::size_t after = end_of_set(frame, b, end);
         // A fixed count makes one run of instructions.
         switch (block.influences) {
+            case 0: keep_blocks(frame, b, after); break;
             case 1: deform_set<1>(frame, b, after); break;
             case 2: deform_set<2>(frame, b, after); break;
             case 3: deform_set<3>(frame, b, after); break;

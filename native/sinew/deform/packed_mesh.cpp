@@ -10,7 +10,10 @@ namespace {
 
 // A block costs the same however few of its lanes are filled, and a mixed one about as much as two and a
 // half full ones. It also bounds the memory: 16 / 10 of 32 bytes a vertex at four influences.
-constexpr std::size_t kFewestLanes = 10;
+constexpr std::size_t kFewestLanes = 6;
+
+// With more runs than this, 48 single floats are written sooner.
+constexpr std::size_t kMostRuns = 8;
 
 class BoneSets {
 public:
@@ -113,6 +116,7 @@ public:
         find_used_bones();
         mesh_.blocks.shrink_to_fit();
         mesh_.vertices.shrink_to_fit();
+        mesh_.runs.shrink_to_fit();
         mesh_.bones.shrink_to_fit();
         return std::move(mesh_);
     }
@@ -163,11 +167,37 @@ private:
         // Rising within a set, and within a number of influences.
         const bool consecutive =
             !mixed && vertices.size() == kLanes && vertices.back() - vertices.front() == kLanes - 1;
-        mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences),
-                                places.lane[0], static_cast<std::uint8_t>(vertices.size()), mixed,
-                                consecutive});
+        const std::size_t runs = consecutive ? 0 : add_runs(vertices);
+        const auto place =
+            consecutive ? vertices.front() : static_cast<std::uint32_t>(mesh_.runs.size() - runs);
+        mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences), place,
+                                static_cast<std::uint8_t>(vertices.size()), static_cast<std::uint8_t>(runs),
+                                mixed, consecutive});
         mesh_.vertices.push_back(places);
-        row_count_ += static_cast<std::uint32_t>(3 + influences);
+        row_count_ += static_cast<std::uint32_t>(3 + (mixed ? influences : weights_kept(influences)));
+    }
+
+    static std::size_t weights_kept(std::size_t influences) {
+        return influences - std::min<std::size_t>(influences, 1);
+    }
+
+    /// The number of runs, or 0 where there are too many.
+    std::size_t add_runs(std::span<const std::uint32_t> vertices) {
+        const std::size_t before = mesh_.runs.size();
+        for (std::size_t begin = 0, end = 0; begin < vertices.size(); begin = end) {
+            end = begin + 1;
+            while (end < vertices.size() && vertices[end] == vertices[begin] + (end - begin)) ++end;
+            if (mesh_.runs.size() - before == kMostRuns) {
+                mesh_.runs.resize(before);
+                return 0;
+            }
+            const std::uint64_t bits = (std::uint64_t{1} << 3 * end) - (std::uint64_t{1} << 3 * begin);
+            mesh_.runs.push_back(
+                {static_cast<std::int32_t>(vertices[begin]) - static_cast<std::int32_t>(begin),
+                 {static_cast<std::uint16_t>(bits), static_cast<std::uint16_t>(bits >> 16),
+                  static_cast<std::uint16_t>(bits >> 32)}});
+        }
+        return mesh_.runs.size() - before;
     }
 
     void fill(std::span<const Vec3<float>> rest_points) {
@@ -178,9 +208,15 @@ private:
             Lanes<float>* const weights = &mesh_.rows[block.first_row] + 3;
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 const auto vertex = static_cast<std::uint32_t>(mesh_.vertices[b].lane[lane]);
-                for (std::size_t k = 0; k < count(vertex); ++k) {
-                    weights[k].lane[lane] = influences_[offsets_[vertex] + k].weight;
+                // In the kernels' order: a vertex gets the same last weight in either kind of block.
+                float left = 1.0f;
+                const std::size_t kept = weights_kept(count(vertex));
+                for (std::size_t k = 0; k < kept; ++k) {
+                    const float weight = influences_[offsets_[vertex] + k].weight;
+                    weights[k].lane[lane] = weight;
+                    left -= weight;
                 }
+                if (block.mixed) weights[kept].lane[lane] = left;
             }
         }
     }

@@ -23,13 +23,22 @@ struct alignas(kLanes * sizeof(T)) Lanes {
 
 /// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
 struct Block {
-    std::uint32_t first_row;   // of PackedMesh::rows: x, y, z, then the weights of each influence
+    // Of PackedMesh::rows: x, y, z, then the weights of each influence; without the last, which is what the
+    // others leave of 1, unless mixed.
+    std::uint32_t first_row;
     std::uint32_t first_bone;  // of PackedMesh::bones: [influences], or if mixed [kLanes][influences]
     std::uint32_t influences;
-    std::int32_t first_vertex;
+    std::uint32_t place;  // consecutive: the first vertex; else, where there are runs, the first of them
     std::uint8_t vertices;
-    bool mixed;        // every lane has bones of its own; fewer influences are filled up with weight 0
-    bool consecutive;  // kLanes vertices that also follow each other in the mesh
+    std::uint8_t runs;  // 0: too many to be worth it
+    bool mixed;         // every lane has bones of its own; fewer influences are filled up with weight 0
+    bool consecutive;   // kLanes vertices that also follow each other in the mesh
+};
+
+/// Lanes of a block whose vertices follow each other in the mesh.
+struct Run {
+    std::int32_t origin;                  // the place in the mesh that lane 0 would have
+    std::array<std::uint16_t, 3> floats;  // a bit for each of the coordinates x y z x y z ... of the block
 };
 
 /// A bound mesh in the order in which it is deformed: vertices with the same bones in the same order lie
@@ -38,13 +47,15 @@ struct PackedMesh {
     std::vector<Block> blocks;
     std::vector<Lanes<float>> rows;
     std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the place of each lane in the mesh
+    std::vector<Run> runs;
     std::vector<std::int32_t> bones;
     std::vector<std::int32_t> used_bones;  // rising, each once
 };
 
 /// rest_points  [vertices]
 /// offsets      [vertices + 1] into `influences`
-/// influences   of each vertex: positive weights of sum 1, or none
+/// influences   of each vertex, or none; of positive weights, of which the last is taken as what the others
+///              leave of 1
 [[nodiscard]] PackedMesh pack(std::span<const Vec3<float>> rest_points,
                               std::span<const std::uint32_t> offsets,
                               std::span<const Influence<float>> influences);

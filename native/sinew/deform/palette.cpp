@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sinew/deform/palette.h"
 
+#include "sinew/deform/kernels.h"
 #include "sinew/skinning/dq.h"
 #include "sinew/skinning/lbs.h"
 #include "sinew/skinning/qv.h"
@@ -45,10 +46,11 @@ void write(const QuatVec<double>& a, Quad* quads) {
     quads[1] = quad(a.translation.x, a.translation.y, a.translation.z, 0.0);
 }
 
+/// The bones in `palette.scaled`, as skinning/ says.
 template <class Method>
-void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                   std::span<const Affine<float>> rest_bones, Palette& palette) {
-    for (const std::int32_t index : used) {
+void prepare_scaled(std::span<const Affine<float>> posed_from_rest, std::span<const Affine<float>> rest_bones,
+                    Palette& palette) {
+    for (const std::int32_t index : palette.scaled) {
         const auto bone = static_cast<std::size_t>(index);
         const auto motion =
             Method::prepare(cast<double>(posed_from_rest[bone]), cast<double>(rest_bones[bone]));
@@ -81,17 +83,20 @@ void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<floa
 
 }  // namespace
 
-void prepare(MethodId method, std::span<const std::int32_t> used,
+void prepare(MethodId method, std::span<const std::int32_t> used, std::span<const std::int32_t> stretched,
              std::span<const Affine<float>> posed_from_rest, std::span<const Affine<float>> rest_bones,
              const Affine<float>& bones_from_model, Palette& palette) {
     palette.has_scale.clear();
     if (palette.bones.size() < bone_quads(method) * posed_from_rest.size()) {
         palette.bones.resize(bone_quads(method) * posed_from_rest.size());
     }
-    switch (method) {
-        case MethodId::lbs: return prepare_lbs(used, posed_from_rest, bones_from_model, palette);
-        case MethodId::qv: return prepare_rigid<Qv>(used, posed_from_rest, rest_bones, palette);
-        case MethodId::dq: return prepare_rigid<Dq>(used, posed_from_rest, rest_bones, palette);
+    if (method == MethodId::lbs) return prepare_lbs(used, posed_from_rest, bones_from_model, palette);
+    palette.scaled.assign(stretched.begin(), stretched.end());
+    prepare_rigid(method, used, posed_from_rest, palette);
+    if (method == MethodId::dq) {
+        prepare_scaled<Dq>(posed_from_rest, rest_bones, palette);
+    } else {
+        prepare_scaled<Qv>(posed_from_rest, rest_bones, palette);
     }
 }
 

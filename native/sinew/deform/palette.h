@@ -33,13 +33,15 @@ struct Palette {
     std::vector<Quad> bones;
     std::vector<Quad> scales;             // kDisplacementQuads a bone, where it has scale
     std::vector<std::uint8_t> has_scale;  // empty: no bone has
+    std::vector<std::int32_t> scaled;     // bones to be looked at one by one
 };
 
 /// Fills `palette` for the bones `used`; it only allocates where it was never as large.
 ///
+/// stretched         those of `used` whose rest bones are not of unit length
 /// bones_from_model  lbs: the result is in model space for points in model space; the other methods blend
 ///                   where they stand, and the caller takes the points there and back
-void prepare(MethodId method, std::span<const std::int32_t> used,
+void prepare(MethodId method, std::span<const std::int32_t> used, std::span<const std::int32_t> stretched,
              std::span<const Affine<float>> posed_from_rest, std::span<const Affine<float>> rest_bones,
              const Affine<float>& bones_from_model, Palette& palette);
 

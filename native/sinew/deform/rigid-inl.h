@@ -38,53 +38,108 @@ HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t c
     return true;
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
+using Four = hn::CappedTag<float, 4>;
+
+/// The dot product in every lane, rounded as dot().
+HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
+    const Vec<Four> product = hn::Mul(a, b);
+    const Vec<Four> pairs = hn::Add(product, hn::Shuffle1032(product));
+    return hn::Add(pairs, hn::Shuffle2301(pairs));
+}
+
+/// Copies rows of the palette, each turned to the side of the first; the least of their cosines.
+template <class Kernel>
+HWY_INLINE float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                             float* rows) {
+    const Four d;
+    const auto quad_of = [&](std::size_t k, std::size_t q) HWY_ATTR {
+        return hn::Load(d, palette.bones[kRowQuads * static_cast<std::size_t>(bones[k]) + q].value.data());
+    };
+    const Vec<Four> first = quad_of(0, 0);
+    Vec<Four> least = hn::Set(d, 1.0f);
+    for (std::size_t k = 0; k < count; ++k) {
+        const Vec<Four> quad = quad_of(k, 0);
+        const Vec<Four> cosine = dot(quad, first);
+        const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
+        least = hn::Min(least, hn::Abs(cosine));
+        hn::Store(hn::Xor(quad, sign), d, rows + kRow * k);
+        const Vec<Four> second = quad_of(k, 1);
+        hn::Store(Kernel::kSignedQuads == 2 ? hn::Xor(second, sign) : second, d, rows + kRow * k + 4);
+    }
+    return hn::GetLane(least);
+}
+
+#else
+
+template <class Kernel>
+float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
+    float least = 1.0f;
+    for (std::size_t k = 0; k < count; ++k) {
+        float* const row = rows + kRow * k;
+        std::memcpy(row, &palette.bones[kRowQuads * static_cast<std::size_t>(bones[k])],
+                    sizeof(Quad) * kRowQuads);
+        const float cosine = dot(row, rows);
+        least = std::min(least, std::abs(cosine));
+        if (cosine < 0.0f) {
+            for (std::size_t i = 0; i < 4 * Kernel::kSignedQuads; ++i) row[i] = -row[i];
+        }
+    }
+    return least;
+}
+
+#endif
+
 /// Copies the bones of a set to `rows`, each turned to the side on which it is added. False where that
 /// depends on the weights, or where a bone has scale and so depends on the vertex.
 template <class Kernel>
 HWY_INLINE bool resolve(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
     if (count > kMostResolved) return false;
-    bool close = true;
-    for (std::size_t k = 0; k < count; ++k) {
-        const auto bone = static_cast<std::size_t>(bones[k]);
-        if (!palette.has_scale.empty() && palette.has_scale[bone] != 0) {
-            return false;
-        }
-        float* const row = rows + kRow * k;
-        std::memcpy(row, &palette.bones[kRowQuads * bone], sizeof(Quad) * kRowQuads);
-        if (k > 0) {
-            const float cosine = dot(row, rows);
-            // Within 45 degrees of the first, all lie within 90 of each other.
-            close = close && std::abs(cosine) > 0.7072f;
-            if (cosine < 0.0f) {
-                for (std::size_t i = 0; i < 4 * Kernel::kSignedQuads; ++i) row[i] = -row[i];
-            }
+    if (!palette.has_scale.empty()) {
+        for (std::size_t k = 0; k < count; ++k) {
+            if (palette.has_scale[static_cast<std::size_t>(bones[k])] != 0) return false;
         }
     }
-    return close || signs_agree(rows, kRow, count);
+    // Within 45 degrees of the first, all lie within 90 of each other.
+    return copy_turned<Kernel>(palette, bones, count, rows) > 0.7072f || signs_agree(rows, kRow, count);
 }
 
 /// Lanes [lane, lane + N) of a block whose bones are resolved. That the first is not added to zeros and
 /// that a fixed count makes one run of instructions saves a twentieth of the time.
-template <class Kernel, std::size_t kCount, class D>
+template <std::size_t kCount, class D>
 HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const float* weights) {
     Sum<D> sum;
-    const Vec<D> first = hn::Load(d, weights);
-    for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, hn::Set(d, rows[i]));
-    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-        add_row(d, hn::Load(d, weights + kLanes * k), rows + kRow * k, 0, kRow, sum);
+    if constexpr (kCount == 1) {
+        for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Set(d, rows[i]);
+        return sum;
     }
+    const std::size_t last = (kCount > 0 ? kCount : count) - 1;
+    const Vec<D> first = hn::Load(d, weights);
+    Vec<D> left = hn::Sub(hn::Set(d, 1.0f), first);
+    for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, hn::Set(d, rows[i]));
+    for (std::size_t k = 1; k < last; ++k) {
+        const Vec<D> weight = hn::Load(d, weights + kLanes * k);
+        left = hn::Sub(left, weight);
+        add_row(d, weight, rows + kRow * k, 0, kRow, sum);
+    }
+    add_row(d, left, rows + kRow * last, 0, kRow, sum);
     return sum;
 }
 
 /// The same for bones with scale, or with signs that depend on the weights.
-template <class Kernel, class D>
+///
+/// kMixed  the last weight is with the others
+template <class Kernel, bool kMixed, class D>
 HWY_INLINE Sum<D> blend_bones(D d, const Palette& palette, const std::int32_t* bones, std::size_t count,
                               const float* weights, const Points<D>& rest) {
     Sum<D> sum;
     for (auto& value : sum.value) value = hn::Zero(d);
+    Vec<D> left = hn::Set(d, 1.0f);
     for (std::size_t k = 0; k < count; ++k) {
-        Kernel::add(d, palette, static_cast<std::size_t>(bones[k]), hn::Load(d, weights + kLanes * k), rest,
-                    sum);
+        const Vec<D> weight = kMixed || k + 1 < count ? hn::Load(d, weights + kLanes * k) : left;
+        left = hn::Sub(left, weight);
+        Kernel::add(d, palette, static_cast<std::size_t>(bones[k]), weight, rest, sum);
     }
     return sum;
 }
@@ -106,40 +161,57 @@ HWY_INLINE Points<D> load_rest(D d, const Frame& frame, const Block& block, std:
     return displaced(d, frame.bones_from_model->value.data(), rest);
 }
 
-/// kCount  the influences of the block, or 0 for any number
+HWY_INLINE const float* weights_of(const Frame& frame, const Block& block) {
+    return frame.mesh->rows[block.first_row].lane.data() + 3 * kLanes;
+}
+
+/// Blocks [begin, end), which have the same resolved bones.
+///
+/// kCount  their influences, or 0 for any number
 template <class Kernel, std::size_t kCount>
-void deform_resolved(const Frame& frame, std::size_t b, const float* rows) {
+void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* rows) {
     const Full d;
-    const Block& block = frame.mesh->blocks[b];
-    const float* const weights = frame.mesh->rows[block.first_row + 3].lane.data();
-    for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-        const auto sum = blend_rows<Kernel, kCount>(d, rows, block.influences, weights + lane);
-        finish_and_store<Kernel>(d, frame, b, lane, sum, load_rest(d, frame, block, lane));
+    for (std::size_t b = begin; b < end; ++b) {
+        const Block& block = frame.mesh->blocks[b];
+        const float* const weights = weights_of(frame, block);
+        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
+            const auto sum = blend_rows<kCount>(d, rows, block.influences, weights + lane);
+            finish_and_store<Kernel>(d, frame, b, lane, sum, load_rest(d, frame, block, lane));
+        }
     }
 }
 
 template <class Kernel>
-HWY_INLINE void deform_resolved(const Frame& frame, std::size_t b, const float* rows) {
-    switch (frame.mesh->blocks[b].influences) {
-        case 1: return deform_resolved<Kernel, 1>(frame, b, rows);
-        case 2: return deform_resolved<Kernel, 2>(frame, b, rows);
-        case 3: return deform_resolved<Kernel, 3>(frame, b, rows);
-        case 4: return deform_resolved<Kernel, 4>(frame, b, rows);
-        default: return deform_resolved<Kernel, 0>(frame, b, rows);
+void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end) {
+    const Full d;
+    for (std::size_t b = begin; b < end; ++b) {
+        const Block& block = frame.mesh->blocks[b];
+        const float* const weights = weights_of(frame, block);
+        const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
+        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
+            const Points<Full> rest = load_rest(d, frame, block, lane);
+            const auto sum =
+                blend_bones<Kernel, false>(d, *frame.palette, bones, block.influences, weights + lane, rest);
+            finish_and_store<Kernel>(d, frame, b, lane, sum, rest);
+        }
     }
 }
 
+/// Blocks [begin, end), which have the same bones.
 template <class Kernel>
-void deform_unresolved(const Frame& frame, std::size_t b) {
-    const Full d;
-    const Block& block = frame.mesh->blocks[b];
-    const float* const weights = frame.mesh->rows[block.first_row + 3].lane.data();
+void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    alignas(64) float rows[kMostResolved * kRow];
+    const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
-    for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-        const Points<Full> rest = load_rest(d, frame, block, lane);
-        const auto sum =
-            blend_bones<Kernel>(d, *frame.palette, bones, block.influences, weights + lane, rest);
-        finish_and_store<Kernel>(d, frame, b, lane, sum, rest);
+    if (!resolve<Kernel>(*frame.palette, bones, block.influences, rows)) {
+        return deform_unresolved<Kernel>(frame, begin, end);
+    }
+    switch (block.influences) {
+        case 1: return deform_resolved<Kernel, 1>(frame, begin, end, rows);
+        case 2: return deform_resolved<Kernel, 2>(frame, begin, end, rows);
+        case 3: return deform_resolved<Kernel, 3>(frame, begin, end, rows);
+        case 4: return deform_resolved<Kernel, 4>(frame, begin, end, rows);
+        default: return deform_resolved<Kernel, 0>(frame, begin, end, rows);
     }
 }
 
@@ -148,12 +220,12 @@ template <class Kernel>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
     const Block& block = frame.mesh->blocks[b];
-    const float* const weights = frame.mesh->rows[block.first_row + 3].lane.data();
+    const float* const weights = weights_of(frame, block);
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const Points<One> rest = load_rest(d, frame, block, lane);
-        const auto sum = blend_bones<Kernel>(d, *frame.palette, bones + block.influences * lane,
-                                             block.influences, weights + lane, rest);
+        const auto sum = blend_bones<Kernel, true>(d, *frame.palette, bones + block.influences * lane,
+                                                   block.influences, weights + lane, rest);
         finish_and_store<Kernel>(d, frame, b, lane, sum, rest);
     }
 }
@@ -164,8 +236,8 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 /// are then turned into lanes.
 template <class Kernel>
 void deform_mixed(const Frame& frame, std::size_t b) {
-    const hn::CappedTag<float, 4> four;
-    using V4 = Vec<hn::CappedTag<float, 4>>;
+    const Four four;
+    using V4 = Vec<Four>;
     const Block& block = frame.mesh->blocks[b];
     const Lanes<float>* const weights = &frame.mesh->rows[block.first_row + 3];
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
@@ -176,10 +248,8 @@ void deform_mixed(const Frame& frame, std::size_t b) {
         for (std::size_t k = 0; k < block.influences; ++k, ++bones) {
             const Quad* const row = &frame.palette->bones[kRowQuads * static_cast<std::size_t>(*bones)];
             const V4 weight = hn::Set(four, weights[k].lane[lane]);
-            V4 dot = hn::Mul(hn::Load(four, row->value.data()), sum[0]);
-            dot = hn::Add(dot, hn::Shuffle1032(dot));
-            dot = hn::Add(dot, hn::Shuffle2301(dot));
-            const V4 side = hn::IfThenElse(hn::Lt(dot, hn::Zero(four)), hn::Neg(weight), weight);
+            const V4 cosine = dot(hn::Load(four, row->value.data()), sum[0]);
+            const V4 side = hn::IfThenElse(hn::Lt(cosine, hn::Zero(four)), hn::Neg(weight), weight);
             for (std::size_t q = 0; q < kRowQuads; ++q) {
                 sum[q] = hn::MulAdd(q < Kernel::kSignedQuads ? side : weight,
                                     hn::Load(four, row[q].value.data()), sum[q]);
@@ -209,29 +279,17 @@ void deform_mixed(const Frame& frame, std::size_t b) {
 
 template <class Kernel>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
-    alignas(64) float rows[kMostResolved * kRow];
-    const Block* of_rows = nullptr;
-    const float* resolved = nullptr;
-    for (std::size_t b = begin; b < end; ++b) {
+    const bool scaled = !frame.palette->has_scale.empty();
+    for (std::size_t b = begin; b < end;) {
         const Block& block = frame.mesh->blocks[b];
-        if (block.influences == 0) {
-            keep_block(frame, b);
-        } else if (!block.mixed) {
-            if (of_rows == nullptr || of_rows->first_bone != block.first_bone) {
-                of_rows = &block;
-                const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
-                resolved = resolve<Kernel>(*frame.palette, bones, block.influences, rows) ? rows : nullptr;
-            }
-            if (resolved != nullptr) {
-                deform_resolved<Kernel>(frame, b, resolved);
-            } else {
-                deform_unresolved<Kernel>(frame, b);
-            }
-        } else if (!frame.palette->has_scale.empty()) {
-            deform_one_by_one<Kernel>(frame, b);
-        } else {
-            deform_mixed<Kernel>(frame, b);
+        if (block.mixed) {
+            scaled ? deform_one_by_one<Kernel>(frame, b) : deform_mixed<Kernel>(frame, b);
+            ++b;
+            continue;
         }
+        const std::size_t after = end_of_set(frame, b, end);
+        block.influences == 0 ? keep_blocks(frame, b, after) : deform_set<Kernel>(frame, b, after);
+        b = after;
     }
 }
 

@@ -8,6 +8,21 @@
 
 namespace sinew {
 
+/// How far squares of lengths and dot products of a rotation's columns may be from 1 and 0.
+inline constexpr double kOrthonormal = 1e-5;
+
+/// Whether the axes of a bone at rest are of unit length: to twice kOrthonormal, which leaves room below the
+/// size that counts as scale.
+template <class T>
+[[nodiscard]] bool has_unit_axes(const Affine<T>& rest_bone) noexcept {
+    bool unit = true;
+    for (int i = 0; i < 3; ++i) {
+        const Vec3<T>& axis = rest_bone.linear[i];
+        unit = unit && std::abs(glm::dot(axis, axis) - T(1)) < T(2 * kOrthonormal);
+    }
+    return unit;
+}
+
 /// posed_from_rest = rigid * scale.
 template <class T>
 struct ScaleSplit {
@@ -96,18 +111,12 @@ template <class T>
     const Mat3<T>& c = posed_from_rest.linear;
     bool orthonormal = true;
     for (int i = 0; i < 3; ++i) {
-        orthonormal = orthonormal && std::abs(glm::dot(c[i], c[i]) - T(1)) < T(1e-5) &&
-                      std::abs(glm::dot(c[i], c[(i + 1) % 3])) < T(1e-5);
+        orthonormal = orthonormal && std::abs(glm::dot(c[i], c[i]) - T(1)) < T(kOrthonormal) &&
+                      std::abs(glm::dot(c[i], c[(i + 1) % 3])) < T(kOrthonormal);
     }
-    if (orthonormal && glm::determinant(c) >= T(0)) {
-        // Axes of unit length to 1e-5 stay so to 2.5e-5, below the size that counts as scale: most bones
-        // of most frames, at a third of the cost of measuring it.
-        bool unit_rest = true;
-        for (int i = 0; i < 3; ++i) {
-            const Vec3<T>& axis = rest_bone.linear[i];
-            unit_rest = unit_rest && std::abs(glm::dot(axis, axis) - T(1)) < T(2e-5);
-        }
-        if (unit_rest) return {posed_from_rest, {}, false};
+    // Most bones of most frames, at a third of the cost of measuring the scale.
+    if (orthonormal && glm::determinant(c) >= T(0) && has_unit_axes(rest_bone)) {
+        return {posed_from_rest, {}, false};
     }
     const Affine<T> posed_bone = posed_from_rest * rest_bone;
     const Vec3<T> stretch(glm::length(posed_bone.linear[0]) - T(1), glm::length(posed_bone.linear[1]) - T(1),
