@@ -117,6 +117,23 @@ TEST_P(Kernels, agree_for_bones_turned_alike) {
     EXPECT_LT(errors(method(), scene_of_sets(1, 12, 100, 6, false, 0.2)).back(), kTolerance);
 }
 
+// Each component of the quaternion is the largest of one of them, and half a turn has w = 0.
+TEST_P(Kernels, agree_for_bones_turned_far) {
+    Scene scene;
+    for (const double degrees : {0.0, 100.0, 179.0, 180.0, 181.0, 300.0}) {
+        for (const Vec3<double> axis : {Vec3<double>(1, 0, 0), Vec3<double>(0, 1, 0), Vec3<double>(0, 0, 1),
+                                        Vec3<double>(1, 1, 0), Vec3<double>(1, -1, 1)}) {
+            const auto bone = static_cast<std::int32_t>(scene.posed_from_rest.size());
+            scene.posed_from_rest.push_back(
+                cast<float>(to_affine(QuatVec<double>{about(axis, degrees), {1, -2, 0.5}})));
+            scene.rest_bones.emplace_back();
+            for (int i = 0; i < 20; ++i)
+                scene.add_vertex(Vec3<float>(1, 0.1f * static_cast<float>(i), -1), {{bone, 1.0f}});
+        }
+    }
+    EXPECT_LT(errors(method(), scene).back(), 2 * kTolerance);
+}
+
 TEST_P(Kernels, agree_for_many_influences) {
     for (const std::size_t most : {12, 31, 32, 33, 40, 70}) {
         const Scene scene = scene_of_sets(2, 5, 40, most, false);
