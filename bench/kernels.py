@@ -1,90 +1,84 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs the measurements of the kernels, prints them as a table of ratios and keeps them as JSON."""
+"""The kernels beside plain loops: a table of ratios, and JSON."""
+
+from __future__ import annotations
 
 import argparse
 import json
-import platform
-import re
 import subprocess
-import sys
 from pathlib import Path
 
-RESULTS = Path(__file__).parent / "results"
-METHODS = ("lbs", "qv", "dq")
+import common
+
 KINDS = ("chain", "shuffled", "character")
+SIZES = (1_000, 10_000, 100_000, 1_000_000, 8_000_000)
+LOOPS = ("glm", "eigen")
 
 
-def processor():
-    try:
-        found = re.search(r"^model name\s*:\s*(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
-    except OSError:
-        found = None
-    return found.group(1) if found else platform.processor() or platform.machine()
-
-
-def run(program, repetitions, options):
+def run(program: Path, pattern: str, repetitions: int, options: list[str]) -> tuple[dict, dict]:
+    """({context}, {name: spread() of nanoseconds a call}) of the benchmarks that match `pattern`."""
     # Interleaved, so that a neighbour's load falls on all candidates alike.
     command = [
         program,
         "--benchmark_format=json",
+        f"--benchmark_filter={pattern}",
         f"--benchmark_repetitions={repetitions}",
         "--benchmark_enable_random_interleaving=true",
-        "--benchmark_min_time=0.02",
+        "--benchmark_min_time=0.005",
         *options,
     ]
     report = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
-    medians = {}
+    times = {}
     for row in report["benchmarks"]:
-        if row.get("aggregate_name") == "median":
-            medians[row["run_name"].removesuffix("/real_time")] = row["real_time"]
-    return report["context"], medians
+        if row["run_type"] == "iteration":
+            times.setdefault(row["run_name"].removesuffix("/real_time"), []).append(row["real_time"])
+    return report["context"], {name: common.spread(of) for name, of in times.items()}
 
 
-def table(medians):
-    """Lines of text; nanoseconds a vertex and ratios."""
-    lines = [f"{'':28}{'plain':>8}{'sinew':>8}{'2 threads':>11}{'sinew is':>11}{'2 are':>8}"]
-    for kind in KINDS:
-        sizes = sorted({int(name.split("/")[3]) for name in medians if f"/{kind}/" in name})
-        for size in sizes:
-            for method in METHODS:
-                key = f"{method}/{kind}/{size}"
-                times = [medians.get(f"{who}/{key}") for who in ("plain", "sinew1", "sinew2")]
-                if None in times:
-                    continue
-                plain, one, two = (time / size for time in times)
-                lines.append(
-                    f"{kind:10}{size:>9,}  {method:7}{plain:8.2f}{one:8.2f}{two:11.2f}"
-                    f"{plain / one:9.1f} x{one / two:6.2f} x"
-                )
-    for name, time in medians.items():
-        if name.startswith(("bind/", "rest/")):
-            size = int(name.split("/")[3])
-            lines.append(f"{name:40}{time / 1e6:8.2f} ms, {time / size:.1f} ns a vertex")
-    if "pool" in medians:
-        lines.append(f"{'a call of the thread pool':40}{medians['pool'] / 1e3:8.2f} us")
+def rows(kind: str, size: int, times: dict) -> list[str]:
+    lines = []
+    for method in common.METHODS:
+        of = {who: times[f"{who}/{method}/{kind}/{size}"] for who in (*LOOPS, "sinew1", "sinew2")}
+        glm, eigen, one, two = (spread["least"] / size for spread in of.values())
+        lines.append(
+            f"{kind:10}{size:>10,}  {method:5}{glm:8.2f}{eigen:8.2f}{one:8.2f}{two:8.2f}"
+            f"{glm / one:9.1f} x{eigen / one:8.1f} x{one / two:8.2f} x"
+        )
     return lines
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("program", type=Path)
-    parser.add_argument("--repetitions", type=int, default=9)
+    parser.add_argument("--quick", action="store_true", help="100,000 vertices only")
     parser.add_argument("--name", default="kernels", help="of the file in bench/results")
-    arguments, options = parser.parse_known_args()
-    context, medians = run(arguments.program, arguments.repetitions, options)
-    machine = {
-        "processor": processor(),
-        "system": platform.platform(),
-        **{key: context[key] for key in ("num_cpus", "load_avg", "simd", "compiler", "flags", "plain_flags")},
-    }
-    print(*(f"{key}: {value}" for key, value in machine.items()), sep="\n")
-    print("\nnanoseconds a vertex, medians; 'plain' is the loop over glm of bench/plain_loops.cpp\n")
-    print(*table(medians), sep="\n")
-    RESULTS.mkdir(exist_ok=True)
-    path = RESULTS / f"{arguments.name}.json"
-    path.write_text(json.dumps({"machine": machine, "median_ns_a_call": medians}, indent=1) + "\n")
-    print(f"\n{path}")
+    parser.add_argument("--simd", help="another instruction set than the best")
+    arguments = parser.parse_args()
+    options = [f"--simd={arguments.simd}"] if arguments.simd else []
+    context, times = run(arguments.program, "^pool", 5, options)
+    facts = common.machine() | {key: context[key] for key in ("simd", "compiler", "flags", "plain_flags")}
+    common.heading("kernels", facts)
+    print("Nanoseconds a vertex, the least of many runs. The loops are one's first with GLM and with Eigen,")
+    print("of four influences always, with plain_flags; ours is built as it is shipped.\n")
+    head = f"{'glm':>8}{'eigen':>8}{'sinew':>8}{'2 thr.':>8}{'than glm':>11}{'eigen':>10}{'2 threads':>10}"
+    print(f"{'':27}{head}")
+    for kind in KINDS:
+        for size in (100_000,) if arguments.quick else SIZES:
+            if size > 1_000_000 and kind != "chain":
+                continue
+            repetitions = 3 if size > 1_000_000 else 7 if arguments.quick else 15
+            found = run(arguments.program, f"/{kind}/{size}/", repetitions, options)[1]
+            print(*rows(kind, size, found), sep="\n", flush=True)
+            times |= found
+    print()
+    for name, time in times.items():
+        what, *scene = name.split("/")
+        if what in ("bind", "rest"):
+            text = {"bind": "binding", "rest": "new rest points"}[what]
+            print(f"{text:16}{scene[1]:10}{int(scene[2]):>10,}{time['least'] / 1e6:9.2f} ms")
+    print(f"a call of the thread pool{times['pool']['least'] / 1e3:20.2f} us")
+    common.write(arguments.name, machine=facts, nanoseconds=times)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

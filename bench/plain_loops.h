@@ -21,4 +21,13 @@ void dq(const Mesh& mesh, const std::vector<glm::dualquat>& palette, glm::vec3* 
 void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations, const std::vector<glm::vec3>& translations,
         glm::vec3* points);
 
+namespace eigen {
+
+void lbs(const Mesh& mesh, const std::vector<glm::mat4>& palette, glm::vec3* points);
+void dq(const Mesh& mesh, const std::vector<glm::dualquat>& palette, glm::vec3* points);
+void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations, const std::vector<glm::vec3>& translations,
+        glm::vec3* points);
+
+}  // namespace eigen
+
 }  // namespace plain

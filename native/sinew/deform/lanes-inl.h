@@ -119,14 +119,24 @@ HWY_INLINE void store_runs(Full, const Frame& frame, const Block& block, const P
     }
 }
 
+/// Lanes turned to points, then each by one masked store.
+///
+/// Apart from store_points, so that its stack is not that of every block.
+inline HWY_NOINLINE void scatter_points(Full d, const std::int32_t* place, Vec3<float>* points, Vec<Full> x,
+                                        Vec<Full> y, Vec<Full> z) {
+    alignas(64) float quads[4 * kLanes];
+    hn::StoreInterleaved4(x, y, z, z, d, quads);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+        _mm_mask_storeu_ps(&points[place[i]].x, 7, _mm_load_ps(quads + 4 * i));
+    }
+}
+
 #else
 
 template <class D>
 HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
     hn::StoreInterleaved3(p.x, p.y, p.z, d, to);
 }
-
-#endif
 
 /// Apart from store_points, so that its stack is not that of every block.
 template <class D>
@@ -141,6 +151,8 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* place, Vec3<float>* po
     hn::Store(z, d, zs);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) points[place[i]] = {xs[i], ys[i], zs[i]};
 }
+
+#endif
 
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
 template <class D>

@@ -8,12 +8,12 @@
 namespace sinew {
 namespace {
 
-// A block costs the same however few of its lanes are filled, and a mixed one about as much as two and a
-// half full ones. It also bounds the memory: 16 / 10 of 32 bytes a vertex at four influences.
+// A block costs the same however few of its lanes are filled: as much as two to six vertices of a mixed one,
+// by processor. It also bounds the memory: 16 / 6 of 24 bytes a vertex at four influences.
 constexpr std::size_t kFewestLanes = 6;
 
-// With more runs than this, 48 single floats are written sooner.
-constexpr std::size_t kMostRuns = 8;
+// A run takes three masked stores; with more runs than this, one for each vertex is as fast.
+constexpr std::size_t kMostRuns = 5;
 
 class BoneSets {
 public:

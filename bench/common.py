@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all measurements share: the machine's description, alternating candidates, JSON and tables."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import statistics
+import time
+from pathlib import Path
+
+RESULTS = Path(__file__).parent / "results"
+METHODS = ("lbs", "qv", "dq")
+
+
+def machine() -> dict:
+    try:
+        found = re.search(r"^model name\s*:\s*(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    except OSError:
+        found = None
+    return {
+        "processor": found.group(1) if found else platform.processor() or platform.machine(),
+        "cpus": os.cpu_count(),
+        "system": platform.platform(),
+        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
+    }
+
+
+def spread(times: list[float]) -> dict:
+    """The least and the median; a neighbour's load falls on the median, hardly on the least."""
+    return {"least": min(times), "median": statistics.median(times), "runs": len(times)}
+
+
+def alternate(candidates: dict, seconds: float, fewest: int = 3) -> dict:
+    """Calls each of {name: function} in turn, for `seconds` for each of them, at least `fewest` times:
+    {name: spread() of seconds a call}. A function may return its own measurement."""
+    for call in candidates.values():
+        call()
+    times = {name: [] for name in candidates}
+    end = time.perf_counter() + seconds * len(candidates)
+    while time.perf_counter() < end or len(next(iter(times.values()))) < fewest:
+        for name, call in candidates.items():
+            start = time.perf_counter()
+            own = call()
+            times[name].append(own if isinstance(own, float) else time.perf_counter() - start)
+    return {name: spread(of) for name, of in times.items()}
+
+
+def write(name: str, **content) -> None:
+    RESULTS.mkdir(exist_ok=True)
+    path = RESULTS / f"{name}.json"
+    path.write_text(json.dumps(content, indent=1) + "\n")
+    print(f"\n{path}\n")
+
+
+def heading(text: str, facts: dict) -> None:
+    print(f"== {text} ==\n" + ", ".join(f"{key}: {value}" for key, value in facts.items()) + "\n", flush=True)
