@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew's Python package beside others that Python's registry has, on the same data in the same run."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import platform
+from importlib import metadata
+
+import common
+import numpy as np
+import sinew
+
+BONES = 100
+INFLUENCES = 4
+
+
+class Scene:
+    """A cylinder along a bent and twisted chain of bones.
+
+    rest, weights, bones: float32 [n, 3], float32 [n, 4], int32 [n, 4]; pose: float32 [bones, 4, 4]
+    """
+
+    def __init__(self, vertices: int) -> None:
+        random = np.random.default_rng(1)
+        along = np.arange(vertices) / vertices * BONES
+        turn = random.uniform(0, 2 * np.pi, vertices)
+        self.rest = np.stack([np.cos(turn), np.sin(turn), along], axis=1).astype(np.float32)
+        first = np.clip(np.floor(along) - 1, 0, BONES - INFLUENCES).astype(np.int32)
+        self.bones = first[:, None] + np.arange(INFLUENCES, dtype=np.int32)
+        away = self.bones + 0.5 - along[:, None]
+        weights = np.exp(-(away**2)) + 0.02 + 0.05 * random.random((vertices, INFLUENCES))
+        self.weights = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
+        axis = np.array([1, 2, 0.5]) / np.linalg.norm([1, 2, 0.5])
+        x, y, z = axis
+        skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        bend = np.eye(3) + np.sin(0.05) * skew + (1 - np.cos(0.05)) * skew @ skew
+        pose, matrix = [], np.eye(4)
+        for bone in range(BONES):
+            head = np.array([0, 0, bone])
+            step = np.eye(4)
+            step[:3, :3], step[:3, 3] = bend, head - bend @ head
+            matrix = matrix @ step
+            pose.append(matrix)
+        self.pose = np.array(pose, dtype=np.float32)
+
+    def deformer(self, method: str) -> sinew.Deformer:
+        count = len(self.rest)
+        offsets = np.arange(0, INFLUENCES * count + 1, INFLUENCES, dtype=np.int32)
+        return sinew.Deformer(self.rest, offsets, self.bones.ravel(), self.weights.ravel(), method)
+
+
+def rotate(quats: np.ndarray, points: np.ndarray) -> np.ndarray:
+    axis = quats[:, 1:]
+    return points + 2 * np.cross(axis, np.cross(axis, points) + quats[:, :1] * points)
+
+
+def numpy_candidates(scene: Scene) -> dict:
+    """What one writes first with numpy, all vertices at once."""
+    rest, bones, weights = scene.rest, scene.bones, scene.weights
+    poses = sinew.affine.to_quat_vec(scene.pose)
+    duals = sinew.affine.to_dual_quat(scene.pose)
+
+    def signed(quats: np.ndarray) -> np.ndarray:
+        of = quats[bones]
+        side = np.sign(np.einsum("vi,vki->vk", of[:, 0, :4], of[..., :4]))
+        return np.where(side < 0, -weights, weights)
+
+    def lbs() -> np.ndarray:
+        blend = np.einsum("vk,vkij->vij", weights, scene.pose[bones, :3])
+        return np.einsum("vij,vj->vi", blend[:, :, :3], rest) + blend[:, :, 3]
+
+    def qv() -> np.ndarray:
+        rotation = np.einsum("vk,vki->vi", signed(poses), poses[bones][..., :4])
+        rotation /= np.linalg.norm(rotation, axis=1, keepdims=True)
+        return rotate(rotation, rest) + np.einsum("vk,vki->vi", weights, poses[bones][..., 4:])
+
+    def dq() -> np.ndarray:
+        blend = np.einsum("vk,vki->vi", signed(duals), duals[bones])
+        blend /= np.linalg.norm(blend[:, :4], axis=1, keepdims=True)
+        w, v, dual_w, dual_v = blend[:, :1], blend[:, 1:4], blend[:, 4:5], blend[:, 5:]
+        return rotate(blend[:, :4], rest) + 2 * (w * dual_v - dual_w * v + np.cross(v, dual_v))
+
+    return {"lbs": {"numpy": lbs}, "qv": {"numpy": qv}, "dq": {"numpy": dq}}
+
+
+def igl_candidates(scene: Scene) -> dict:
+    igl = importlib.import_module("igl")
+    dense = np.zeros((len(scene.rest), BONES))
+    np.put_along_axis(dense, scene.bones.astype(np.int64), scene.weights, axis=1)
+    blend = igl.lbs_matrix(scene.rest.astype(np.float64), dense)
+    # A stack of transposed 3 x 4.
+    stacked = scene.pose[:, :3].astype(np.float64).transpose(0, 2, 1).reshape(-1, 3)
+    return {"lbs": {"igl lbs_matrix": lambda: blend @ stacked}}
+
+
+def usd_candidates(scene: Scene) -> dict:
+    skel = importlib.import_module("pxr.UsdSkel")
+    vt = importlib.import_module("pxr.Vt")
+    gf = importlib.import_module("pxr.Gf")
+    identity = gf.Matrix4f(1)
+    # Of row vectors.
+    pose = vt.Matrix4fArray.FromNumpy(np.ascontiguousarray(scene.pose.transpose(0, 2, 1)))
+    bones = vt.IntArray.FromNumpy(scene.bones.ravel())
+    weights = vt.FloatArray.FromNumpy(scene.weights.ravel())
+
+    def skin(method: str, serial: bool):
+        def run() -> np.ndarray:
+            # In place: the rest points are copied first, as its users have to.
+            points = vt.Vec3fArray.FromNumpy(scene.rest)
+            if not skel.SkinPoints(method, identity, pose, bones, weights, INFLUENCES, points, serial):
+                raise RuntimeError("UsdSkel.SkinPoints refused its input")
+            return np.asarray(points)
+
+        return run
+
+    return {
+        name: {"UsdSkel": skin(method, True), "UsdSkel, threads": skin(method, False)}
+        for name, method in (("lbs", "classicLinear"), ("dq", "dualQuaternion"))
+    }
+
+
+def sinew_candidates(scene: Scene) -> dict:
+    def candidate(deformer: sinew.Deformer, threads: int | None):
+        out = np.empty_like(scene.rest)
+        return lambda: deformer.deform(scene.pose, out=out, threads=threads)
+
+    return {
+        method: {
+            "sinew": candidate(scene.deformer(method), 1),
+            "sinew, threads": candidate(scene.deformer(method), None),
+        }
+        for method in common.METHODS
+    }
+
+
+PEERS = {
+    "sinew-skinning": sinew_candidates,
+    "numpy": numpy_candidates,
+    "libigl": igl_candidates,
+    "usd-core": usd_candidates,
+}
+
+
+def collect(scene: Scene) -> tuple[dict, dict, dict]:
+    """({method: {name: function}}, {distribution: version}, {distribution: why it is missing})."""
+    candidates = {method: {} for method in common.METHODS}
+    versions, missing = {}, {}
+    for distribution, make in PEERS.items():
+        try:
+            versions[distribution] = metadata.version(distribution)
+            made = make(scene)
+        except (ImportError, AttributeError) as error:
+            missing[distribution] = str(error)
+            continue
+        for method, functions in made.items():
+            candidates[method] |= functions
+    return candidates, versions, missing
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="10,000 vertices")
+    parser.add_argument("--name", default="peers", help="of the file in bench/results")
+    arguments = parser.parse_args()
+    vertices = 10_000 if arguments.quick else 100_000
+    scene = Scene(vertices)
+    candidates, versions, missing = collect(scene)
+    facts = common.machine() | {"python": platform.python_version(), **versions}
+    common.heading(f"peers, {vertices:,} vertices of {INFLUENCES} influences", facts)
+    for distribution, reason in missing.items():
+        print(f"without {distribution}: {reason}")
+    print("Nanoseconds a vertex, the least of many runs; distance from Sinew's points as a part of the size.\n")
+    size = np.ptp(scene.rest, axis=0).max()
+    results = {}
+    for method, functions in candidates.items():
+        points = {name: np.array(call()) for name, call in functions.items()}
+        for name, spread in common.alternate(functions, 0.5 if arguments.quick else 1.5).items():
+            away = float(np.abs(points[name] - points["sinew"]).max() / size)
+            spread |= {"per_vertex": spread["least"] / vertices * 1e9, "away": away}
+            results[f"{method}/{name}"] = spread
+            ratio = spread["least"] / results[f"{method}/sinew"]["least"]
+            print(f"{method:5}{name:18}{spread['per_vertex']:10.2f}{ratio:10.1f} x{away:12.0e}", flush=True)
+    common.write(arguments.name, machine=facts, missing=missing, seconds=results)
+
+
+if __name__ == "__main__":
+    main()
