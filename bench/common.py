@@ -9,6 +9,7 @@ import platform
 import re
 import statistics
 import time
+from importlib import metadata
 from pathlib import Path
 
 RESULTS = Path(__file__).parent / "results"
@@ -26,6 +27,13 @@ def machine() -> dict:
         "system": platform.platform(),
         "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
     }
+
+
+def version_of(distribution: str) -> str | None:
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def spread(times: list[float]) -> dict:

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A frame in Blender: its Armature modifier beside Sinew, on the same scene in the same run.
+
+Two processes, one with the modifier and one with Sinew, take turns at a few frames. A frame is
+Scene.frame_set() and then asking for the evaluated mesh, which is where what the handler wrote arrives.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import statistics
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import common
+
+FRAMES = 60
+
+
+@dataclass(frozen=True)
+class Case:
+    """rig: a file in SINEW_RIGS instead of a tube; normals: also read; subdivision: levels behind."""
+
+    vertices: int = 1080
+    method: str = "dq"
+    characters: int = 1
+    bones: int = 100
+    influences: int = 4
+    normals: bool = False
+    subdivision: int = 0
+    rig: str = ""
+
+    @property
+    def name(self) -> str:
+        many = f"{self.characters} x " if self.characters > 1 else ""
+        what = self.rig or f"{many}{self.vertices:,} vertices"
+        normals = ", normals" if self.normals else ""
+        return what + (f", subdivision {self.subdivision}" if self.subdivision else "") + normals
+
+
+def cases(quick: bool) -> list[Case]:
+    sizes = [1_080, 13_380, 100_000] if quick else [1_080, 13_380, 25_000, 100_000, 1_000_000]
+    found = [Case(size, method) for size in sizes for method in ("dq", "lbs")]
+    found += [Case(size, method, normals=True) for size in sizes[2:] for method in ("dq", "lbs")]
+    found += [Case(characters=count, bones=50) for count in (10, 50)]
+    found.append(Case(13_380, subdivision=1))
+    folder = os.environ.get("SINEW_RIGS")
+    for name in ("human.blend", "CesiumMan.glb", "Fox.glb") if folder else ():
+        if (Path(folder) / name).exists():
+            found += [replace(Case(rig=name), method=method) for method in ("dq", "lbs")]
+    return found
+
+
+# --- In the two processes
+
+
+def make_tube(bpy, case: Case, index: int):
+    """A tube along Y, one unit a bone, each bone keyed to bend and twist; (mesh object, its armature)."""
+    import numpy as np
+
+    collection = bpy.context.scene.collection.objects
+    armature = bpy.data.objects.new(f"Rig {index}", bpy.data.armatures.new(f"Rig {index}"))
+    collection.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for bone_index in range(case.bones):
+        bone = armature.data.edit_bones.new(f"bone.{bone_index}")
+        bone.head, bone.tail = (0, bone_index, 0), (0, bone_index + 1, 0)
+        bone.parent, bone.use_connect = parent, parent is not None
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+    sides = max(4, round((case.vertices / 4) ** 0.5))
+    rings = max(2, case.vertices // sides)
+    ring, side = np.divmod(np.arange(rings * sides), sides)
+    along = ring / (rings - 1) * case.bones
+    turn = side / sides * 2 * np.pi
+    mesh = bpy.data.meshes.new(f"Tube {index}")
+    mesh.vertices.add(len(along))
+    mesh.vertices.foreach_set("co", np.stack([np.cos(turn), along, np.sin(turn)], axis=1).ravel())
+    here = (np.arange(rings - 1)[:, None] * sides + np.arange(sides)).ravel()
+    beside = (np.arange(rings - 1)[:, None] * sides + (np.arange(sides) + 1) % sides).ravel()
+    corners = np.stack([here, beside, beside + sides, here + sides], axis=1)
+    mesh.loops.add(corners.size)
+    mesh.loops.foreach_set("vertex_index", corners.ravel())
+    mesh.polygons.add(len(corners))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, corners.size, 4))
+    mesh.update(calc_edges=True)
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(corners), dtype=bool))
+    obj = bpy.data.objects.new(f"Tube {index}", mesh)
+    collection.link(obj)
+
+    first = np.clip(np.floor(along) - (case.influences - 1) // 2, 0, case.bones - case.influences).astype(int)
+    groups = [obj.vertex_groups.new(name=f"bone.{bone}") for bone in range(case.bones)]
+    for k in range(case.influences):
+        weights = np.exp(-((first + k + 0.5 - along) ** 2)) + 0.02
+        for ring_start in range(0, len(along), sides):
+            group = groups[first[ring_start] + k]
+            group.add(list(range(ring_start, ring_start + sides)), float(weights[ring_start]), "REPLACE")
+    for bone in armature.pose.bones:
+        bone.rotation_mode = "QUATERNION"
+        bone.keyframe_insert("rotation_quaternion", frame=1)
+        bone.rotation_quaternion = (1.0, 0.02, 0.05, 0.01)
+        bone.keyframe_insert("rotation_quaternion", frame=FRAMES)
+    obj.modifiers.new("Armature", "ARMATURE").object = armature
+    if case.subdivision:
+        obj.modifiers.new("Subdivision", "SUBSURF").levels = case.subdivision
+    return obj
+
+
+def open_rig(bpy, path: Path) -> list:
+    """The meshes of a rig that its armature deforms; every bone keyed, so that none of a frame is idle."""
+    if path.suffix == ".blend":
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+    else:
+        bpy.ops.import_scene.gltf(filepath=str(path))
+    meshes, armatures = [], set()
+    for obj in bpy.context.view_layer.objects:
+        modifiers = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object is not None]
+        if obj.type == "MESH" and modifiers:
+            meshes.append(obj)
+            armatures.add(modifiers[0].object)
+    for armature in armatures:
+        armature.animation_data_clear()
+        for bone in armature.pose.bones:
+            bone.rotation_mode = "QUATERNION"
+            bone.keyframe_insert("rotation_quaternion", frame=1)
+            bone.rotation_quaternion = (1.0, 0.1, 0.15, 0.05)
+            bone.keyframe_insert("rotation_quaternion", frame=FRAMES)
+    return meshes
+
+
+class Worker:
+    """One of the two processes."""
+
+    def __init__(self, with_sinew: bool) -> None:
+        import bpy
+
+        self.bpy = bpy
+        self.with_sinew = with_sinew
+        self.handler_times: list[float] = []
+        if with_sinew:
+            import sinew_addon
+
+            sinew_addon.register()
+            self.end = sinew_addon.unregister
+            self._time_handlers()
+        else:
+            self.end = lambda: None
+
+    def _time_handlers(self) -> None:
+        handlers = self.bpy.app.handlers.frame_change_post
+        for index, function in enumerate(handlers):
+            if not function.__module__.startswith("sinew_addon"):
+                continue
+
+            def timed(*arguments, function=function):
+                start = time.perf_counter()
+                function(*arguments)
+                self.handler_times.append(time.perf_counter() - start)
+
+            # Blender takes handlers off at the next file without this mark.
+            self.bpy.app.handlers.persistent(timed)
+            handlers[index] = timed
+
+    def open(self, case: Case) -> dict:
+        bpy = self.bpy
+        self.case = case
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        if case.rig:
+            self.meshes = open_rig(bpy, Path(os.environ["SINEW_RIGS"]) / case.rig)
+        else:
+            self.meshes = [make_tube(bpy, case, index) for index in range(case.characters)]
+        for obj in self.meshes:
+            for modifier in obj.modifiers:
+                if modifier.type == "ARMATURE":
+                    modifier.use_deform_preserve_volume = case.method == "dq"
+        bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, FRAMES
+        bpy.context.scene.frame_set(1)
+        if self.with_sinew:
+            for obj in self.meshes:
+                with bpy.context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
+                    bpy.ops.sinew.add()
+                obj.sinew.method = case.method
+        return {"vertices": sum(len(obj.data.vertices) for obj in self.meshes), "points": self.points(FRAMES // 2)}
+
+    def frame(self, number: int) -> None:
+        bpy = self.bpy
+        bpy.context.scene.frame_set(number)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for obj in self.meshes:
+            mesh = obj.evaluated_get(depsgraph).data
+            if self.case.normals:
+                mesh.vertex_normals[0].vector.length  # noqa: B018 - Blender computes them all for the first
+            else:
+                mesh.vertices[0].co.length  # noqa: B018
+
+    def points(self, number: int):
+        """float32 [n, 3] of the first mesh: what both processes must agree on."""
+        import numpy as np
+
+        self.frame(number)
+        mesh = self.meshes[0].evaluated_get(self.bpy.context.evaluated_depsgraph_get()).data
+        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        return points
+
+    def run(self, numbers: list[int]) -> list[float]:
+        times = []
+        for number in numbers:
+            start = time.perf_counter()
+            self.frame(number)
+            times.append(time.perf_counter() - start)
+        return times
+
+    def handler(self) -> dict:
+        """Seconds in Sinew's handler for each object, at frames that change it and where it stays."""
+        count = len(self.meshes)
+        self.handler_times.clear()
+        self.run([1 + number * 7 % FRAMES for number in range(30)])
+        moving = [t / count for t in self.handler_times]
+        self.handler_times.clear()
+        self.run([FRAMES // 2] * 31)
+        staying = [t / count for t in self.handler_times[1:]]
+        return {"moving": common.spread(moving), "staying": common.spread(staying)} if moving and staying else {}
+
+
+def serve(connection: Connection, with_sinew: bool) -> None:
+    # What Blender prints is not ours to show.
+    sys.stdout = open(os.devnull, "w")
+    os.dup2(sys.stdout.fileno(), 1)
+    worker = Worker(with_sinew)
+    try:
+        while (request := connection.recv()) is not None:
+            name, *arguments = request
+            try:
+                connection.send((None, getattr(worker, name)(*arguments)))
+            except Exception as error:
+                connection.send((f"{type(error).__name__}: {error}", None))
+    finally:
+        worker.end()
+        connection.send((None, None))
+
+
+# --- In this one
+
+
+class Process:
+    def __init__(self, with_sinew: bool) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, other = context.Pipe()
+        self.process = context.Process(target=serve, args=(other, with_sinew), daemon=True)
+        self.process.start()
+
+    def ask(self, *request):
+        self.connection.send(request)
+        error, answer = self.connection.recv()
+        if error is not None:
+            raise RuntimeError(error)
+        return answer
+
+    def end(self) -> None:
+        self.connection.send(None)
+        self.process.join(20)
+
+
+def measure(case: Case, processes: dict[str, Process], seconds: float) -> dict:
+    opened = {who: process.ask("open", case) for who, process in processes.items()}
+    points = {who: answer.pop("points") for who, answer in opened.items()}
+    size = float((points["modifier"].max(axis=0) - points["modifier"].min(axis=0)).max())
+    away = float(abs(points["modifier"] - points["sinew"]).max()) / size
+    times = {who: [] for who in processes}
+    number, batch = 1, 3
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end or len(times["sinew"]) < 9:
+        numbers = [1 + (number + 7 * i) % FRAMES for i in range(batch)]
+        number += 7 * batch
+        for who, process in processes.items():
+            times[who] += process.ask("run", numbers)
+    result = {who: common.spread(of) for who, of in times.items()}
+    return asdict(case) | opened["sinew"] | result | {"away": away, "handler": processes["sinew"].ask("handler")}
+
+
+def line(name: str, result: dict) -> str:
+    modifier, sinew = result["modifier"]["median"], result["sinew"]["median"]
+    text = f"{name:38}{result['method']:4}{modifier * 1e3:9.2f}{sinew * 1e3:9.2f}{modifier / sinew:8.2f} x"
+    handler = result["handler"]
+    if handler:
+        moving, staying = handler["moving"]["median"], handler["staying"]["median"]
+        text += f"{moving * 1e6:10.0f}{staying * 1e6:10.1f}"
+    return text + f"{result['away']:10.0e}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="up to 100,000 vertices")
+    parser.add_argument("--name", default="frames", help="of the file in bench/results")
+    parser.add_argument("-k", default="", help="only cases whose line has this in it")
+    arguments = parser.parse_args()
+    facts = common.machine() | {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
+    common.heading("frames in Blender", facts)
+    print("Milliseconds from Scene.frame_set() to the evaluated mesh, medians; then microseconds of Sinew's")
+    print("handler for each object, kernel and all, where it moves and where it stays; then how far the points")
+    print("are from the modifier's, as a part of the mesh's size.\n")
+    print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
+    results, failed = {}, {}
+    processes = {"modifier": Process(False), "sinew": Process(True)}
+    for case in cases(arguments.quick):
+        name = f"{case.name} {case.method}"
+        if arguments.k not in name:
+            continue
+        try:
+            result = measure(case, processes, 2.0 if arguments.quick else 4.0)
+        except (RuntimeError, EOFError) as error:
+            failed[name] = str(error)
+            print(f"{case.name:38}{case.method:4}  not measured: {error}", flush=True)
+            continue
+        results[name] = result
+        print(line(case.name, result), flush=True)
+    for process in processes.values():
+        process.end()
+    common.write(arguments.name, machine=facts, failed=failed, seconds=results)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plain_loops.h"
+#include "sinew/deform/deformer.h"
+
+namespace sinew::bench {
+
+enum class Kind {
+    chain,      // vertices along a cylinder
+    shuffled,   // the same, in random order within windows of 4096
+    character,  // 1 to 4 influences, 1.85 in the mean, in patches of some dozens of vertices
+};
+inline constexpr const char* kKindNames[] = {"chain", "shuffled", "character"};
+
+struct Shape {
+    Kind kind = Kind::chain;
+    std::size_t vertices = 100'000;
+    std::size_t bones = 100;
+    std::size_t influences = 4;  // of chain and shuffled
+    auto operator<=>(const Shape&) const = default;
+};
+
+inline constexpr std::size_t kMostInfluences = 8;
+
+/// A mesh, its weights and a pose, for ours and for the plain loops.
+struct Scene {
+    plain::Mesh plain;
+    std::vector<std::int32_t> offsets{0};
+    std::vector<std::int32_t> bones;
+    std::vector<float> weights;
+    std::vector<Affine<float>> pose;
+    std::vector<glm::mat4> matrices;
+    std::vector<glm::dualquat> dual_quats;
+    std::vector<glm::quat> rotations;
+    std::vector<glm::vec3> translations;
+    std::vector<Vec3<float>> points;
+
+    BindData data() const { return {plain.rest_points, offsets, bones, weights, {}}; }
+
+    /// of, share  [count]; the plain loops see the first four
+    void add_vertex(const glm::vec3& rest, std::size_t count, const std::size_t* of, const float* share);
+};
+
+Scene make_scene(const Shape& shape);
+
+}  // namespace sinew::bench
