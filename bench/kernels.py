@@ -24,7 +24,7 @@ def run(program: Path, pattern: str, repetitions: int, options: list[str]) -> tu
         f"--benchmark_filter={pattern}",
         f"--benchmark_repetitions={repetitions}",
         "--benchmark_enable_random_interleaving=true",
-        "--benchmark_min_time=0.005",
+        "--benchmark_min_time=0.001",
         *options,
     ]
     report = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
@@ -66,7 +66,7 @@ def main() -> None:
         for size in (100_000,) if arguments.quick else SIZES:
             if size > 1_000_000 and kind != "chain":
                 continue
-            repetitions = 3 if size > 1_000_000 else 7 if arguments.quick else 15
+            repetitions = 5 if size > 1_000_000 else 20 if arguments.quick else 60
             found = run(arguments.program, f"/{kind}/{size}/", repetitions, options)[1]
             print(*rows(kind, size, found), sep="\n", flush=True)
             times |= found

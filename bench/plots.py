@@ -19,41 +19,49 @@ MARKERS = {"lbs": "o", "qv": "s", "dq": "^"}
 INFLUENCES = ("1", "2", "3", "4", "6", "8", "mixed")
 BONES = (10, 30, 100, 300, 1000)
 VERTICES = 100_000
+# What people call Highway's AVX3.
+SETS = {"AVX3": "AVX-512"}
 
 
 def pairs() -> list[tuple[str, int]]:
     return [(influences, 100) for influences in INFLUENCES] + [("4", bones) for bones in BONES if bones != 100]
 
 
-def costs(program: Path, options: list[str]) -> tuple[dict, dict]:
+def costs(program: Path, simd: str | None) -> tuple[dict, dict]:
     """({context}, {"method/influences/bones": nanoseconds a vertex}), the least of many runs."""
     context, found = {}, {}
+    options = [f"--simd={simd}"] if simd else []
     for influences, bones in pairs():
-        context, times = kernels.run(program, f"^cost/[a-z]*/{influences}/{bones}/", 40, options)
+        context, times = kernels.run(program, f"^cost/[a-z]*/{influences}/{bones}/", 100, options)
         for name, spread in times.items():
             found[name.removeprefix("cost/")] = spread["least"] / VERTICES
     return context, found
 
 
-def draw(name: str, label: str, ticks: list, positions: list, keys, found: dict, logarithmic: bool) -> None:
-    figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
-    for method in common.METHODS:
-        values = [found[f"{method}/{key}"] for key in keys]
-        joined = [i for i, tick in enumerate(ticks) if tick != "mixed"]
-        style = {"color": COLOURS[method], "marker": MARKERS[method]}
-        axes.plot([positions[i] for i in joined], [values[i] for i in joined], label=method, **style)
-        for i in set(range(len(ticks))) - set(joined):
-            axes.plot(positions[i], values[i], linestyle="none", **style)
-    if logarithmic:
-        axes.set_xscale("log")
-        axes.minorticks_off()
-    axes.set_xticks(positions, [str(tick) for tick in ticks])
-    axes.set_xlabel(label)
-    axes.set_ylabel("nanoseconds a vertex")
-    axes.set_ylim(bottom=0)
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, ncols=3, loc="upper left")
+def draw(name: str, label: str, ticks: tuple, positions: tuple, keys: list[str], found: dict) -> None:
+    """A panel for each instruction set, on one scale."""
+    figure, panels = plt.subplots(
+        1, len(found), figsize=(4.2 * len(found), 3.4), layout="constrained", sharey=True, squeeze=False
+    )
+    for axes, (simd, costs_of) in zip(panels[0], found.items(), strict=True):
+        for method in common.METHODS:
+            values = [costs_of[f"{method}/{key}"] for key in keys]
+            joined = [i for i, tick in enumerate(ticks) if tick != "mixed"]
+            style = {"color": COLOURS[method], "marker": MARKERS[method]}
+            axes.plot([positions[i] for i in joined], [values[i] for i in joined], label=method, **style)
+            for i in set(range(len(ticks))) - set(joined):
+                axes.plot(positions[i], values[i], linestyle="none", **style)
+        if positions is BONES:
+            axes.set_xscale("log")
+            axes.minorticks_off()
+        axes.set_xticks(positions, [f"{tick:,}" if tick in BONES else tick for tick in ticks])
+        axes.set_xlabel(label)
+        axes.set_ylim(bottom=0)
+        axes.set_title(SETS.get(simd, simd), fontsize="medium")
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0][0].set_ylabel("nanoseconds a vertex")
+    panels[0][0].legend(frameon=False, loc="upper left")
     path = DOCS / f"{name}.svg"
     # Without a date, so that the same figures make the same file.
     figure.savefig(path, metadata={"Date": None})
@@ -62,12 +70,12 @@ def draw(name: str, label: str, ticks: list, positions: list, keys, found: dict,
 
 
 def table(found: dict) -> list[str]:
-    head = ["influences", "bones", *common.METHODS, "qv / lbs", "dq / lbs"]
+    sets = [f"{method}, {SETS.get(simd, simd)}" for simd in found for method in common.METHODS]
+    head = ["influences", "bones", *sets]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for influences, bones in pairs():
-        lbs, qv, dq = (found[f"{method}/{influences}/{bones}"] for method in common.METHODS)
-        ratios = f"{qv / lbs:.2f} | {dq / lbs:.2f}"
-        lines.append(f"| {influences} | {bones:,} | {lbs:.2f} | {qv:.2f} | {dq:.2f} | {ratios} |")
+        costs_of = [of[f"{method}/{influences}/{bones}"] for of in found.values() for method in common.METHODS]
+        lines.append(" | ".join([f"| {influences}", f"{bones:,}", *(f"{cost:.2f}" for cost in costs_of)]) + " |")
     return lines
 
 
@@ -75,18 +83,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("program", type=Path)
     parser.add_argument("--name", default="costs", help="of the file in bench/results")
-    parser.add_argument("--simd", help="another instruction set than the best")
     arguments = parser.parse_args()
     plt.rcParams["svg.hashsalt"] = "sinew"
-    context, found = costs(arguments.program, [f"--simd={arguments.simd}"] if arguments.simd else [])
-    facts = common.machine() | {key: context[key] for key in ("simd", "compiler", "flags")}
-    common.heading(f"cost of a vertex, {VERTICES:,} vertices, one thread", facts)
+    context, best = costs(arguments.program, None)
+    found = {context["simd"]: best}
+    if context["simd"] == "AVX3":
+        found["AVX2"] = costs(arguments.program, "AVX2")[1]
+    facts = common.machine() | {key: context[key] for key in ("compiler", "flags")}
+    common.heading(f"nanoseconds a vertex, {VERTICES:,} vertices, one thread", facts)
     print(*table(found), sep="\n")
     print()
-    draw("cost-of-influences", "influences a vertex, of 100 bones; mixed: 1 to 4, 1.85 in the mean",
-         list(INFLUENCES), [1, 2, 3, 4, 6, 8, 9.5], [f"{i}/100" for i in INFLUENCES], found, False)
-    draw("cost-of-bones", "bones, at 4 influences a vertex", list(BONES), list(BONES),
-         [f"4/{bones}" for bones in BONES], found, True)
+    draw(
+        "cost-of-influences",
+        "influences a vertex, of 100 bones",
+        INFLUENCES,
+        (1, 2, 3, 4, 6, 8, 9.5),
+        [f"{influences}/100" for influences in INFLUENCES],
+        found,
+    )
+    draw("cost-of-bones", "bones, at 4 influences a vertex", BONES, BONES, [f"4/{b}" for b in BONES], found)
     common.write(arguments.name, machine=facts, nanoseconds=found)
 
 

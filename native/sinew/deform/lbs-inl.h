@@ -164,6 +164,10 @@ inline void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
             case 2: deform_set<2>(frame, b, after); break;
             case 3: deform_set<3>(frame, b, after); break;
             case 4: deform_set<4>(frame, b, after); break;
+            case 5: deform_set<5>(frame, b, after); break;
+            case 6: deform_set<6>(frame, b, after); break;
+            case 7: deform_set<7>(frame, b, after); break;
+            case 8: deform_set<8>(frame, b, after); break;
             default: deform_set<0>(frame, b, after); break;
         }
         b = after;
