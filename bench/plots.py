@@ -56,12 +56,12 @@ def draw(name: str, label: str, ticks: tuple, positions: tuple, keys: list[str],
             axes.minorticks_off()
         axes.set_xticks(positions, [f"{tick:,}" if tick in BONES else tick for tick in ticks])
         axes.set_xlabel(label)
-        axes.set_ylim(bottom=0)
         axes.set_title(SETS.get(simd, simd), fontsize="medium")
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
+    panels[0][0].set_ylim(bottom=0)
     panels[0][0].set_ylabel("nanoseconds a vertex")
-    panels[0][0].legend(frameon=False, loc="upper left")
+    panels[0][0].legend(frameon=False, loc="lower right")
     path = DOCS / f"{name}.svg"
     # Without a date, so that the same figures make the same file.
     figure.savefig(path, metadata={"Date": None})

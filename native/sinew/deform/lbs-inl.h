@@ -26,17 +26,24 @@ HWY_INLINE V in_register(V v) {
     return v;
 }
 
-/// What the bone with these columns adds to `p`.
-template <class D>
-HWY_INLINE Points<D> moved_by(D d, const float* columns, const Points<D>& p) {
-    const Vec<D> x = hn::MulAdd(hn::Set(d, columns[8]), p.z, hn::Set(d, columns[12]));
-    const Vec<D> y = hn::MulAdd(hn::Set(d, columns[9]), p.z, hn::Set(d, columns[13]));
-    const Vec<D> z = hn::MulAdd(hn::Set(d, columns[10]), p.z, hn::Set(d, columns[14]));
-    const Vec<D> x2 = hn::MulAdd(hn::Set(d, columns[4]), p.y, x);
-    const Vec<D> y2 = hn::MulAdd(hn::Set(d, columns[5]), p.y, y);
-    const Vec<D> z2 = hn::MulAdd(hn::Set(d, columns[6]), p.y, z);
-    return {hn::MulAdd(hn::Set(d, columns[0]), p.x, x2), hn::MulAdd(hn::Set(d, columns[1]), p.x, y2),
-            hn::MulAdd(hn::Set(d, columns[2]), p.x, z2)};
+/// Adds to each of kVectors `sum` what the bone with these columns adds to its weight's part of `p`.
+template <std::size_t kVectors, class D>
+HWY_INLINE void add_bone(D d, const float* columns, const Vec<D>* weight, const Points<D>* p,
+                         Points<D>* sum) {
+    // Coordinate by coordinate, so that few of the bone's numbers are in registers at once.
+    const auto add_along = [&](std::size_t row, Vec<D> Points<D>::*axis) HWY_ATTR {
+        const Vec<D> x = hn::Set(d, columns[row]);
+        const Vec<D> y = hn::Set(d, columns[4 + row]);
+        const Vec<D> z = hn::Set(d, columns[8 + row]);
+        const Vec<D> shift = hn::Set(d, columns[12 + row]);
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            const Vec<D> moved = hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, shift)));
+            sum[v].*axis = hn::MulAdd(weight[v], moved, sum[v].*axis);
+        }
+    };
+    add_along(0, &Points<D>::x);
+    add_along(1, &Points<D>::y);
+    add_along(2, &Points<D>::z);
 }
 
 /// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
@@ -52,25 +59,22 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, std::size_t b, std::size_t
     const std::size_t last = (kCount > 0 ? kCount : block.influences) - 1;
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
+    Vec<D> weight[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, rows, lane + v * step);
     for (std::size_t k = 0; k < last; ++k) {
         const float* const columns = columns_of(k);
         const float* const weights = rows[3 + k].lane.data() + lane;
-        for (std::size_t v = 0; v < kVectors; ++v) {
-            const Vec<D> weight = in_register(hn::Load(d, weights + v * step));
-            sum[v] = add_scaled<D>(sum[v], weight, moved_by(d, columns, p[v]));
-        }
+        for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
+        add_bone<kVectors>(d, columns, weight, p, sum);
     }
-    const float* const columns = columns_of(last);
     for (std::size_t v = 0; v < kVectors; ++v) {
-        Vec<D> left = hn::Set(d, 1.0f);
+        weight[v] = hn::Set(d, 1.0f);
         for (std::size_t k = 0; k < last; ++k) {
-            left = hn::Sub(left, hn::Load(d, rows[3 + k].lane.data() + lane + v * step));
+            weight[v] = hn::Sub(weight[v], hn::Load(d, rows[3 + k].lane.data() + lane + v * step));
         }
-        const Points<D> moved = moved_by(d, columns, p[v]);
-        sum[v] = kCount == 1 ? add<D>(sum[v], moved) : add_scaled<D>(sum[v], left, moved);
-        store_points(d, frame, b, lane + v * step, sum[v]);
     }
+    add_bone<kVectors>(d, columns_of(last), weight, p, sum);
+    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, frame, b, lane + v * step, sum[v]);
 }
 
 HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
@@ -141,7 +145,7 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
         Points<One> sum = p;
         for (std::size_t k = 0; k < block.influences; ++k) {
             const Vec<One> weight = hn::Load(d, rows[3 + k].lane.data() + lane);
-            sum = add_scaled<One>(sum, weight, moved_by(d, columns_of_bone(frame, bones[k]), p));
+            add_bone<1>(d, columns_of_bone(frame, bones[k]), &weight, &p, &sum);
         }
         store_points(d, frame, b, lane, sum);
     }
