@@ -41,18 +41,22 @@ def spread(times: list[float]) -> dict:
     return {"least": min(times), "median": statistics.median(times), "runs": len(times)}
 
 
-def alternate(candidates: dict, seconds: float, fewest: int = 3) -> dict:
-    """Calls each of {name: function} in turn, for `seconds` for each of them, at least `fewest` times:
-    {name: spread() of seconds a call}. A function may return its own measurement."""
-    for call in candidates.values():
-        call()
+def alternate(candidates: dict, seconds: float) -> dict:
+    """Calls each of {name: function} in turn, for `seconds` for each of them: {name: spread() of seconds a
+    call}. A turn is some calls long, as each finds in the caches what the one before it has left there."""
     times = {name: [] for name in candidates}
     end = time.perf_counter() + seconds * len(candidates)
-    while time.perf_counter() < end or len(next(iter(times.values()))) < fewest:
+    while time.perf_counter() < end:
         for name, call in candidates.items():
-            start = time.perf_counter()
-            own = call()
-            times[name].append(own if isinstance(own, float) else time.perf_counter() - start)
+            turn = time.perf_counter() + 0.01
+            call()
+            while True:
+                start = time.perf_counter()
+                call()
+                now = time.perf_counter()
+                times[name].append(now - start)
+                if now > turn:
+                    break
     return {name: spread(of) for name, of in times.items()}
 
 

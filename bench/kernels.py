@@ -15,8 +15,11 @@ SIZES = (1_000, 10_000, 100_000, 1_000_000, 8_000_000)
 LOOPS = ("glm", "eigen")
 
 
-def run(program: Path, pattern: str, repetitions: int, options: list[str]) -> tuple[dict, dict]:
-    """({context}, {name: spread() of nanoseconds a call}) of the benchmarks that match `pattern`."""
+def run(
+    program: Path, pattern: str, repetitions: int, options: list[str], seconds: float = 0.001
+) -> tuple[dict, dict]:
+    """({context}, {name: spread() of nanoseconds a call}) of the benchmarks that match `pattern`; a repetition
+    is as many calls as fill `seconds`."""
     # Interleaved, so that a neighbour's load falls on all candidates alike.
     command = [
         program,
@@ -24,7 +27,7 @@ def run(program: Path, pattern: str, repetitions: int, options: list[str]) -> tu
         f"--benchmark_filter={pattern}",
         f"--benchmark_repetitions={repetitions}",
         "--benchmark_enable_random_interleaving=true",
-        "--benchmark_min_time=0.001",
+        f"--benchmark_min_time={seconds}",
         *options,
     ]
     report = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
@@ -66,8 +69,12 @@ def main() -> None:
         for size in (100_000,) if arguments.quick else SIZES:
             if size > 1_000_000 and kind != "chain":
                 continue
-            repetitions = 5 if size > 1_000_000 else 20 if arguments.quick else 60
-            found = run(arguments.program, f"/{kind}/{size}/", repetitions, options)[1]
+            # Short, so that some are whole without an interruption; large meshes need more calls to find
+            # their data where the last one left it.
+            repetitions, seconds = {1_000_000: (40, 0.005), 8_000_000: (8, 0.05)}.get(size, (60, 0.001))
+            if arguments.quick:
+                repetitions = 20
+            found = run(arguments.program, f"/{kind}/{size}/", repetitions, options, seconds)[1]
             print(*rows(kind, size, found), sep="\n", flush=True)
             times |= found
     print()

@@ -92,7 +92,8 @@ def igl_candidates(scene: Scene) -> dict:
     blend = igl.lbs_matrix(scene.rest.astype(np.float64), dense)
     # A stack of transposed 3 x 4.
     stacked = scene.pose[:, :3].astype(np.float64).transpose(0, 2, 1).reshape(-1, 3)
-    return {"lbs": {"igl lbs_matrix": lambda: blend @ stacked}}
+    sparse = importlib.import_module("scipy.sparse").csr_matrix(blend)
+    return {"lbs": {"igl lbs_matrix": lambda: blend @ stacked, "the same, sparse": lambda: sparse @ stacked}}
 
 
 def usd_candidates(scene: Scene) -> dict:
