@@ -31,8 +31,8 @@ def compiler_of(program: Path) -> str:
 def count(program: Path) -> dict[str, int]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "callgrind.out"
-        command = ["valgrind", "--tool=callgrind", "--collect-atstart=no", f"--callgrind-out-file={out}", program]
-        done = subprocess.run(command, capture_output=True, text=True)
+        options = ["--tool=callgrind", "--collect-atstart=no", f"--callgrind-out-file={out}"]
+        done = subprocess.run(["valgrind", *options, program], capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(f"callgrind failed:\n{done.stderr}")
         counts = {}
@@ -40,7 +40,8 @@ def count(program: Path) -> dict[str, int]:
             text = path.read_text()
             name = re.search(r"^desc: Trigger: Client Request: (.*)$", text, re.MULTILINE)
             if name:
-                counts[name.group(1)] = int(re.search(r"^(?:summary|totals): (\d+)", text, re.MULTILINE).group(1))
+                total = re.search(r"^(?:summary|totals): (\d+)", text, re.MULTILINE)
+                counts[name.group(1)] = int(total.group(1))
         return dict(sorted(counts.items()))
 
 

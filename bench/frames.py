@@ -10,8 +10,6 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-import statistics
-import sys
 import time
 from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Connection
@@ -188,7 +186,8 @@ class Worker:
                 with bpy.context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
                     bpy.ops.sinew.add()
                 obj.sinew.method = case.method
-        return {"vertices": sum(len(obj.data.vertices) for obj in self.meshes), "points": self.points(FRAMES // 2)}
+        vertices = sum(len(obj.data.vertices) for obj in self.meshes)
+        return {"vertices": vertices, "points": self.points(FRAMES // 2)}
 
     def frame(self, number: int) -> None:
         bpy = self.bpy
@@ -228,13 +227,14 @@ class Worker:
         self.handler_times.clear()
         self.run([FRAMES // 2] * 31)
         staying = [t / count for t in self.handler_times[1:]]
-        return {"moving": common.spread(moving), "staying": common.spread(staying)} if moving and staying else {}
+        if not moving or not staying:
+            return {}
+        return {"moving": common.spread(moving), "staying": common.spread(staying)}
 
 
 def serve(connection: Connection, with_sinew: bool) -> None:
     # What Blender prints is not ours to show.
-    sys.stdout = open(os.devnull, "w")
-    os.dup2(sys.stdout.fileno(), 1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     worker = Worker(with_sinew)
     try:
         while (request := connection.recv()) is not None:
@@ -270,6 +270,10 @@ class Process:
         self.process.join(20)
 
 
+def start() -> dict[str, Process]:
+    return {"modifier": Process(False), "sinew": Process(True)}
+
+
 def measure(case: Case, processes: dict[str, Process], seconds: float) -> dict:
     opened = {who: process.ask("open", case) for who, process in processes.items()}
     points = {who: answer.pop("points") for who, answer in opened.items()}
@@ -283,8 +287,9 @@ def measure(case: Case, processes: dict[str, Process], seconds: float) -> dict:
         number += 7 * batch
         for who, process in processes.items():
             times[who] += process.ask("run", numbers)
-    result = {who: common.spread(of) for who, of in times.items()}
-    return asdict(case) | opened["sinew"] | result | {"away": away, "handler": processes["sinew"].ask("handler")}
+    spreads = {who: common.spread(of) for who, of in times.items()}
+    handler = processes["sinew"].ask("handler")
+    return asdict(case) | opened["sinew"] | spreads | {"away": away, "handler": handler}
 
 
 def line(name: str, result: dict) -> str:
@@ -305,21 +310,27 @@ def main() -> None:
     arguments = parser.parse_args()
     facts = common.machine() | {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
     common.heading("frames in Blender", facts)
-    print("Milliseconds from Scene.frame_set() to the evaluated mesh, medians; then microseconds of Sinew's")
-    print("handler for each object, kernel and all, where it moves and where it stays; then how far the points")
-    print("are from the modifier's, as a part of the mesh's size.\n")
+    print(
+        "Milliseconds from Scene.frame_set() to the evaluated mesh, medians; microseconds of Sinew's handler"
+    )
+    print(
+        "for each object, kernel and all, where it moves and where it stays; how far the points are from the"
+    )
+    print("modifier's, as a part of the mesh's size.\n")
     print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
     results, failed = {}, {}
-    processes = {"modifier": Process(False), "sinew": Process(True)}
+    processes = start()
     for case in cases(arguments.quick):
         name = f"{case.name} {case.method}"
         if arguments.k not in name:
             continue
         try:
             result = measure(case, processes, 2.0 if arguments.quick else 4.0)
-        except (RuntimeError, EOFError) as error:
-            failed[name] = str(error)
-            print(f"{case.name:38}{case.method:4}  not measured: {error}", flush=True)
+        except (RuntimeError, EOFError, OSError) as error:
+            failed[name] = str(error) or "Blender ended"
+            print(f"{case.name:38}{case.method:4}  not measured: {failed[name]}", flush=True)
+            if not isinstance(error, RuntimeError):
+                processes = start()
             continue
         results[name] = result
         print(line(case.name, result), flush=True)

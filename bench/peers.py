@@ -172,7 +172,8 @@ def main() -> None:
     common.heading(f"peers, {vertices:,} vertices of {INFLUENCES} influences", facts)
     for distribution, reason in missing.items():
         print(f"without {distribution}: {reason}")
-    print("Nanoseconds a vertex, the least of many runs; distance from Sinew's points as a part of the size.\n")
+    print("Nanoseconds a vertex, the least of many runs; how far the points are from Sinew's, as a part")
+    print("of the size.\n")
     size = np.ptp(scene.rest, axis=0).max()
     results = {}
     for method, functions in candidates.items():

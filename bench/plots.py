@@ -24,7 +24,8 @@ SETS = {"AVX3": "AVX-512"}
 
 
 def pairs() -> list[tuple[str, int]]:
-    return [(influences, 100) for influences in INFLUENCES] + [("4", bones) for bones in BONES if bones != 100]
+    others = [("4", bones) for bones in BONES if bones != 100]
+    return [(influences, 100) for influences in INFLUENCES] + others
 
 
 def costs(program: Path, simd: str | None) -> tuple[dict, dict]:
@@ -74,8 +75,10 @@ def table(found: dict) -> list[str]:
     head = ["influences", "bones", *sets]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for influences, bones in pairs():
-        costs_of = [of[f"{method}/{influences}/{bones}"] for of in found.values() for method in common.METHODS]
-        lines.append(" | ".join([f"| {influences}", f"{bones:,}", *(f"{cost:.2f}" for cost in costs_of)]) + " |")
+        cells = [influences, f"{bones:,}"]
+        for costs_of in found.values():
+            cells += [f"{costs_of[f'{method}/{influences}/{bones}']:.2f}" for method in common.METHODS]
+        lines.append("| " + " | ".join(cells) + " |")
     return lines
 
 
