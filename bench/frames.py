@@ -310,13 +310,9 @@ def main() -> None:
     arguments = parser.parse_args()
     facts = common.machine() | {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
     common.heading("frames in Blender", facts)
-    print(
-        "Milliseconds from Scene.frame_set() to the evaluated mesh, medians; microseconds of Sinew's handler"
-    )
-    print(
-        "for each object, kernel and all, where it moves and where it stays; how far the points are from the"
-    )
-    print("modifier's, as a part of the mesh's size.\n")
+    print("Milliseconds from Scene.frame_set() to the evaluated mesh, medians; microseconds of Sinew's")
+    print("handler for each object, kernel and all, where it moves and where it stays; how far the points")
+    print("are from the modifier's, as a part of the mesh's size.\n")
     print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
     results, failed = {}, {}
     processes = start()

@@ -18,8 +18,9 @@ LOOPS = ("glm", "eigen")
 def run(
     program: Path, pattern: str, repetitions: int, options: list[str], seconds: float = 0.001
 ) -> tuple[dict, dict]:
-    """({context}, {name: spread() of nanoseconds a call}) of the benchmarks that match `pattern`. A repetition
-    is as many calls as fill `seconds`.
+    """({context}, {name: spread() of nanoseconds a call}) of the benchmarks that match `pattern`.
+
+    seconds  filled by the calls of a repetition
     """
     # Interleaved, so that a neighbour's load falls on all candidates alike.
     command = [
