@@ -21,9 +21,13 @@ std::atomic<int> locks{0};
 
 }  // namespace
 
-void* operator new(std::size_t size) {
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
     allocations.fetch_add(1);
-    if (void* const memory = std::malloc(std::max<std::size_t>(size, 1))) return memory;
+    return std::malloc(std::max<std::size_t>(size, 1));
+}
+
+void* operator new(std::size_t size) {
+    if (void* const memory = operator new(size, std::nothrow)) return memory;
     throw std::bad_alloc();
 }
 
