@@ -89,7 +89,7 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
         for (const std::size_t threads : {1, 4}) frame(threads);
         const int allocations_before = allocations;
         const int locks_before = locks;
-        for (int round = 0; round < 20; ++round) {
+        for (int round = 0; round < 5; ++round) {
             for (const std::size_t threads : {1, 4}) frame(threads);
         }
         EXPECT_EQ(allocations, allocations_before) << method.name;
