@@ -15,6 +15,7 @@ class Changes:
     touched    objects that were touched in any way
     objects    whose geometry was touched
     moved      that were moved
+    gated      whose modifiers rested, which touches their geometry and mesh
     meshes     whose geometry was touched: points, weights, topology, shape keys
     armatures  whose bones may differ
     structure  objects may have come, gone or been hidden
@@ -25,6 +26,7 @@ class Changes:
     touched: set[int] = field(default_factory=set)
     objects: set[int] = field(default_factory=set)
     moved: set[int] = field(default_factory=set)
+    gated: set[int] = field(default_factory=set)
     meshes: set[int] = field(default_factory=set)
     armatures: set[int] = field(default_factory=set)
     structure: bool = False

@@ -97,7 +97,7 @@ def update(
     driven.frames = frames
     rest_points = source.rest_points(obj, driven.source, depsgraph)
     if changes.frame:
-        reshaped = rest_points is not driven.rest_points
+        reshaped = driven.rest_points is not None and rest_points is not driven.rest_points
         driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
     driven.rest_points = rest_points
     if driven.chain.deform(rest_points, frames):
@@ -246,6 +246,9 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
         and read.equals_but_for_points(old.source)
         and all(b.equals(link.binding.bones) for b, link in zip(bones, old.chain.links, strict=False))
     ):
+        if np.array_equal(read.points, old.source.points):
+            # The same array tells that nothing moved.
+            read.points = old.source.points
         old.source = read
         return old
     options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]

@@ -29,11 +29,14 @@ class Gate:
                 self._resting.append((obj, modifier.name, modifier.show_viewport, modifier.show_render))
                 modifier.show_viewport = modifier.show_render = False
 
-    def open(self) -> None:
+    def open(self) -> set[int]:
+        """The session_uid of each object whose modifiers rested."""
+        gated = {obj.session_uid for obj, *_flags in self._resting}
         for obj, name, viewport, render in self._resting:
             modifier = obj.modifiers[name]
             modifier.show_viewport, modifier.show_render = viewport, render
         self._resting.clear()
+        return gated
 
 
 def is_allowed() -> bool:

@@ -152,9 +152,11 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    session.gate.open()
+    gated = session.gate.open()
     if not session.idle:
-        _update(depsgraph, _read_changes(depsgraph, frame=True))
+        changes = _read_changes(depsgraph, frame=True)
+        changes.gated = gated
+        _update(depsgraph, changes)
 
 
 @persistent

@@ -77,7 +77,7 @@ def has_changed(
     if mesh.session_uid not in changes.meshes:
         return False
     # An object that an animation moves dirties its mesh, and weights take long to read.
-    if changes.frame and obj.session_uid in changes.moved:
+    if changes.frame and obj.session_uid in changes.moved | changes.gated:
         return False
     if keys is None:
         return True
