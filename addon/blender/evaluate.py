@@ -44,13 +44,18 @@ def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy
             else "no mesh is deformed by an armature"
         )
         raise SinewError(what)
+    show(meshes)
+    return meshes
+
+
+def show(meshes: list[bpy.types.Object]) -> None:
+    """Makes meshes of the scene visible, with the collections that they are in."""
     _show_layers(bpy.context.view_layer.layer_collection)
     for obj in meshes:
         obj.hide_viewport = False
         obj.hide_render = False
         if obj.name in bpy.context.view_layer.objects:
             obj.hide_set(False)
-    return meshes
 
 
 def use_method(obj: bpy.types.Object, method: str) -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import bpy
@@ -21,8 +20,10 @@ BLEND_MAGIC = b"BLENDER"
 COMPRESSED_MAGIC = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip up to Blender 2.93
 
 
-def open_file(path: Path) -> None:
+def open_file(path: Path, load_ui: bool = False) -> None:
     """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
+
+    load_ui  with the file's own windows and workspaces, which a copy of it is to keep
 
     Raises SinewError where it can not be read. Scripts in the file do not run.
     """
@@ -30,7 +31,7 @@ def open_file(path: Path) -> None:
     try:
         importer = IMPORTERS.get(path.suffix.lower())
         if importer is None:
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=False)
         else:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
@@ -38,15 +39,13 @@ def open_file(path: Path) -> None:
         raise SinewError(f"{path}: Blender can not read it: {_telling_line(error)}") from None
 
 
-def save_copy(source: Path, target: Path) -> None:
-    """Saves the open file as `target`, compressed if `source` was; beside it first, then renamed."""
-    unfinished = target.with_name(f".{target.stem}.unfinished.blend")
+def save_copy(source: Path, target: Path, unfinished: Path) -> None:
+    """Saves the open file for `target`, compressed if `source` was, under the name `unfinished` beside it."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(
             filepath=str(unfinished), copy=True, check_existing=False, compress=_is_compressed(source)
         )
-        os.replace(unfinished, target)
     except (OSError, RuntimeError) as error:
         unfinished.unlink(missing_ok=True)
         raise SinewError(f"{target}: can not be written: {_telling_line(error)}") from None
@@ -57,6 +56,8 @@ def _check_readable(path: Path) -> None:
         raise SinewError(f"{path}: no such file")
     if path.is_dir():
         raise SinewError(f"{path}: is a folder, expected a file")
+    if not path.is_file():
+        raise SinewError(f"{path}: is a device or a pipe, expected a file")
     if path.suffix.lower() not in READABLE:
         raise SinewError(f"{path}: expected a file ending in {', '.join(READABLE)}")
     try:
