@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender behind batch/blender_process.py: a task comes in as a line of JSON, what became of it goes out."""
+"""The Blender behind batch/blender_process.py: tasks come in as lines of JSON, outcomes go out."""
 
 from __future__ import annotations
 

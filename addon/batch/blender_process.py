@@ -117,9 +117,8 @@ class BlenderProcess:
                     raise BlenderLost(f"no end after {limits.timeout:g} s while {self._doing}") from None
                 if limits.memory and self._memory() > limits.memory:
                     self.kill()
-                    raise BlenderLost(
-                        f"needed more than {limits.memory / 2**30:.3g} GiB of memory while {self._doing}"
-                    ) from None
+                    size = f"{limits.memory / 2**20:,.0f} MiB"
+                    raise BlenderLost(f"needed more than {size} of memory while {self._doing}") from None
                 continue
             if message is None:
                 raise BlenderLost(self._epitaph())

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..core.errors import WrongUse
+from .journal import UNFINISHED
 
 STANDARD_INPUT = "-"
 
@@ -60,7 +61,11 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     else:
         return path.parent, [path]
     # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
-    files = [p for p in sorted(found) if p.is_file() and not _is_below(p, out, root) and p.name[0] != "."]
+    files = [
+        p
+        for p in sorted(found)
+        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED)
+    ]
     if not files:
         raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
     return root, files

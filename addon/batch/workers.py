@@ -119,7 +119,7 @@ def do_task(
         try:
             outcome = run({**task, "unfinished": str(unfinished)}, limits)
         except BlenderLost as lost:
-            outcome = {"error": f"{source}: {lost}"}
+            outcome = {"error": f"{source}: {lost}; tried {attempt} times"}
             for left in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
                 left.unlink(missing_ok=True)
             continue

@@ -299,12 +299,18 @@ def _conclude(console: Console, action: Action, rows: list[dict], summary: dict,
     if bad:
         console.table(
             ("file", "result"),
-            [(row["source"], row.get("error") or f"left out: {'; '.join(row['left_out'])}") for row in bad],
+            [(row["source"], _reason(row)) for row in bad],
         )
     unchanged = f", {summary['unchanged']} of them before" if summary["unchanged"] else ""
     console.say(f"{len(complete)} of {len(rows)} files {action.done}{unchanged}")
     console.say(str(report))
     return 1 if bad else 0
+
+
+def _reason(row: dict) -> str:
+    if "error" in row:
+        return row["error"].removeprefix(f"{row['source']}: ")
+    return f"left as they were: {'; '.join(row['left_out'])}"
 
 
 def _count(text: str) -> int:
