@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Who does the work of a batch: Blenders on this machine, or those of a dask cluster.
 
-dask hands out the tasks either way. On this machine its scheduler and its worker are threads of this process,
-one for each Blender: those are processes already, and dask's own would only cost their start and memory.
+dask hands out the tasks either way. On this machine its scheduler and its worker are threads of this process:
+the Blenders are processes already, and dask's own would only cost their start and memory.
 """
 
 from __future__ import annotations
@@ -35,15 +35,23 @@ def versions() -> dict[str, str]:
 
 
 class _Blenders:
-    """The Blenders of this process: one for each thread at work, kept for its next file."""
+    """The Blenders of this process, each kept for its next file.
+
+    slots  as many as there may be at a time; there may be one for each thread unless this is set
+    """
 
     def __init__(self) -> None:
+        self.slots: contextlib.AbstractContextManager = contextlib.nullcontext()
         self._lock = threading.Lock()
         self._idle: list[BlenderProcess] = []
         self._busy: set[BlenderProcess] = set()
         self._stopped = False
 
     def run(self, task: dict, limits: Limits) -> dict:
+        with self.slots:
+            return self._run(task, limits)
+
+    def _run(self, task: dict, limits: Limits) -> dict:
         blender = self._take(limits)
         try:
             outcome = blender.run(task, limits)
@@ -186,10 +194,12 @@ def _client(jobs: int, scheduler: str | None) -> Iterator:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if scheduler is None:
         versions()
+        _blenders.slots = threading.Semaphore(jobs)
         with (
             distributed.LocalCluster(
                 n_workers=1,
-                threads_per_worker=jobs,
+                # Those without a Blender have a task ready for the next that is free.
+                threads_per_worker=2 * jobs,
                 processes=False,
                 memory_limit=None,
                 dashboard_address=None,

@@ -198,7 +198,7 @@ def _versions() -> dict[str, str]:
 
 
 def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings, journal: Journal) -> dict:
-    name = hashlib.blake2b(journal.name_of(job.target).encode(), digest_size=8).hexdigest()
+    name = hashlib.blake2b(os.fsencode(journal.name_of(job.target)), digest_size=8).hexdigest()
     return {
         "command": action.command,
         "source": str(job.source),
