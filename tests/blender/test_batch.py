@@ -417,21 +417,18 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
     assert unfinished_in(out) == []
 
     sample = [name for name in good if name.startswith(("names", "rig"))][::9]
-    with cluster(tmp_path) as address:
+    with Cluster(tmp_path) as cluster:
         there = tmp_path / "cluster"
         lock_folder(there / "locked")
-        run_sinew(
-            "reskin",
-            folder,
-            "--method",
-            "dq",
-            "--out",
-            there,
-            *FAST,
-            "--scheduler",
-            address,
-            status=1,
+        process = start_sinew(
+            "reskin", folder, "--method", "dq", "--out", there, *FAST, "--scheduler", cluster.address
         )
+        for _ in range(40):
+            process.stderr.readline()
+        cluster.lose_a_worker()
+        _output, errors = process.communicate(timeout=300)
+        assert process.returncode == 1, errors
+    assert unfinished_in(there) == []
     elsewhere = report_of(there)
     assert {name: row["status"] for name, row in rows.items()} == {
         name: row["status"] for name, row in elsewhere.items()
@@ -587,37 +584,34 @@ def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
     return good, broken
 
 
-class cluster:
-    """A dask scheduler and two workers, in processes of their own; its address."""
+class Cluster:
+    """A dask scheduler and two workers, in processes of their own."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
         self._processes: list[subprocess.Popen] = []
-
-    def __enter__(self) -> str:
-        address_file = self._folder / "scheduler.json"
-        options = ("--scheduler-file", str(address_file))
-        self._start("scheduler", *options, "--port", "0", "--host", "127.0.0.1", "--no-dashboard")
+        address_file = folder / "scheduler.json"
+        options = ("--scheduler-file", str(address_file), "--no-dashboard")
+        self._start("scheduler", *options, "--port", "0", "--host", "127.0.0.1")
         for _ in range(2):
-            self._start(
-                "worker",
-                *options,
-                "--nthreads",
-                "1",
-                "--no-dashboard",
-                "--local-directory",
-                str(self._folder),
-            )
+            self._start("worker", *options, "--nthreads", "1", "--local-directory", str(folder))
         end = time.monotonic() + 60
         while not address_file.exists() and time.monotonic() < end:
             time.sleep(0.1)
-        return json.loads(address_file.read_text())["address"]
+        self.address = json.loads(address_file.read_text())["address"]
+
+    def __enter__(self) -> Cluster:
+        return self
 
     def __exit__(self, *_exception: object) -> None:
         for process in reversed(self._processes):
             process.terminate()
         for process in self._processes:
             process.wait(timeout=30)
+
+    def lose_a_worker(self) -> None:
+        """Kills one with what it is at; its keeper starts another."""
+        for process in psutil.Process(self._processes[-1].pid).children():
+            process.kill()
 
     def _start(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "dask", *arguments]
