@@ -53,13 +53,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         files.open_file(source, load_ui=True)
     notes = _notes_on_file()
     with clock.doing("deforming"):
-        driven: list[tuple[bpy.types.Object, dict]] = []
-        left_out = []
-        for obj in _meant(settings, source):
-            try:
-                driven.append((obj, _drive(obj, _method_of(obj, settings))))
-            except SinewError as error:
-                left_out.append(str(error))
+        driven, left_out = _drive(_meant(settings, source), settings)
     if not driven:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
     with clock.doing("saving"):
@@ -103,23 +97,31 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
     return {"meshes": meshes, "left_out": left_out, "notes": notes, "seconds": clock.seconds}
 
 
-def _drive(obj: bpy.types.Object, method: str) -> dict:
-    """Puts Sinew on a mesh: what is to be known of it. Raises SinewError, the mesh as it was."""
-    before, was_driven = _described(obj), properties.is_driven(obj)
-    try:
-        evaluate.use_method(obj, method)
-    except SinewError:
-        if properties.is_driven(obj) and not was_driven:
-            drive.remove(obj)
-        raise
-    state = handlers.state_of(obj)
-    return {
-        "object": obj.name,
-        "vertices": len(obj.data.vertices),
-        "before": before,
-        "method": method,
-        "warnings": list(state.facts.warnings) if state is not None else [],
-    }
+def _drive(
+    objects: list[bpy.types.Object], settings: dict
+) -> tuple[list[tuple[bpy.types.Object, dict]], list[str]]:
+    """Puts Sinew on meshes: each with what is to be known of it; and why others stay as they were."""
+    before = [(_described(obj), properties.is_driven(obj)) for obj in objects]
+    wanted = [(obj, _method_of(obj, settings)) for obj in objects]
+    driven, left_out = [], []
+    for (obj, method), (way, was_driven), error in zip(
+        wanted, before, evaluate.use_methods(wanted), strict=True
+    ):
+        if error is not None:
+            left_out.append(str(error))
+            if properties.is_driven(obj) and not was_driven:
+                drive.remove(obj)
+            continue
+        state = handlers.state_of(obj)
+        mesh = {
+            "object": obj.name,
+            "vertices": len(obj.data.vertices),
+            "before": way,
+            "method": method,
+            "warnings": list(state.facts.warnings) if state is not None else [],
+        }
+        driven.append((obj, mesh))
+    return driven, left_out
 
 
 def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:
@@ -200,8 +202,7 @@ def _compare(task: dict, driven: list[tuple[bpy.types.Object, dict]], outcome: d
         evaluate.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]
-        for obj in objects:
-            evaluate.use_method(obj, evaluate.BLENDER)
+        evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
         theirs = [_points(scene, objects, frame) for frame in frames]
         worst = max(
             _deviation(mesh, frames, [p[i] for p in ours], [p[i] for p in theirs])
@@ -248,15 +249,13 @@ def _draw(
     objects = [obj for obj, _mesh in shown]
     evaluate.set_frame(scene, frame)
     before = evaluate.world_points(objects)
-    for obj, mesh in shown:
-        evaluate.use_method(obj, mesh["method"])
+    evaluate.use_methods([(obj, mesh["method"]) for obj, mesh in shown])
     view = whole_view(np.concatenate([before, evaluate.world_points(objects)]))
     stem.parent.mkdir(parents=True, exist_ok=True)
     paths = {name: stem.with_name(f"{stem.name}-{name}.png") for name in ("after", "before")}
     render.prepare(scene, objects, _engine(), PICTURE_SIZE)
     render.picture(scene, view, paths["after"])
-    for obj in objects:
-        evaluate.use_method(obj, evaluate.BLENDER)
+    evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
     render.picture(scene, view, paths["before"])
     return {"frame": frame, **{name: path.name for name, path in paths.items()}}
 

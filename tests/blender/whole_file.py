@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 
 import bpy
 import scenes
@@ -33,12 +34,16 @@ VOLATILE = {
 def of_open_file() -> dict[str, object]:
     """Path of each value -> the value."""
     found: dict[str, object] = {}
+    # Also what is to go some day is a part of the file.
+    warnings.simplefilter("ignore", DeprecationWarning)
     for collection in bpy.data.bl_rna.properties:
         # 5.0 lists all once more.
         if collection.type != "COLLECTION" or collection.identifier == "all_ids":
             continue
         for item in getattr(bpy.data, collection.identifier):
-            if isinstance(item, bpy.types.ID):
+            # The last render is this process's own.
+            is_render = isinstance(item, bpy.types.Image) and item.source == "VIEWER"
+            if isinstance(item, bpy.types.ID) and not is_render:
                 path = f"{collection.identifier}[{item.name_full}]"
                 found[path] = item.users
                 _Walk(found, item).struct(item, path)
