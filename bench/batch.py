@@ -4,8 +4,8 @@
 
     .venv/bin/python bench/batch.py [--files 48] [--repetitions 5] [--json FILE]
 
-The time of a file is the slope between a long and a short batch, so that no start counts; candidates take
-turns, and the least of each is taken, as on a shared machine only that is the machine's own.
+From the first file that is done to the last, so that no start counts; candidates take turns, and the least of
+each is taken, as on a shared machine only that is the machine's own.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import importlib.metadata
 import json
 import os
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -65,60 +66,66 @@ def plain(folder: Path) -> float:
     return number(run([sys.executable, "-c", OPEN_AND_SAVE, str(folder / "plain.out"), *paths]), "seconds")
 
 
-def batch(folder: Path, *options: str) -> tuple[float, dict[str, float]]:
-    """Seconds for a whole batch, and what of it each step took, summed over files."""
+def batch(folder: Path, *options: str) -> dict[str, float]:
+    """Seconds a file in a batch, from the first that is done to the last; and in each step of it."""
     with tempfile.TemporaryDirectory(dir=folder.parent) as out:
-        started = time.perf_counter()
-        run([*SINEW, "reskin", str(folder), "--method", "dq", "--out", out, *options])
-        seconds = time.perf_counter() - started
+        command = [*SINEW, "reskin", str(folder), "--method", "dq", "--out", out, *options]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        done = [time.perf_counter() for line in process.stderr]
+        if process.wait() != 0:
+            raise SystemExit("the batch failed")
         rows = json.loads(Path(out, "report.json").read_text(encoding="utf-8"))["files"]
-    return seconds, {
-        step: sum(row["seconds"][step] for row in rows) for step in ("opening", "deforming", "saving")
-    }
+    steps = rows[0]["seconds"]
+    found = {step: statistics.mean(row["seconds"][step] for row in rows[1:]) for step in steps}
+    return {"file": (done[-1] - done[0]) / (len(done) - 1), **found}
 
 
 def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str, float]:
-    """Milliseconds a file."""
-    short, long = work / "short", work / "long"
-    for folder, count in ((short, files // 4), (long, files)):
-        folder.mkdir()
-        for index in range(count):
-            shutil.copy(source, folder / f"{index:03d}.blend")
+    """Milliseconds a file, and ratios."""
+    folder = work / "files"
+    folder.mkdir()
+    for index in range(files):
+        shutil.copy(source, folder / f"{index:03d}.blend")
     bare = ("--frames", "none", "--no-pictures")
-    candidates = {
-        "open and save": plain,
-        "batch": lambda folder: batch(folder, *bare, "--jobs", "1")[0],
-        "batch, compared": lambda folder: batch(folder, "--no-pictures", "--jobs", "1")[0],
-        "batch, compared, pictures": lambda folder: batch(folder, "--jobs", "1")[0],
-        "batch, 2 jobs": lambda folder: batch(folder, *bare, "--jobs", "2")[0],
-        "batch, compared, 2 jobs": lambda folder: batch(folder, "--no-pictures", "--jobs", "2")[0],
+    compared = ("--no-pictures",)
+    runs: dict[str, list] = {
+        "plain": [],
+        "bare": [],
+        "bare, 2 jobs": [],
+        "compared": [],
+        "compared, 2 jobs": [],
     }
-    least: dict[tuple[str, Path], float] = {}
-    inside: list[dict[str, float]] = []
-    for repetition in range(repetitions):
-        for name, candidate in candidates.items():
-            if "pictures" in name and repetition > 0:
-                continue  # seconds, not milliseconds
-            for folder in (short, long):
-                seconds = candidate(folder)
-                least[name, folder] = min(least.get((name, folder), seconds), seconds)
-        inside.append(batch(long, *bare, "--jobs", "1")[1])
-    extra = files - files // 4
+    for _ in range(repetitions):
+        runs["plain"].append(plain(folder) / files)
+        runs["bare"].append(batch(folder, *bare, "--jobs", "1"))
+        runs["bare, 2 jobs"].append(batch(folder, *bare, "--jobs", "2"))
+        runs["compared"].append(batch(folder, *compared, "--jobs", "1"))
+        runs["compared, 2 jobs"].append(batch(folder, *compared, "--jobs", "2"))
+    drawn = batch(folder, "--jobs", "1")
+    shutil.rmtree(folder)
+
+    def least(name: str, step: str) -> float:
+        return min(run[step] for run in runs[name])
+
+    # Within each run, as what else the machine does slows down both parts of it.
+    beside = [run["file"] - run["opening"] - run["deforming"] - run["saving"] for run in runs["bare"]]
+    parts = [
+        extra / (run["opening"] + run["saving"]) for extra, run in zip(beside, runs["bare"], strict=True)
+    ]
     result = {
-        name: round(1000 * (least[name, long] - least[name, short]) / extra, 2) for name in candidates
+        "Blender opens and saves": 1000 * min(runs["plain"]),
+        "opening, in the batch": 1000 * least("bare", "opening"),
+        "saving, in the batch": 1000 * least("bare", "saving"),
+        "deforming": 1000 * least("bare", "deforming"),
+        "beside those": 1000 * min(beside),
+        "beside those, % of opening and saving": 100 * statistics.median(parts),
+        "whole, 1 job": 1000 * least("bare", "file"),
+        "comparing 9 frames": 1000 * least("compared", "comparing"),
+        "drawing 2 pictures": 1000 * drawn["drawing"],
+        "2 jobs, times as fast": least("bare", "file") / least("bare, 2 jobs", "file"),
+        "2 jobs, compared, times as fast": least("compared", "file") / least("compared, 2 jobs", "file"),
     }
-    for step in ("opening", "deforming", "saving"):
-        result[f"inside: {step}"] = round(1000 * min(times[step] for times in inside) / files, 2)
-    result["beside opening, deforming, saving"] = round(
-        result["batch"] - sum(value for name, value in result.items() if name.startswith("inside")), 2
-    )
-    result["2 jobs, times as fast"] = round(result["batch"] / result["batch, 2 jobs"], 2)
-    result["2 jobs, compared, times as fast"] = round(
-        result["batch, compared"] / result["batch, compared, 2 jobs"], 2
-    )
-    shutil.rmtree(short)
-    shutil.rmtree(long)
-    return result
+    return {name: round(value, 2) for name, value in result.items()}
 
 
 def main() -> None:

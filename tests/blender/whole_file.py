@@ -34,8 +34,6 @@ VOLATILE = {
 def of_open_file() -> dict[str, object]:
     """Path of each value -> the value."""
     found: dict[str, object] = {}
-    # Also what is to go some day is a part of the file.
-    warnings.simplefilter("ignore", DeprecationWarning)
     for collection in bpy.data.bl_rna.properties:
         # 5.0 lists all once more.
         if collection.type != "COLLECTION" or collection.identifier == "all_ids":
@@ -98,7 +96,8 @@ class _Walk:
             self.found[path] = "not set"
             return
         try:
-            value = getattr(data, prop.identifier)
+            with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+                value = getattr(data, prop.identifier)
         except (AttributeError, RuntimeError, ValueError, UnicodeDecodeError) as error:
             self.found[path] = type(error).__name__
             return
