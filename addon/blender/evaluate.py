@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 
@@ -28,7 +28,7 @@ def method_label(name: str) -> str:
 def check_methods(names: Iterable[str]) -> None:
     for name in names:
         if name not in method_names():
-            raise SinewError(f"method: expected one of {', '.join(method_names())}, got {name!r}")
+            raise WrongUse(f"method: expected one of {', '.join(method_names())}, got {name!r}")
 
 
 def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy.types.Object]:

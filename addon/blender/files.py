@@ -49,7 +49,18 @@ def open_file(path: Path, load_ui: bool = False) -> None:
         raise SinewError(f"{path}: Blender can not read it: {_telling_line(error)}") from None
 
 
-def save_copy(source: Path, target: Path, unfinished: Path) -> None:
+def save_copy(source: Path, target: Path) -> None:
+    """Saves the open file as `target`, compressed if `source` was; beside it first, then renamed."""
+    unfinished = target.with_name(f".{target.stem}.unfinished.blend")
+    save_beside(source, target, unfinished)
+    try:
+        os.replace(unfinished, target)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise SinewError(f"{target}: can not be written: {error.strerror}") from None
+
+
+def save_beside(source: Path, target: Path, unfinished: Path) -> None:
     """Saves the open file for `target`, compressed if `source` was, under the name `unfinished` beside it."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

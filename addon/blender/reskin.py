@@ -16,7 +16,7 @@ import numpy as np
 from ..core.compare import whole_view
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
-from . import drive, evaluate, files, handlers, properties, render
+from . import drive, evaluate, files, handlers, properties, render, stack
 
 PICTURE_SIZE = 360
 # Frames that a comparison looks at where none are named.
@@ -57,7 +57,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
     if not driven:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
     with clock.doing("saving"):
-        files.save_copy(source, Path(task["target"]), Path(task["unfinished"]))
+        files.save_beside(source, Path(task["target"]), Path(task["unfinished"]))
     outcome = {
         "meshes": [mesh for _obj, mesh in driven],
         "left_out": left_out,
@@ -93,7 +93,7 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
         reason = left_out.pop() if left_out else "no mesh is deformed by Sinew"
         raise SinewError(f"{source}: {reason}; nothing written")
     with clock.doing("saving"):
-        files.save_copy(source, Path(task["target"]), Path(task["unfinished"]))
+        files.save_beside(source, Path(task["target"]), Path(task["unfinished"]))
     return {"meshes": meshes, "left_out": left_out, "notes": notes, "seconds": clock.seconds}
 
 
@@ -159,11 +159,11 @@ def _described(obj: bpy.types.Object) -> str:
     """How a mesh was deformed before."""
     if properties.is_driven(obj):
         return f"Sinew, {properties.of(obj).method}"
-    modifier = drive.armature_modifier(obj)
-    if modifier is None:
-        return "nothing"
-    way = "Preserve Volume" if modifier.use_deform_preserve_volume else "linear blend"
-    return f"{modifier.name}, {way}"
+    modifiers = stack.armature_modifiers(obj)
+    if not modifiers:
+        return f"parent {obj.parent.name}, linear blend"
+    ways = ("linear blend", "Preserve Volume")
+    return "; ".join(f"{m.name}, {ways[m.use_deform_preserve_volume]}" for m in modifiers)
 
 
 def _notes_on_file() -> list[str]:

@@ -132,11 +132,16 @@ class _Walk:
         except (AttributeError, TypeError):
             return
         for name, value in items:
-            if hasattr(value, "to_dict"):
-                value = value.to_dict()
-            elif hasattr(value, "to_list"):
-                value = value.to_list()
-            self.found[f"{path}[{name!r}]"] = repr(value)
+            self.found[f"{path}[{name!r}]"] = repr(_plain(value))
+
+
+def _plain(value: object) -> object:
+    """A custom property without the addresses that Blender shows it with."""
+    if hasattr(value, "to_dict"):
+        return {name: _plain(item) for name, item in value.items()}
+    if hasattr(value, "to_list"):
+        return value.to_list()
+    return [_plain(item) for item in value] if isinstance(value, list) else value
 
 
 def _embedded(block: bpy.types.ID) -> bool:
