@@ -126,7 +126,9 @@ def _drive(
 
 def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:
     """The file's armature-deformed meshes that the settings mean. Raises SinewError where there are none."""
-    deformed = drive.deformed_meshes(list(bpy.data.objects))
+    # What a library override stands for is there as well, linked, and of no concern.
+    overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
+    deformed = drive.deformed_meshes([obj for obj in bpy.data.objects if obj not in overridden])
     if not deformed:
         raise SinewError(f"{source}: no mesh is deformed by an armature; nothing written")
     meant = [obj for obj in deformed if _is_meant(obj, settings)]

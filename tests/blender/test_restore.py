@@ -71,6 +71,18 @@ def full_scene(folder: Path) -> Path:
     track.strips.new("strip", 1, layered.animation_data.action)
     layered.animation_data.action = None
 
+    # What Sinew needs helpers for: a modifier in front, chained modifiers, the parent's own deformation.
+    mirrored, _ = scenes.make_arm(sides=6, rings=9, name="Mirrored")
+    mirrored.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
+    mirrored.modifiers.move(1, 0)
+    chained, chain = scenes.make_arm(sides=6, rings=9, name="Chained")
+    second = chained.modifiers.new("Multi", "ARMATURE")
+    second.object, second.use_multi_modifier, second.vertex_group = chain, True, "bone.1"
+    chained.keyframe_insert('modifiers["Multi"].show_viewport', frame=2)
+    child, parent = scenes.make_arm(sides=6, rings=9, name="Child")
+    child.modifiers.clear()
+    child.parent, child.parent_type = parent, "ARMATURE"
+
     # Two objects of one mesh; one that only renders; one that no armature deforms.
     twin = obj.copy()
     twin.name = "Twin"
@@ -101,8 +113,11 @@ def full_scene(folder: Path) -> Path:
     library.parent.mkdir()
     shutil.copy(path, library)
     with bpy.data.libraries.load(str(library), link=True, relative=True) as (_, to):
-        to.materials = ["Material"]
+        to.materials, to.objects = ["Material"], ["Bare"]
     mesh.materials.append(to.materials[0])
+    hero = to.objects[0]
+    bpy.context.scene.collection.objects.link(hero)
+    hero.override_create(remap_local_usages=True).name = "Override"
     return save(path)
 
 
