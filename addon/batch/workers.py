@@ -129,7 +129,8 @@ def do_task(
         except BlenderLost as lost:
             outcome = {"error": f"{source}: {lost}; tried {attempt} times"}
             for left in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
-                left.unlink(missing_ok=True)
+                with contextlib.suppress(OSError):
+                    left.unlink()
             continue
         except SinewError as error:
             outcome = {"error": str(error)}
