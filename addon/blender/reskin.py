@@ -13,9 +13,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.compare import whole_view
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
+from ..core.views import seen_extent, whole_view
 from . import drive, evaluate, files, handlers, properties, render, stack
 
 PICTURE_SIZE = 360
@@ -252,16 +252,16 @@ def _draw(
     evaluate.set_frame(scene, frame)
     before = evaluate.world_points(objects)
     evaluate.use_methods([(obj, mesh["method"]) for obj, mesh in shown])
-    view = whole_view(np.concatenate([before, evaluate.world_points(objects)]))
+    view = whole_view([seen_extent(before), seen_extent(evaluate.world_points(objects))])
     stem.parent.mkdir(parents=True, exist_ok=True)
     paths = {name: stem.with_name(f"{stem.name}-{name}.png") for name in ("after", "before")}
-    render.prepare(scene, objects, _engine(), PICTURE_SIZE)
-    render.picture(scene, view, paths["after"])
+    studio = render.Studio(scene, objects, _engine(), PICTURE_SIZE)
+    studio.picture(view, paths["after"])
     evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
-    render.picture(scene, view, paths["before"])
+    studio.picture(view, paths["before"])
     return {"frame": frame, **{name: path.name for name, path in paths.items()}}
 
 
 @cache
 def _engine() -> str:
-    return "workbench" if render.has_opengl() else "cycles"
+    return render.chosen_engine("auto")
