@@ -7,20 +7,35 @@ import argparse
 import atexit
 import sys
 
-from .core.errors import SinewError
+from .core.errors import SinewError, WrongUse
+
+# The batches have Blenders of their own, or ask for this one; a report without Blender has no pictures.
+WITHOUT_BLENDER = ("methods", "report", "reskin", "restore")
 
 _commands: list[object] = []
 
 
 def main(argv: list[str]) -> int:
     """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
-    from .commands import compare, console, inbetween, info, methods, points, render, report, reskin
+    from .commands import (
+        compare,
+        console,
+        inbetween,
+        info,
+        methods,
+        points,
+        render,
+        report,
+        reskin,
+        restore,
+    )
 
     modules = {
         "methods": methods,
         "info": info,
         "points": points,
         "reskin": reskin,
+        "restore": restore,
         "inbetween": inbetween,
         "compare": compare,
         "render": render,
@@ -38,13 +53,12 @@ def main(argv: list[str]) -> int:
         return stop.code if isinstance(stop.code, int) else 2
     output = console.keep_output() if args.verbose else console.take_over_output()
     try:
-        # A report without Blender has no pictures, and says so.
-        if args.command not in ("methods", "report"):
+        if args.command not in WITHOUT_BLENDER:
             prepare_blender()
         return modules[args.command].run(args, output)
     except SinewError as error:
         output.complain(error)
-        return 1
+        return 2 if isinstance(error, WrongUse) else 1
     except KeyboardInterrupt:
         output.complain("stopped")
         return 130

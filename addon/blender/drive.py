@@ -83,6 +83,7 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
     obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(run[0]))
     if active is not None:
         obj.modifiers.active = active
+    settings.had_animation = obj.animation_data is not None
     settings.method = method or _method_of(run[0])
     pairs = stand_ins(obj)
     points.arrange(obj)

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 
@@ -28,7 +28,7 @@ def method_label(name: str) -> str:
 def check_methods(names: Iterable[str]) -> None:
     for name in names:
         if name not in method_names():
-            raise SinewError(f"method: expected one of {', '.join(method_names())}, got {name!r}")
+            raise WrongUse(f"method: expected one of {', '.join(method_names())}, got {name!r}")
 
 
 def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy.types.Object]:
@@ -44,17 +44,45 @@ def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy
             else "no mesh is deformed by an armature"
         )
         raise SinewError(what)
+    show(meshes)
+    return meshes
+
+
+def show(meshes: list[bpy.types.Object]) -> None:
+    """Makes meshes of the scene visible, with the collections that they are in."""
     _show_layers(bpy.context.view_layer.layer_collection)
     for obj in meshes:
         obj.hide_viewport = False
         obj.hide_render = False
         if obj.name in bpy.context.view_layer.objects:
             obj.hide_set(False)
-    return meshes
 
 
 def use_method(obj: bpy.types.Object, method: str) -> None:
     """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not drive it."""
+    error = use_methods([(obj, method)])[0]
+    if error is not None:
+        raise error
+
+
+def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
+    """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
+    errors: list[SinewError | None] = []
+    with handlers.held():
+        for obj, method in wanted:
+            try:
+                _choose(obj, method)
+                errors.append(None)
+            except SinewError as error:
+                errors.append(error)
+    handlers.refresh(bpy.context)
+    for index, (obj, method) in enumerate(wanted):
+        if errors[index] is None and method != BLENDER and properties.of(obj).error:
+            errors[index] = SinewError(properties.of(obj).error)
+    return errors
+
+
+def _choose(obj: bpy.types.Object, method: str) -> None:
     if method == BLENDER:
         if properties.is_driven(obj):
             properties.of(obj).enabled = False
@@ -65,14 +93,12 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
     animation.remove_keys(obj, "sinew.method")
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
-    handlers.refresh(bpy.context)
-    if properties.of(obj).error:
-        raise SinewError(properties.of(obj).error)
 
 
 def use_method_on(meshes: Iterable[bpy.types.Object], method: str) -> None:
-    for obj in meshes:
-        use_method(obj, method)
+    for error in use_methods([(obj, method) for obj in meshes]):
+        if error is not None:
+            raise error
 
 
 def drivable_meshes(

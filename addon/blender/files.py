@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import struct
 from pathlib import Path
 
 import bpy
@@ -18,11 +20,20 @@ IMPORTERS = {
 READABLE = (".blend", *IMPORTERS)
 
 BLEND_MAGIC = b"BLENDER"
-COMPRESSED_MAGIC = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip up to Blender 2.93
+ZSTANDARD_MAGIC = b"\x28\xb5\x2f\xfd"
+COMPRESSED_MAGIC = (ZSTANDARD_MAGIC, b"\x1f\x8b")  # the other is gzip, up to Blender 2.93
+
+# Zstandard's seekable format, as Blender writes it: a skippable frame at the end, with two numbers a frame.
+SEEK_TABLE_MAGIC = 0x8F92EAB1
+SKIPPABLE_HEADER = 8
+# Bytes of the last block of a file that is not compressed: up to Blender 4.5, and since.
+LAST_BLOCK = (24, 32)
 
 
-def open_file(path: Path) -> None:
+def open_file(path: Path, load_ui: bool = False) -> None:
     """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
+
+    load_ui  with the file's own windows and workspaces, which a copy of it is to keep
 
     Raises SinewError where it can not be read. Scripts in the file do not run.
     """
@@ -30,7 +41,7 @@ def open_file(path: Path) -> None:
     try:
         importer = IMPORTERS.get(path.suffix.lower())
         if importer is None:
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=False)
         else:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
@@ -41,12 +52,23 @@ def open_file(path: Path) -> None:
 def save_copy(source: Path, target: Path) -> None:
     """Saves the open file as `target`, compressed if `source` was; beside it first, then renamed."""
     unfinished = target.with_name(f".{target.stem}.unfinished.blend")
+    save_beside(source, target, unfinished)
+    try:
+        os.replace(unfinished, target)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise SinewError(f"{target}: can not be written: {error.strerror}") from None
+
+
+def save_beside(source: Path, target: Path, unfinished: Path) -> None:
+    """Saves the open file for `target`, compressed if `source` was, under the name `unfinished` beside it."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(
             filepath=str(unfinished), copy=True, check_existing=False, compress=_is_compressed(source)
         )
-        os.replace(unfinished, target)
+        if not unfinished.exists() or not _is_whole(unfinished):
+            raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
     except (OSError, RuntimeError) as error:
         unfinished.unlink(missing_ok=True)
         raise SinewError(f"{target}: can not be written: {_telling_line(error)}") from None
@@ -57,6 +79,8 @@ def _check_readable(path: Path) -> None:
         raise SinewError(f"{path}: no such file")
     if path.is_dir():
         raise SinewError(f"{path}: is a folder, expected a file")
+    if not path.is_file():
+        raise SinewError(f"{path}: is a device or a pipe, expected a file")
     if path.suffix.lower() not in READABLE:
         raise SinewError(f"{path}: expected a file ending in {', '.join(READABLE)}")
     try:
@@ -68,6 +92,30 @@ def _check_readable(path: Path) -> None:
         raise SinewError(f"{path}: is empty")
     if path.suffix.lower() == ".blend" and magic != BLEND_MAGIC and not magic.startswith(COMPRESSED_MAGIC):
         raise SinewError(f"{path}: is not a .blend file")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether all that Blender wrote is in a file: of a compressed one it does not notice that a disk is full
+    (seen on 4.2 and 5.2; it drops the error of its Zstandard writer)."""
+    with path.open("rb") as file:
+        is_compressed = file.read(4) == ZSTANDARD_MAGIC
+        size = file.seek(0, os.SEEK_END)
+        if not is_compressed:
+            file.seek(-min(size, max(LAST_BLOCK)), os.SEEK_END)
+            end = file.read()
+            return any(end[-length:].startswith(b"ENDB") for length in LAST_BLOCK)
+        # At its end the sizes of all frames are listed, as they were meant to be written.
+        footer = struct.Struct("<IBI")
+        if size < footer.size:
+            return False
+        file.seek(-footer.size, os.SEEK_END)
+        frames, _flags, magic = footer.unpack(file.read())
+        table = footer.size + 8 * frames
+        if magic != SEEK_TABLE_MAGIC or size < table:
+            return False
+        file.seek(-table, os.SEEK_END)
+        listed = struct.unpack(f"<{2 * frames}I", file.read(8 * frames))
+        return sum(listed[::2]) + SKIPPABLE_HEADER + table == size
 
 
 def _is_compressed(path: Path) -> bool:

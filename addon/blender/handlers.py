@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
@@ -52,7 +54,7 @@ def state_of(obj: bpy.types.Object) -> Driven | None:
 def refresh(context: bpy.types.Context) -> None:
     """Deforms all driven objects at the current frame, as after a change of settings."""
     if session.updating:
-        # A handler turned an object off: asking for another evaluation now could be from a render's thread.
+        # Held, or a handler turned an object off: another evaluation now could be from a render's thread.
         return
     session.objects = None
     depsgraph = context.evaluated_depsgraph_get()
@@ -60,6 +62,16 @@ def refresh(context: bpy.types.Context) -> None:
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
         context.view_layer.update()
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """What is changed inside is not looked at before the refresh() that has to follow."""
+    session.updating = True
+    try:
+        yield
+    finally:
+        session.updating = False
 
 
 def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 
 import bpy
 
+from . import properties
+
 PATH = "sinew.pose"
 
 
@@ -42,7 +44,10 @@ def remove(obj: bpy.types.Object) -> None:
 
 
 def remove_empty_animation(obj: bpy.types.Object) -> None:
+    """Takes the object's animation data away where it is empty and was not there before Sinew."""
     animation = obj.animation_data
+    if properties.of(obj).had_animation:
+        return
     if animation.action is None and not animation.drivers and not animation.nla_tracks:
         obj.animation_data_clear()
 

@@ -120,6 +120,11 @@ class SinewSettings(bpy.types.PropertyGroup):
     helper: bpy.props.BoolProperty(
         description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
     )
+    had_animation: bpy.props.BoolProperty(
+        description="The object had animation data, be it empty, before Sinew",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )

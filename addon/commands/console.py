@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TextIO, TypeVar
 
 Item = TypeVar("Item")
@@ -14,9 +15,11 @@ Item = TypeVar("Item")
 class Console:
     """Output through `rich` where it is installed, plain where it is not (Blender's own Python)."""
 
-    def __init__(self, out: TextIO, err: TextIO) -> None:
+    def __init__(self, out: TextIO, err: TextIO, verbose: bool = False) -> None:
         self.out = out
         self.err = err
+        self.verbose = verbose
+        self._has_bar = False
         try:
             import rich.console
         except ImportError:
@@ -30,7 +33,11 @@ class Console:
 
     def note(self, text: str) -> None:
         """A word about the work, on standard error."""
-        print(text, file=self.err, flush=True)
+        if self._has_bar:
+            # Above the bar, which would otherwise be written into.
+            self._rich.print(text, markup=False, soft_wrap=True)
+        else:
+            print(text, file=self.err, flush=True)
 
     def complain(self, text: object) -> None:
         """One sentence on what went wrong, on standard error."""
@@ -63,6 +70,46 @@ class Console:
         self.note(f"{what} ({total})")
         yield from items
 
+    @contextmanager
+    def batch(self, what: str, total: int) -> Iterator[BatchProgress]:
+        """Shows how a batch of `total` files gets on: a bar on a terminal, a line for each file elsewhere."""
+        if self._rich is None or not self._rich.is_terminal:
+            yield BatchProgress(self, total)
+            return
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=self._rich) as bar:
+            self._has_bar = True
+            try:
+                yield BatchProgress(self, total, bar, bar.add_task(what, total=total, meshes=0, failed=0))
+            finally:
+                self._has_bar = False
+
+
+class BatchProgress:
+    """Counts of a batch at work."""
+
+    def __init__(self, console: Console, total: int, bar=None, bar_task=None) -> None:
+        self.done = self.meshes = self.failed = 0
+        self._console, self._total, self._bar, self._bar_task = console, total, bar, bar_task
+
+    def step(self, line: str | None, meshes: int, failed: bool) -> None:
+        """One more file: what to say of it, if that is not said."""
+        self.done += 1
+        self.meshes += meshes
+        self.failed += failed
+        if self._bar is not None:
+            self._bar.update(self._bar_task, completed=self.done, meshes=self.meshes, failed=self.failed)
+        elif line is not None:
+            self._console.note(f"[{self.done}/{self._total}] {line}")
+
 
 def take_over_output() -> Console:
     """Keeps standard output and error for Sinew alone: what Blender prints goes nowhere.
@@ -85,4 +132,4 @@ def take_over_output() -> Console:
 
 def keep_output() -> Console:
     """Leaves Blender's output where it was, for `--verbose`."""
-    return Console(sys.stdout, sys.stderr)
+    return Console(sys.stdout, sys.stderr, verbose=True)

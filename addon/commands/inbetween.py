@@ -7,8 +7,8 @@ import argparse
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..core.errors import SinewError
-from ..core.jobs import Job, plan_jobs
+from ..batch.inputs import Job, plan_jobs
+from ..core.errors import SinewError, WrongUse
 from .console import Console
 
 HELP = """\
@@ -31,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="+", type=Path, metavar="FILE_OR_FOLDER")
+    parser.add_argument("inputs", nargs="+", metavar="FILE_OR_FOLDER")
     names = ", ".join(sinew.interpolate.METHODS)
     parser.add_argument("--method", required=True, help=f"one of {names}")
     parser.add_argument(
@@ -67,9 +67,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     if args.method not in sinew.interpolate.METHODS:
         names = ", ".join(sinew.interpolate.METHODS)
-        raise SinewError(f"method: expected one of {names}, got {args.method!r}")
+        raise WrongUse(f"method: expected one of {names}, got {args.method!r}")
     if args.step < 1:
-        raise SinewError(f"step: expected 1 or more frames, got {args.step}")
+        raise WrongUse(f"step: expected 1 or more frames, got {args.step}")
     jobs = plan_jobs(args.inputs, args.out)
     outcomes = []
     for job in console.progress(jobs, len(jobs), "Making in-betweens"):

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from .errors import SinewError
+from .errors import WrongUse
 
 
 def parse_frames(text: str) -> list[float]:
     """The frames of "1,12,40-48": single frames, which may be fractions, and ranges, in the order typed.
 
-    Whole frames come back as int. Raises SinewError for anything else.
+    Whole frames come back as int. Raises WrongUse for anything else.
     """
     frames: list[float] = []
     for part in text.split(","):
@@ -20,11 +20,11 @@ def parse_frames(text: str) -> list[float]:
             if dash > 0:
                 first, last = int(part[:dash]), int(part[dash + 1 :])
                 if last < first:
-                    raise SinewError(f"frames: {part!r} runs backwards; write {last}-{first}")
+                    raise WrongUse(f"frames: {part!r} runs backwards; write {last}-{first}")
                 frames.extend(range(first, last + 1))
             else:
                 number = float(part)
                 frames.append(int(number) if number.is_integer() else number)
         except (ValueError, OverflowError):
-            raise SinewError(f"frames: expected frames such as 1,12,40-48, got {text!r}") from None
+            raise WrongUse(f"frames: expected frames such as 1,12,40-48, got {text!r}") from None
     return frames

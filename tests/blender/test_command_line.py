@@ -4,10 +4,7 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 
 import bpy
 import numpy as np
@@ -15,24 +12,10 @@ import pytest
 import scenes
 import sinew
 from conftest import REPOSITORY
+from program import run_sinew
 from sinew_addon.blender import files, properties
 
 METHODS = [method.name for method in sinew.methods()]
-
-
-def run_sinew(*args: object, status: int = 0) -> subprocess.CompletedProcess:
-    result = subprocess.run(
-        [sys.executable, "-c", "from sinew_addon.cli import run; run()", *map(str, args)],
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        timeout=300,
-        check=False,
-        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
-    )
-    assert result.returncode == status, result.stdout + result.stderr
-    assert "Traceback" not in result.stderr, result.stderr
-    return result
 
 
 @pytest.fixture
@@ -47,7 +30,8 @@ def arm_file(tmp_path):
 
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    for command in ("methods", "info", "points", "reskin", "inbetween", "compare", "report"):
+    commands = ("methods", "info", "points", "reskin", "restore", "inbetween", "compare", "report")
+    for command in commands:
         assert "usage: sinew" in run_sinew(command, "--help").stdout
 
 
@@ -151,7 +135,7 @@ def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):
 def test_reskin_never_writes_to_the_input_folder(arm_file):
     path, _expected = arm_file
     before = path.read_bytes()
-    assert "input" in run_sinew("reskin", path, "--method", "dq", "--out", path.parent, status=1).stderr
+    assert "input" in run_sinew("reskin", path, "--method", "dq", "--out", path.parent, status=2).stderr
     assert path.read_bytes() == before
 
 
@@ -164,10 +148,12 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
     (folder / "empty.blend").touch()
     (folder / "text.blend").write_text("not a blend file")
     (folder / "truncated.blend").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    result = run_sinew("reskin", folder, "--method", "dq", "--out", tmp_path / "out", status=1)
+    result = run_sinew(
+        "reskin", folder, "--method", "dq", "--out", tmp_path / "out", "--no-pictures", status=1
+    )
     assert "2 of 5 files" in result.stdout
     written = sorted(
-        str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*") if p.is_file()
+        str(p.relative_to(tmp_path / "out")) for p in (tmp_path / "out").rglob("*.blend") if p.is_file()
     )
     assert written == ["a good one.blend", "sub/名前.blend"]
     for name in ("empty.blend", "text.blend", "truncated.blend"):
@@ -203,8 +189,9 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
         (["info", tmp_path / "no.blend"], "no such file"),
     ]
+    wrong_use = {"expected one of", "backwards", "expected frames"}
     for arguments, sentence in cases:
-        result = run_sinew(*arguments, status=1)
+        result = run_sinew(*arguments, status=2 if sentence in wrong_use else 1)
         complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
         assert len(complaints) == 1, result.stderr
         assert sentence in complaints[0]
@@ -315,14 +302,14 @@ def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "still.blend"))
     out = ["--out", tmp_path / "out"]
     cases = [
-        ([path, "--method", "best", *out], "expected one of matrix_linear"),
-        ([path, "--method", "dlb", "--step", "0", *out], "step"),
-        ([path, "--method", "dlb", "--out", path.parent], "replace an input"),
-        ([tmp_path / "still.blend", "--method", "dlb", *out], "keyed bones"),
-        ([tmp_path / "strips.blend", "--method", "dlb", *out], "NLA strips (Walk)"),
+        ([path, "--method", "best", *out], "expected one of matrix_linear", 2),
+        ([path, "--method", "dlb", "--step", "0", *out], "step", 2),
+        ([path, "--method", "dlb", "--out", path.parent], "replace an input", 2),
+        ([tmp_path / "still.blend", "--method", "dlb", *out], "keyed bones", 1),
+        ([tmp_path / "strips.blend", "--method", "dlb", *out], "NLA strips (Walk)", 1),
     ]
-    for arguments, sentence in cases:
-        result = run_sinew("inbetween", *arguments, status=1)
+    for arguments, sentence, status in cases:
+        result = run_sinew("inbetween", *arguments, status=status)
         complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
         assert len(complaints) == 1, result.stderr
         assert sentence in complaints[0]

@@ -424,3 +424,13 @@ def test_what_is_missing_in_the_rig_is_warned_of():
         group.remove([0, 1])
     scenes.add_sinew(obj)
     assert "2 of 252 vertices" in " ".join(handlers.state_of(obj).facts.warnings)
+
+
+def test_remove_while_off_keeps_what_the_artist_switched():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).enabled = False
+    obj.modifiers["Armature"].show_viewport = False
+    drive.remove(obj)
+    assert not obj.modifiers["Armature"].show_viewport
+    assert obj.modifiers["Armature"].show_render

@@ -123,11 +123,12 @@ def test_package_sinew_imports_nothing_of_blender_or_the_extension():
         assert roots & (OF_BLENDER | {"addon", "sinew_addon"}) == set(), path
 
 
-def test_core_imports_nothing_of_blender():
-    core = ROOT / "addon" / "core"
+@pytest.mark.parametrize("folder", ["core", "batch"])
+def test_core_and_batch_import_nothing_of_blender(folder):
+    folder = ROOT / "addon" / folder
     wrong = {}
-    for path in sources(core, ".py"):
-        depth = len(path.relative_to(core).parts) - 1
+    for path in sources(folder, ".py"):
+        depth = len(path.relative_to(folder).parts) - 1
         found = wrong_in_core(path.read_text(encoding="utf-8"), depth)
         if found:
             wrong[path.relative_to(ROOT).as_posix()] = found

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which files a batch reads and which it writes."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..core.errors import WrongUse
+from .journal import UNFINISHED
+
+STANDARD_INPUT = "-"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One file to read and the copy to write, both absolute."""
+
+    source: Path
+    target: Path
+
+
+def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> list[Job]:
+    """A job for each file meant by `inputs`: files, folders (all .blend files below them), patterns such as
+    "characters/**/*.blend", and STANDARD_INPUT, which stands for the paths `listed`, one a line.
+
+    A single file's copy is written right into `out`. The tree below a folder, below the fixed part of a
+    pattern, or below what all listed files have in common is kept there.
+
+    Raises WrongUse, before anything is done, where an input means no file, a copy would be written over an
+    input, or two would have one name. A file that can not be read is left for its own job to report.
+    """
+    out = Path(os.path.abspath(out))
+    jobs: dict[Path, Job] = {}
+    for given in inputs:
+        root, paths = _files_of(given, out, listed)
+        for path in paths:
+            target = (out / path.relative_to(root)).with_suffix(".blend")
+            jobs.setdefault(path, Job(path, target))
+    _check(list(jobs.values()))
+    return list(jobs.values())
+
+
+def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[Path]]:
+    """The files that one input means, absolute, and the folder whose tree is kept."""
+    # Absolute without following links: a linked folder keeps the name it has here.
+    path = Path(os.path.abspath(given))
+    if given == STANDARD_INPUT:
+        paths = [Path(os.path.abspath(line)) for line in (line.strip("\r\n") for line in listed) if line]
+        if not paths:
+            raise WrongUse("standard input: no paths, expected one a line")
+        return Path(os.path.commonpath([p.parent for p in paths])), paths
+    if path.is_dir():
+        root, found = path, path.rglob("*.blend")
+    elif glob.has_magic(given) and not path.exists():
+        fixed = Path(*_before_magic(path.parts))
+        root, found = fixed, (Path(p) for p in glob.iglob(str(path), recursive=True))
+    else:
+        return path.parent, [path]
+    # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
+    files = [
+        p
+        for p in sorted(found)
+        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED)
+    ]
+    if not files:
+        raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
+    return root, files
+
+
+def _before_magic(parts: tuple[str, ...]) -> tuple[str, ...]:
+    first = next(index for index, part in enumerate(parts) if glob.has_magic(part))
+    return parts[:first]
+
+
+def _check(jobs: list[Job]) -> None:
+    sources = {job.source.resolve() for job in jobs}
+    targets: dict[Path, Path] = {}
+    for job in jobs:
+        target = job.target.resolve()
+        if target in sources:
+            raise WrongUse(f"{job.target}: the copy would replace an input; choose another --out")
+        other = targets.setdefault(target, job.source)
+        if other != job.source:
+            raise WrongUse(f"{other} and {job.source} would both be written to {job.target}")
+
+
+def _is_below(path: Path, out: Path, root: Path) -> bool:
+    out = out.resolve()
+    return out != root.resolve() and out in path.resolve().parents

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The record of a batch beside its output, which outlives a run that is killed at any moment.
+
+One JSON object a line. A line is on disk before the copy that it speaks of gets its name: whatever happens
+in between, the next run only has to rename. A half-written last line is as if it had never been.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from ..core.errors import SinewError, WrongUse
+
+NAME = "sinew-journal.jsonl"
+UNFINISHED = ".unfinished.blend"
+
+
+class Journal:
+    """The journal of the folder `out`, locked until it is closed or the process ends.
+
+    latest  the last record of each copy, by its path below `out`
+
+    Raises WrongUse where another batch is at work in the folder.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.path = out / NAME
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            self._file = self.path.open("a+b", buffering=0)
+        except OSError as error:
+            raise SinewError(f"{self.path}: can not be written: {error.strerror}") from None
+        if not _lock(self._file.fileno()):
+            self._file.close()
+            raise WrongUse(f"{out}: another batch is at work there; wait for it, or choose another --out")
+        self.latest = self._read()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self._file.close()
+
+    def name_of(self, target: Path) -> str:
+        return target.relative_to(self.out).as_posix()
+
+    def record(self, target: Path, record: dict) -> None:
+        """Adds what became of a copy; on disk when this returns."""
+        record = {"file": self.name_of(target), **record}
+        line = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode() + b"\n"
+        end = self._file.seek(0, os.SEEK_END)
+        try:
+            if self._file.write(line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            # What a full disk took of the line goes again, for more than the last line could be half one.
+            os.truncate(self.path, end)
+            raise SinewError(
+                f"{self.path}: can not be written: {error.strerror}; what was done is in it, --resume goes on"
+            ) from None
+        self.latest[record["file"]] = record
+
+    def finish(self, target: Path, record: dict) -> None:
+        """Gives a copy its name, after its record."""
+        os.replace(target.with_name(record["unfinished"]), target)
+
+    def holds(self, target: Path, record: dict | None) -> bool:
+        """Whether `target` is the very file that its record speaks of."""
+        return record is not None and record.get("written") == _stamp(target)
+
+    def recover(self) -> None:
+        """Finishes what a killed run had recorded, and clears away what it had not."""
+        for name, record in self.latest.items():
+            if "unfinished" in record:
+                target = self.out / name
+                if record["written"] == _stamp(target.with_name(record["unfinished"])):
+                    self.finish(target, record)
+
+    def clear_away(self, targets: Iterable[Path]) -> None:
+        """Removes the half-written copies of runs that were killed, which no record speaks of."""
+        for folder in {target.parent for target in targets}:
+            # Blender writes beside, too, with an @.
+            for left in folder.glob(f".*{UNFINISHED}*"):
+                left.unlink(missing_ok=True)
+
+    def _read(self) -> dict[str, dict]:
+        self._file.seek(0)
+        content = self._file.read()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            os.truncate(self.path, whole)
+        latest = {}
+        for line in content[:whole].splitlines():
+            try:
+                record = json.loads(line)
+                latest[record["file"]] = record
+            except (ValueError, TypeError, KeyError):
+                # A machine that lost its power can leave anything: such a file is done again.
+                continue
+        return latest
+
+
+def stamp(path: Path) -> list[int]:
+    """What stays the same of a file when it is renamed: its size, and when it was written."""
+    status = path.stat()
+    return [status.st_size, status.st_mtime_ns]
+
+
+def _stamp(path: Path) -> list[int] | None:
+    try:
+        return stamp(path)
+    except OSError:
+        return None
+
+
+def _lock(descriptor: int) -> bool:
+    """Locks a file for this process alone; the system unlocks it however the process ends."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        # Beyond any journal's end, as Windows lets nobody read what is locked.
+        os.lseek(descriptor, 1 << 40, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

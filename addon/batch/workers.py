@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who does the work of a batch: Blenders on this machine, or those of a dask cluster.
+
+dask hands out the tasks either way. On this machine its scheduler and its worker are threads of this process:
+the Blenders are processes already, and dask's own would only cost their start and memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import logging
+import threading
+import uuid
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import sinew
+
+from ..core.errors import SinewError
+from .blender_process import BlenderLost, BlenderProcess, Limits, Stopped
+from .journal import UNFINISHED, stamp
+
+ATTEMPTS = 2
+CONNECT_LIMIT = 30.0
+
+
+def versions() -> dict[str, str]:
+    """What decides over results in this Python: releases of Sinew and of Blender."""
+    try:
+        return {"sinew": sinew.__version__, "blender": importlib.metadata.version("bpy")}
+    except importlib.metadata.PackageNotFoundError:
+        raise SinewError("this Python has no Blender; install bpy") from None
+
+
+class _Blenders:
+    """The Blenders of this process, each kept for its next file.
+
+    slots  as many as there may be at a time; there may be one for each thread unless this is set
+    """
+
+    def __init__(self) -> None:
+        self.slots: contextlib.AbstractContextManager = contextlib.nullcontext()
+        self._lock = threading.Lock()
+        self._idle: list[BlenderProcess] = []
+        self._busy: set[BlenderProcess] = set()
+        self._stopped = False
+
+    def run(self, task: dict, limits: Limits) -> dict:
+        with self.slots:
+            return self._run(task, limits)
+
+    def _run(self, task: dict, limits: Limits) -> dict:
+        blender = self._take(limits)
+        try:
+            outcome = blender.run(task, limits)
+        finally:
+            with self._lock:
+                self._busy.discard(blender)
+        if blender.has_grown(limits):
+            blender.end()
+        else:
+            with self._lock:
+                self._idle.append(blender)
+        return outcome
+
+    def _take(self, limits: Limits) -> BlenderProcess:
+        with self._lock:
+            blender = self._idle.pop() if self._idle and not self._stopped else None
+        blender = blender or BlenderProcess(limits)
+        with self._lock:
+            self._busy.add(blender)
+            if not self._stopped:
+                return blender
+        blender.kill()
+        raise Stopped
+
+    def end(self) -> None:
+        """Ends those that are idle."""
+        with self._lock:
+            idle, self._idle = self._idle, []
+        for blender in idle:
+            blender.end()
+
+    def stop(self) -> None:
+        """Ends all, at once and for good."""
+        with self._lock:
+            self._stopped = True
+            everyone = [*self._idle, *self._busy]
+            self._idle = []
+        for blender in everyone:
+            blender.kill()
+
+
+_blenders = _Blenders()
+
+
+def end_blenders() -> None:
+    """Ends this process's idle Blenders; a cluster's worker calls it when a batch is over."""
+    _blenders.end()
+
+
+def do_task(
+    task: dict,
+    limits: Limits,
+    run: Callable[[dict, Limits], dict] = _blenders.run,
+    versions: Callable[[], dict[str, str]] = versions,
+) -> dict:
+    """What became of a task's file, tried once more in a fresh process where Blender was lost.
+
+    task  "command", "source", "target", what the command needs, and "known": hash and versions of a source
+          that need not be done again, or None
+    run   how to do it: in a process of its own, or here
+
+    The copy lies beside its target, under the name "unfinished": giving it its own is for who keeps the
+    journal.
+    """
+    source, target = Path(task["source"]), Path(task["target"])
+    facts = {"hash": _hash(source), "versions": versions()}
+    if facts == task["known"]:
+        return {"unchanged": True}
+    for attempt in range(1, ATTEMPTS + 1):
+        facts["attempts"] = attempt
+        # Short, for names may be as long as the system lets them be.
+        unfinished = target.with_name(f".{uuid.uuid4().hex[:12]}{UNFINISHED}")
+        try:
+            outcome = run({**task, "unfinished": str(unfinished)}, limits)
+        except BlenderLost as lost:
+            outcome = {"error": f"{source}: {lost}; tried {attempt} times"}
+            for left in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
+                with contextlib.suppress(OSError):
+                    left.unlink()
+            continue
+        except SinewError as error:
+            outcome = {"error": str(error)}
+        break
+    if "error" in outcome:
+        return {**outcome, **facts}
+    return {**outcome, **facts, "unfinished": unfinished.name, "written": stamp(unfinished)}
+
+
+def run_here(
+    tasks: Sequence[dict],
+    run: Callable[[dict, Limits], dict],
+    versions: Callable[[], dict[str, str]],
+) -> Iterator[tuple[dict, dict]]:
+    """Each task and what became of it, done one after the other in this process."""
+    for task in tasks:
+        yield task, do_task(task, Limits(), run, versions)
+
+
+def run_in_dask(
+    tasks: Sequence[dict], limits: Limits, jobs: int, scheduler: str | None
+) -> Iterator[tuple[dict, dict]]:
+    """Each task and what became of it, as they are done: by `jobs` Blenders here, or by those of the cluster
+    at `scheduler`, as many on each worker as it has threads.
+
+    Raises SinewError where the cluster can not be used. What is not done when the generator is closed, or
+    interrupted, is given up.
+    """
+    import distributed
+
+    with _client(jobs, scheduler) as client:
+        futures = client.map(do_task, tasks, limits=limits, pure=False)
+        task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
+        done = False
+        try:
+            for future in distributed.as_completed(futures):
+                # A worker that was lost has its file done by another; one that takes several along does not.
+                error = future.exception()
+                if error is None:
+                    outcome = future.result()
+                else:
+                    outcome = {"error": f"{task_of[future.key]['source']}: {_sentence(error)}"}
+                yield task_of[future.key], outcome
+                future.release()
+            done = True
+        finally:
+            if not done:
+                client.cancel(futures)
+            if scheduler is None and not done:
+                _blenders.stop()
+            elif scheduler is None:
+                _blenders.end()
+            else:
+                client.run(end_blenders)
+
+
+@contextlib.contextmanager
+def _client(jobs: int, scheduler: str | None) -> Iterator:
+    import distributed
+
+    # Its warnings are of load and lost connections; what matters comes back as an error of a task.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    if scheduler is None:
+        versions()
+        _blenders.slots = threading.Semaphore(jobs)
+        with (
+            distributed.LocalCluster(
+                n_workers=1,
+                # Those without a Blender have a task ready for the next that is free.
+                threads_per_worker=2 * jobs,
+                processes=False,
+                memory_limit=None,
+                dashboard_address="127.0.0.1:0",
+                worker_dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
+        return
+    try:
+        client = distributed.Client(scheduler, timeout=CONNECT_LIMIT)
+    except (OSError, ValueError) as error:
+        raise SinewError(f"{scheduler}: no dask scheduler answers there: {error}") from None
+    with client:
+        _check_workers(client, scheduler)
+        yield client
+
+
+def _check_workers(client, scheduler: str) -> None:
+    """Raises SinewError where a worker can not do what this process would."""
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_LIMIT)
+    except TimeoutError:
+        raise SinewError(f"{scheduler}: has no workers; start some with `dask worker {scheduler}`") from None
+    try:
+        found = client.run(versions)
+    except Exception as error:
+        raise SinewError(
+            f"{scheduler}: a worker can not run Sinew: {_sentence(error)}; install sinew-blender there"
+        ) from None
+    blenders = {there["blender"] for there in found.values()}
+    if len(blenders) > 1:
+        raise SinewError(f"{scheduler}: its workers have different Blenders: {', '.join(sorted(blenders))}")
+    for address, there in found.items():
+        if there["sinew"] != sinew.__version__:
+            raise SinewError(
+                f"{scheduler}: worker {address} has Sinew {there['sinew']}, here is {sinew.__version__}; "
+                "install the same"
+            )
+
+
+def _sentence(error: BaseException) -> str:
+    import distributed
+
+    if isinstance(error, distributed.KilledWorker):
+        return "lost with each worker that took it on"
+    lines = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
+
+
+def _hash(path: Path) -> str | None:
+    """Of the file's content; None where it can not be read, which is for who opens it to say."""
+    try:
+        if not path.is_file():
+            return None
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "blake2b").hexdigest()[:32]
+    except OSError:
+        return None

@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What `sinew reskin` and `sinew restore` have in common: inputs, workers, journal, progress, report."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..batch.blender_process import Limits
+from ..batch.inputs import STANDARD_INPUT, Job, plan_jobs
+from ..batch.job_file import JobFile, Settings, read_job_file
+from ..batch.journal import Journal
+from ..batch.report import PICTURES, write_report
+from ..batch.workers import run_here, run_in_dask
+from ..core.errors import SinewError, WrongUse
+from .console import Console
+
+
+@dataclass(frozen=True)
+class Action:
+    """What is done to each file.
+
+    command   a command of worker.py
+    done      what a file is afterwards, as in "3 of 4 files re-skinned"
+    settings  those given on the command line
+    job       path of a job file
+    methods   those that may be asked for; none where no method is needed
+    """
+
+    command: str
+    done: str
+    settings: Settings = field(default_factory=Settings)
+    job: str | None = None
+    methods: Collection[str] = ()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "inputs",
+        nargs="*",
+        metavar="INPUT",
+        help="a file, a folder (all .blend files below it), a pattern such as 'chars/**/*.blend', or - for a "
+        "list of paths on standard input",
+    )
+    parser.add_argument("--out", metavar="DIR", help="folder for copies, journal and report")
+    parser.add_argument(
+        "--include",
+        action="append",
+        metavar="NAME",
+        help="only objects, or collections, of this name or pattern",
+    )
+    parser.add_argument("--exclude", action="append", metavar="NAME", help="but not these")
+    parser.add_argument("--resume", action="store_true", help="do only what is missing or has changed")
+    parser.add_argument("--overwrite", action="store_true", help="replace copies that are there already")
+    parser.add_argument("--jobs", type=_count, metavar="N", help="Blenders at a time (default: one a core)")
+    parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="work on this dask cluster instead")
+    parser.add_argument(
+        "--timeout",
+        type=_seconds,
+        metavar="SECONDS",
+        help="how long one file may take (default: 1800; 0: any time)",
+    )
+    parser.add_argument(
+        "--memory",
+        metavar="SIZE",
+        help="what one Blender may take, such as 4GiB (default: its share; 0: all)",
+    )
+
+
+def run(args: argparse.Namespace, console: Console, action: Action) -> int:
+    """Exit status: 0 all went well, 1 something failed or was left as it was."""
+    job_file = read_job_file(Path(action.job), action.methods) if action.job else JobFile()
+    inputs = args.inputs or job_file.inputs
+    out = args.out or job_file.out
+    if not inputs:
+        raise WrongUse("no input: name files, folders or patterns, or - for a list on standard input")
+    if out is None:
+        raise WrongUse("no --out: name a folder for the copies")
+    out = Path(os.path.abspath(out))
+    jobs = plan_jobs(inputs, out, sys.stdin if STANDARD_INPUT in inputs else ())
+    given = Settings(
+        include=tuple(args.include) if args.include else None,
+        exclude=tuple(args.exclude) if args.exclude else None,
+    )
+    settings = [job_file.settings_of(job.source, action.settings.overridden_by(given)) for job in jobs]
+    for job, wanted in zip(jobs, settings, strict=True):
+        if action.methods and wanted.method is None:
+            raise WrongUse(f"no method for {job.source}: give --method, or one in a job file")
+    for rule in job_file.files:
+        if not any(rule.matches(job.source) for job in jobs):
+            console.note(f"{action.job}:{rule.line}: no file matches {', '.join(rule.match)}")
+    workers = _Workers(args, len(jobs), console)
+
+    started = time.monotonic()
+    with Journal(out) as journal:
+        journal.recover()
+        journal.clear_away(job.target for job in jobs)
+        tasks, results = [], {}
+        for job, wanted in zip(jobs, settings, strict=True):
+            task = _task(args, action, job, wanted, journal)
+            try:
+                task["known"] = _known(args, task, job, journal)
+                tasks.append(task)
+            except SinewError as error:
+                results[job.target] = {"error": str(error)}
+                console.complain(error)
+        try:
+            with (
+                console.batch(f"{action.command} {len(jobs)} files", len(jobs)) as progress,
+                closing(workers.run(tasks)) as outcomes,
+            ):
+                progress.done = len(results)
+                progress.failed = len(results)
+                for task, outcome in outcomes:
+                    result = _keep(journal, task, outcome)
+                    results[Path(task["target"])] = result
+                    _tell(console, progress, task, result)
+        except KeyboardInterrupt:
+            console.note(f"{len(results)} of {len(jobs)} files are done; --resume does the others")
+            raise
+        finally:
+            journal.clear_away(job.target for job in jobs)
+        seconds = time.monotonic() - started
+        rows = [_row(job, journal.name_of(job.target), results[job.target]) for job in jobs]
+        summary = _summary(action, rows, seconds)
+        report = write_report(out, summary, rows)
+    return _conclude(console, action, rows, summary, report)
+
+
+class _Workers:
+    """Who does the work; checked before anything is done."""
+
+    def __init__(self, args: argparse.Namespace, files: int, console: Console) -> None:
+        self._args = args
+        bpy = sys.modules.get("bpy")
+        self._inside_blender = bpy is not None and bool(bpy.app.binary_path)
+        if self._inside_blender:
+            for option in ("scheduler", "timeout", "memory"):
+                if getattr(args, option) is not None:
+                    raise WrongUse(_needs_python(f"--{option}"))
+            if args.jobs is not None and args.jobs > 1:
+                raise WrongUse(_needs_python("--jobs"))
+            return
+        if args.scheduler is not None and args.jobs is not None:
+            raise WrongUse("--jobs and --scheduler: the cluster's workers decide how many Blenders it runs")
+        self._jobs = min(args.jobs or os.cpu_count() or 1, files)
+        self._limits = Limits(
+            timeout=1800.0 if args.timeout is None else args.timeout,
+            memory=self._memory(args.memory),
+            verbose=console.verbose,
+        )
+
+    def run(self, tasks: list[dict]) -> Iterator[tuple[dict, dict]]:
+        if not tasks or self._inside_blender:
+            from .. import worker
+            from ..cli import prepare_blender
+
+            if tasks:
+                prepare_blender()
+            return run_here(tasks, lambda task, _limits: worker.run(task, lambda _doing: None), _versions)
+        return run_in_dask(tasks, self._limits, self._jobs, self._args.scheduler)
+
+    def _memory(self, text: str | None) -> int:
+        if text is None:
+            if self._args.scheduler is not None:
+                return 0
+            import psutil
+
+            return psutil.virtual_memory().total // self._jobs
+        import dask.utils
+
+        try:
+            return dask.utils.parse_bytes(text)
+        except ValueError:
+            raise WrongUse(f"--memory: expected a size such as 4GiB, got {text!r}") from None
+
+
+def _needs_python(option: str) -> str:
+    return (
+        f"{option} needs Blenders in processes of their own, which this one can not start: install "
+        "sinew-blender in a Python with bpy and run `sinew` there"
+    )
+
+
+def _versions() -> dict[str, str]:
+    import bpy
+    import sinew
+
+    return {"sinew": sinew.__version__, "blender": bpy.app.version_string}
+
+
+def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings, journal: Journal) -> dict:
+    name = hashlib.blake2b(os.fsencode(journal.name_of(job.target)), digest_size=8).hexdigest()
+    return {
+        "command": action.command,
+        "source": str(job.source),
+        "target": str(job.target),
+        "settings": settings.as_task(),
+        "frames": args.frames,
+        "pictures": str(journal.out / PICTURES / name) if args.pictures else None,
+    }
+
+
+def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> dict | None:
+    """What the source must still be for its copy to stand. Raises SinewError where a copy is in the way."""
+    record = journal.latest.get(journal.name_of(job.target))
+    is_ours = journal.holds(job.target, record)
+    if job.target.exists() and not args.overwrite and not (args.resume and is_ours):
+        if args.resume and record is not None:
+            raise SinewError(f"{job.target}: was changed since it was written; use --overwrite to replace it")
+        raise SinewError(
+            f"{job.target}: is there already; use --overwrite to replace it, or --resume to go on"
+        )
+    same = ("command", "source", "settings")
+    if args.resume and is_ours and "error" not in record and all(record[k] == task[k] for k in same):
+        return {"hash": record["hash"], "versions": record["versions"]}
+    return None
+
+
+def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
+    """Records what became of a file, and gives its copy its name: the record."""
+    target = Path(task["target"])
+    before = journal.latest.get(journal.name_of(target), {})
+    if "unchanged" in outcome:
+        return {**before, "unchanged": True}
+    record = {key: task[key] for key in ("command", "source", "settings")} | outcome
+    if "error" in record:
+        _record_failure(journal, target, record, before)
+        return record
+    journal.record(target, record)
+    try:
+        journal.finish(target, record)
+    except OSError as error:
+        record["error"] = f"{target}: can not be written: {error.strerror}"
+        _record_failure(journal, target, record, before)
+    return record
+
+
+def _record_failure(journal: Journal, target: Path, record: dict, before: dict) -> None:
+    for key in ("unfinished", "written"):
+        record.pop(key, None)
+    if "written" in before:
+        # The older copy is still ours.
+        record["written"] = before["written"]
+    journal.record(target, record)
+
+
+def _tell(console: Console, progress, task: dict, result: dict) -> None:
+    failed = "error" in result or bool(result["left_out"])
+    meshes = 0 if "error" in result else len(result["meshes"])
+    if "error" in result:
+        line = None
+        console.complain(result["error"])
+    elif "unchanged" in result:
+        line = f"{task['source']}: unchanged"
+    else:
+        line = f"{task['source']}: {meshes} mesh{'' if meshes == 1 else 'es'}"
+        line += f", {sum(result['seconds'].values()):.1f} s"
+    for reason in result.get("left_out", []) if "error" not in result else []:
+        console.complain(f"{task['source']}: left as it was: {reason}")
+    progress.step(line, meshes, failed)
+
+
+def _row(job: Job, name: str, result: dict) -> dict:
+    """What the report says of a file."""
+    status = "failed" if "error" in result else "unchanged" if "unchanged" in result else "written"
+    shown = ("error", "meshes", "left_out", "notes", "versions", "seconds", "attempts", "pictures")
+    return {"source": str(job.source), "file": name, "status": status} | {
+        key: result[key] for key in shown if key in result
+    }
+
+
+def _summary(action: Action, rows: list[dict], seconds: float) -> dict:
+    statuses = Counter(row["status"] for row in rows)
+    good = [row for row in rows if row["status"] != "failed"]
+    return {
+        "command": action.command,
+        "files": len(rows),
+        "written": statuses["written"],
+        "unchanged": statuses["unchanged"],
+        "failed": statuses["failed"],
+        "meshes": sum(len(row["meshes"]) for row in good),
+        "meshes_left_out": sum(len(row["left_out"]) for row in good),
+        "seconds": round(seconds, 3),
+    }
+
+
+def _conclude(console: Console, action: Action, rows: list[dict], summary: dict, report: Path) -> int:
+    complete = [row for row in rows if row["status"] != "failed" and not row["left_out"]]
+    bad = [row for row in rows if row not in complete]
+    if bad:
+        console.table(
+            ("file", "result"),
+            [(row["source"], _reason(row)) for row in bad],
+        )
+    unchanged = f", {summary['unchanged']} of them before" if summary["unchanged"] else ""
+    console.say(f"{len(complete)} of {len(rows)} files {action.done}{unchanged}")
+    console.say(str(report))
+    return 1 if bad else 0
+
+
+def _reason(row: dict) -> str:
+    if "error" in row:
+        return row["error"].removeprefix(f"{row['source']}: ")
+    return f"left as they were: {'; '.join(row['left_out'])}"
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"expected at least 1, got {number}")
+    return number
+
+
+def _seconds(text: str) -> float:
+    number = float(text)
+    if not 0 <= number < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected 0 or more, got {text}")
+    return number

@@ -1,0 +1,156 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a batch costs beside Blender's own opening and saving, and what a second Blender brings.
+
+    .venv/bin/python bench/batch.py [--files 48] [--repetitions 5] [--json FILE]
+
+From the first file that is done to the last, so that no start counts; candidates take turns, and the least of
+each is taken, as on a shared machine only that is the machine's own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+WRIST = Path(__file__).resolve().parents[1] / "blend_files" / "wrist.blend"
+SINEW = [sys.executable, "-c", "from sinew_addon.cli import run; run()"]
+
+OPEN_AND_SAVE = """
+import sys, time, bpy
+target, *paths = sys.argv[1:]
+started = time.perf_counter()
+for path in paths:
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=True, use_scripts=False)
+    bpy.ops.wm.save_as_mainfile(filepath=target, copy=True, check_existing=False, compress=True)
+print("seconds", time.perf_counter() - started)
+"""
+
+SUBDIVIDE = """
+import sys, bpy
+source, target, times = sys.argv[1:]
+bpy.ops.wm.open_mainfile(filepath=source)
+obj = next(o for o in bpy.data.objects if o.type == "MESH" and o.find_armature())
+bpy.context.view_layer.objects.active = obj
+if int(times):
+    modifier = obj.modifiers.new("Finer", "SUBSURF")
+    modifier.levels = int(times)
+    bpy.ops.object.modifier_move_to_index(modifier="Finer", index=0)
+    bpy.ops.object.modifier_apply(modifier="Finer")
+bpy.ops.wm.save_as_mainfile(filepath=target, copy=True, compress=True)
+print("vertices", len(obj.data.vertices))
+"""
+
+
+def run(command: list[str]) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def number(output: str, name: str) -> float:
+    """The one on the line that begins with `name`, among what Blender prints."""
+    return float(next(line.split()[1] for line in output.splitlines() if line.startswith(name + " ")))
+
+
+def plain(folder: Path) -> float:
+    """Seconds for opening and saving each file of a folder in one Blender, started before."""
+    paths = [str(path) for path in sorted(folder.glob("*.blend"))]
+    return number(run([sys.executable, "-c", OPEN_AND_SAVE, str(folder / "plain.out"), *paths]), "seconds")
+
+
+def batch(folder: Path, *options: str) -> dict[str, float]:
+    """Seconds a file in a batch, from the first that is done to the last; and in each step of it."""
+    with tempfile.TemporaryDirectory(dir=folder.parent) as out:
+        command = [*SINEW, "reskin", str(folder), "--method", "dq", "--out", out, *options]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        done = [time.perf_counter() for line in process.stderr]
+        if process.wait() != 0:
+            raise SystemExit("the batch failed")
+        rows = json.loads(Path(out, "report.json").read_text(encoding="utf-8"))["files"]
+    steps = rows[0]["seconds"]
+    found = {step: statistics.mean(row["seconds"][step] for row in rows[1:]) for step in steps}
+    return {"file": (done[-1] - done[0]) / (len(done) - 1), **found}
+
+
+def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str, float]:
+    """Milliseconds a file, and ratios."""
+    folder = work / "files"
+    folder.mkdir()
+    for index in range(files):
+        shutil.copy(source, folder / f"{index:03d}.blend")
+    bare = ("--frames", "none", "--no-pictures")
+    compared = ("--no-pictures",)
+    runs: dict[str, list] = {
+        "plain": [],
+        "bare": [],
+        "bare, 2 jobs": [],
+        "compared": [],
+        "compared, 2 jobs": [],
+    }
+    for _ in range(repetitions):
+        runs["plain"].append(plain(folder) / files)
+        runs["bare"].append(batch(folder, *bare, "--jobs", "1"))
+        runs["bare, 2 jobs"].append(batch(folder, *bare, "--jobs", "2"))
+        runs["compared"].append(batch(folder, *compared, "--jobs", "1"))
+        runs["compared, 2 jobs"].append(batch(folder, *compared, "--jobs", "2"))
+    drawn = batch(folder, "--jobs", "1")
+    shutil.rmtree(folder)
+
+    def least(name: str, step: str) -> float:
+        return min(run[step] for run in runs[name])
+
+    beside = [run["file"] - run["opening"] - run["deforming"] - run["saving"] for run in runs["bare"]]
+    # Of neighbours in time, as what else the machine does slows down both.
+    parts = [extra / own for extra, own in zip(beside, runs["plain"], strict=True)]
+    result = {
+        "Blender opens and saves": 1000 * min(runs["plain"]),
+        "opening, in the batch": 1000 * least("bare", "opening"),
+        "saving, in the batch": 1000 * least("bare", "saving"),
+        "deforming": 1000 * least("bare", "deforming"),
+        "beside those": 1000 * min(beside),
+        "beside those, % of Blender's own": 100 * statistics.median(parts),
+        "whole, 1 job": 1000 * least("bare", "file"),
+        "comparing 9 frames": 1000 * least("compared", "comparing"),
+        "drawing 2 pictures": 1000 * drawn["drawing"],
+        "2 jobs, times as fast": least("bare", "file") / least("bare, 2 jobs", "file"),
+        "2 jobs, compared, times as fast": least("compared", "file") / least("compared, 2 jobs", "file"),
+    }
+    return {name: round(value, 2) for name, value in result.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--files", type=int, default=48)
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    results: dict[str, object] = {
+        "bpy": importlib.metadata.version("bpy"),
+        "cores": os.cpu_count(),
+        "unit": "milliseconds a file",
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        for times, share in ((0, 1), (2, 2)):
+            source = work / f"{times}.blend"
+            command = [sys.executable, "-c", SUBDIVIDE, str(WRIST), str(source), str(times)]
+            vertices = number(run(command), "vertices")
+            name = f"{vertices:,.0f} vertices, {source.stat().st_size / 1e6:.1f} MB"
+            results[name] = measure(source, options.files // share, options.repetitions, work)
+            print(name)
+            for what, value in results[name].items():
+                print(f"  {what:36} {value:9.2f}", flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(results, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

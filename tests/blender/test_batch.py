@@ -1,0 +1,619 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Batches of files: workers, journal, kills, hangs, limits, report."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+
+import bpy
+import numpy as np
+import psutil
+import pytest
+import scenes
+import whole_file
+from program import COMMAND, ENVIRONMENT, run_sinew
+from sinew_addon.blender import files, properties
+
+newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="long: runs with the newest Blender alone")
+FAST = ("--frames", "none", "--no-pictures")
+
+
+def make_rig(path: Path, degrees: float = 100.0) -> Path:
+    """A small character in a file of its own."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    _obj, armature = scenes.make_arm(sides=6, rings=5)
+    scenes.key_pose(armature, degrees)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)
+    return path
+
+
+def make_rigs(folder: Path, count: int) -> list[Path]:
+    return [make_rig(folder / f"rig {number:03d}.blend", 20.0 + number) for number in range(count)]
+
+
+def make_work(path: Path, vertices: int, iterations: int) -> Path:
+    """A character beside a grid of `vertices` squared, smoothed so many times whenever it is evaluated."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes.make_arm(sides=6, rings=5)
+    group = bpy.data.node_groups.new("Work", "GeometryNodeTree")
+    group.is_modifier = True
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    grid, blur, position, place, out = (
+        group.nodes.new(kind)
+        for kind in (
+            "GeometryNodeMeshGrid",
+            "GeometryNodeBlurAttribute",
+            "GeometryNodeInputPosition",
+            "GeometryNodeSetPosition",
+            "NodeGroupOutput",
+        )
+    )
+    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = vertices
+    blur.data_type = "FLOAT_VECTOR"
+    blur.inputs["Iterations"].default_value = iterations
+    value = next(socket for socket in blur.inputs if socket.enabled and socket.name == "Value")
+    group.links.new(position.outputs["Position"], value)
+    group.links.new(grid.outputs["Mesh"], place.inputs["Geometry"])
+    group.links.new(next(s for s in blur.outputs if s.enabled), place.inputs["Position"])
+    group.links.new(place.outputs["Geometry"], out.inputs[0])
+    obj = bpy.data.objects.new("Work", bpy.data.meshes.new("Work"))
+    obj.modifiers.new("Work", "NODES").node_group = group
+    bpy.context.scene.collection.objects.link(obj)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # Saving as an artist does would evaluate it.
+    bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
+    bpy.data.objects.remove(obj)
+    return path
+
+
+def start_sinew(*args: object, **options: object) -> subprocess.Popen:
+    return subprocess.Popen(
+        [*COMMAND, *map(str, args)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        env=ENVIRONMENT,
+        **options,
+    )
+
+
+def blenders_of(process: subprocess.Popen) -> list[psutil.Process]:
+    """The Blenders that a batch has started."""
+    return psutil.Process(process.pid).children()
+
+
+def wait_for_work(process: subprocess.Popen, but: int | None = None, seconds: float = 3.0) -> psutil.Process:
+    """The first Blender, not that with the id `but`, that has been busy for so long: starting takes less."""
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
+        for blender in blenders_of(process):
+            try:
+                if blender.pid != but and sum(blender.cpu_times()[:2]) > seconds:
+                    return blender
+            except psutil.Error:
+                continue
+        time.sleep(0.05)
+    raise AssertionError("no Blender got to work")
+
+
+def report_of(out: Path) -> dict[str, dict]:
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    return {row["file"]: row for row in report["files"]}
+
+
+def journal_of(out: Path) -> list[dict]:
+    return [json.loads(line) for line in (out / "sinew-journal.jsonl").read_bytes().splitlines()]
+
+
+def unfinished_in(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob(".*") if "unfinished" in path.name]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        os.fsencode(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def driven_points(path: Path) -> dict[str, bytes]:
+    """The final points of a copy, and the settings that give them."""
+    files.open_file(path)
+    driven = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
+    assert driven, f"{path} is not re-skinned"
+    found = whole_file.evaluated([1, 6, 11])
+    return found | {f"{obj.name} method": properties.of(obj).method for obj in driven}
+
+
+def test_settings_for_files_and_objects(tmp_path):
+    """A job file's methods, by file and object, over those for all; names left out; a report that says so."""
+    for name in ("hero", "extra"):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        for part in ("Body", "Face", "Hair"):
+            scenes.make_arm(sides=6, rings=5, name=part)
+        props = bpy.data.collections.new("Props")
+        bpy.context.scene.collection.children.link(props)
+        hat, _ = scenes.make_arm(sides=6, rings=5, name="Hat")
+        props.objects.link(hat)
+        (tmp_path / "in" / "sub").mkdir(parents=True, exist_ok=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in" / "sub" / f"{name}.blend"))
+    (tmp_path / "job.toml").write_text(
+        """
+        inputs = ["in/**/*.blend"]
+        out = "out"
+        method = "dq"
+        exclude = ["Props"]
+
+        [[files]]
+        match = "sub/hero.blend"
+        include = ["Body", "F*"]
+
+        [[files.objects]]
+        match = "Face"
+        method = "lbs"
+        """
+    )
+    result = run_sinew("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
+    assert "2 of 2 files re-skinned" in result.stdout
+    methods = {}
+    for name in ("hero", "extra"):
+        files.open_file(tmp_path / "out" / "sub" / f"{name}.blend")
+        driven = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
+        methods[name] = {obj.name: properties.of(obj).method for obj in driven}
+    assert methods == {
+        "hero": {"Body": "dq", "Face": "lbs"},
+        "extra": {"Body": "dq", "Face": "dq", "Hair": "dq"},
+    }
+    rows = report_of(tmp_path / "out")
+    deviation = {mesh["object"]: mesh["deviation_part"] for mesh in rows["sub/hero.blend"]["meshes"]}
+    assert deviation["Face"] <= scenes.TOLERANCE < 0.01 < deviation["Body"]
+
+
+def test_report_has_pictures_of_the_worst_frame(tmp_path):
+    from PIL import Image
+
+    make_rig(tmp_path / "rig.blend")
+    (tmp_path / "bad.blend").write_text("nothing")
+    run_sinew(
+        "reskin",
+        tmp_path / "rig.blend",
+        tmp_path / "bad.blend",
+        "--method",
+        "dq",
+        "--out",
+        tmp_path / "out",
+        "--frames",
+        "1,11",
+        status=1,
+    )
+    row = report_of(tmp_path / "out")["rig.blend"]
+    assert row["pictures"]["frame"] == row["meshes"][0]["frame"] == 11
+    obj = bpy.data.objects["Arm"]
+    linear, dual = (scenes.modifier_shapes(obj, [11], preserve_volume=keep)[0] for keep in (False, True))
+    expected = np.linalg.norm(dual - linear, axis=1).max()
+    assert row["meshes"][0]["deviation"] == pytest.approx(expected, abs=1e-5)
+    folder = tmp_path / "out" / "report-pictures"
+    before, after = (
+        np.asarray(Image.open(folder / row["pictures"][name]).convert("RGBA"), dtype=np.float64)
+        for name in ("before", "after")
+    )
+    assert before[..., 3].std() > 20, "an empty picture"
+    assert 0.5 < np.abs(before - after).mean() < 100
+
+    class Reader(HTMLParser):
+        def __init__(self) -> None:
+            super().__init__()
+            self.text, self.images = "", []
+
+        def handle_data(self, data):
+            self.text += data
+
+        def handle_starttag(self, tag, attributes):
+            if tag == "img":
+                self.images.append(dict(attributes)["src"])
+
+    page = Reader()
+    page.feed((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    assert [(tmp_path / "out" / image).exists() for image in page.images] == [True, True]
+    assert "is not a .blend file" in page.text
+    assert "Armature, linear blend → dq" in page.text
+
+
+def test_a_file_does_not_depend_on_those_before_it(tmp_path):
+    """One Blender after the other files, and a fresh one, make the same of a file."""
+    folder = tmp_path / "in"
+    shutil.copytree(Path(__file__).resolve().parents[2] / "blend_files", folder)
+    make_rig(folder / "z.blend")
+    run_sinew("reskin", folder, "--method", "qv", "--out", tmp_path / "all", "--jobs", 1, "--no-pictures")
+    run_sinew("reskin", folder / "z.blend", "--method", "qv", "--out", tmp_path / "alone", *FAST)
+    both = []
+    for path in (tmp_path / "all" / "z.blend", tmp_path / "alone" / "z.blend"):
+        files.open_file(path, load_ui=True)
+        both.append(whole_file.of_open_file() | whole_file.evaluated([1, 6, 11]))
+    assert whole_file.differences(*both) == []
+
+
+@newest_only
+def test_resume_does_only_what_is_missing_or_changed(tmp_path):
+    paths = make_rigs(tmp_path / "in", 6)
+    (tmp_path / "in" / "bad.blend").write_text("nothing")
+    out = tmp_path / "out"
+    arguments = ("reskin", tmp_path / "in", "--out", out, *FAST)
+    run_sinew(*arguments, "--method", "dq", status=1)
+    written = {path.name: (out / path.name).stat().st_mtime_ns for path in paths}
+
+    make_rig(paths[0], 77.0)  # changed
+    (out / paths[1].name).unlink()  # missing
+    os.utime(paths[2])  # touched, with what was in it
+    (out / paths[3].name).write_bytes(b"edited by an artist")
+    result = run_sinew(*arguments, "--method", "dq", "--resume", status=1)
+    rows = report_of(out)
+    assert [rows[path.name]["status"] for path in paths] == [
+        "written",
+        "written",
+        "unchanged",
+        "failed",
+        "unchanged",
+        "unchanged",
+    ]
+    assert "was changed since it was written" in rows[paths[3].name]["error"]
+    assert (out / paths[3].name).read_bytes() == b"edited by an artist"
+    assert "is not a .blend file" in rows["bad.blend"]["error"]
+    assert (out / paths[2].name).stat().st_mtime_ns == written[paths[2].name]
+    assert "3 of them before" in result.stdout
+
+    (out / paths[3].name).unlink()
+    (tmp_path / "in" / "bad.blend").unlink()
+    # Half a line, as a full disk or a lost machine leaves it.
+    with (out / "sinew-journal.jsonl").open("ab") as journal:
+        journal.write(b'{"file":"rig 000.blend","writ')
+    run_sinew(*arguments, "--method", "dq", "--resume")
+    assert Counter(row["status"] for row in report_of(out).values()) == {"unchanged": 5, "written": 1}
+    run_sinew(*arguments, "--method", "lbs", "--resume")
+    assert Counter(row["status"] for row in report_of(out).values()) == {"written": 6}
+    assert driven_points(out / paths[0].name)["Arm method"] == "lbs"
+
+
+@newest_only
+def test_hang_crash_and_greed_fail_alone(tmp_path):
+    make_work(tmp_path / "in" / "a endless.blend", 500, 100_000_000)
+    make_work(tmp_path / "in" / "b greedy.blend", 8000, 1)
+    make_rig(tmp_path / "in" / "c good.blend")
+    out = tmp_path / "out"
+    arguments = ("reskin", tmp_path / "in", "--method", "dq", "--out", out, *FAST, "--jobs", 1)
+    run_sinew(*arguments, "--timeout", 3, "--memory", "700MiB", status=1)
+    rows = report_of(out)
+    assert "no end after 3 s while opening it; tried 2 times" in rows["a endless.blend"]["error"]
+    assert "needed more than 700 MiB" in rows["b greedy.blend"]["error"]
+    assert rows["c good.blend"]["status"] == "written"
+
+    process = start_sinew(*arguments, "--resume", "--memory", "700MiB")
+    first = wait_for_work(process)
+    # While one batch is at work in a folder, no other is.
+    refused = run_sinew(*arguments, "--resume", status=2)
+    assert "another batch is at work there" in refused.stderr
+    first.send_signal(signal.SIGSEGV)
+    wait_for_work(process, but=first.pid).send_signal(signal.SIGSEGV)
+    _output, errors = process.communicate(timeout=120)
+    assert process.returncode == 1, errors
+    rows = report_of(out)
+    assert "Blender crashed (SIGSEGV) while opening it; tried 2 times" in rows["a endless.blend"]["error"]
+    assert rows["c good.blend"]["status"] == "unchanged"
+    assert unfinished_in(out) == []
+
+
+@newest_only
+def test_ctrl_c_stops_cleanly(tmp_path):
+    folder = tmp_path / "in"
+    make_rigs(folder, 4)
+    make_work(folder / "z endless.blend", 500, 100_000_000)
+    process = start_sinew("reskin", folder, "--method", "dq", "--out", tmp_path / "out", *FAST, "--jobs", 2)
+    lines = [process.stderr.readline() for _ in range(4)]
+    assert all("1 mesh" in line for line in lines), lines
+    blenders = [wait_for_work(process)]
+    process.send_signal(signal.SIGINT)
+    _output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "4 of 5 files are done; --resume does the others" in errors
+    assert "Traceback" not in errors
+    assert not any(blender.is_running() for blender in blenders)
+    assert unfinished_in(tmp_path / "out") == []
+    assert len(journal_of(tmp_path / "out")) == 4
+
+
+def test_full_disk(tmp_path):
+    """A limit on the size of files stands in for it: a write stops half-way, with an error."""
+    paths = make_rigs(tmp_path / "in", 3)
+    out = tmp_path / "out"
+    arguments = ("reskin", tmp_path / "in", "--method", "dq", "--out", out, *FAST)
+
+    def limited(size: int) -> str:
+        process = start_sinew(
+            *arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+        )
+        _output, errors = process.communicate(timeout=120)
+        assert process.returncode == 1, errors
+        assert "Traceback" not in errors, errors
+        assert list(out.glob("*.blend")) == []
+        assert unfinished_in(out) == []
+        return errors
+
+    assert limited(8000).count("can not be written") == 3
+    (out / "sinew-journal.jsonl").unlink()
+    assert "sinew-journal.jsonl: can not be written" in limited(100)
+    run_sinew(*arguments, "--resume")
+    assert [driven_points(out / path.name)["Arm method"] for path in paths] == ["dq"] * 3
+
+
+def test_links_are_kept_and_reported(tmp_path):
+    """Linked characters are reported, missing libraries kept; relative paths still lead there."""
+    make_rig(tmp_path / "library" / "hero.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes.make_arm(sides=6, rings=5, name="Local")
+    hero = tmp_path / "library" / "hero.blend"
+    shot = tmp_path / "shots" / "shot.blend"
+    shot.parent.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    for library, relative in ((hero, True), (tmp_path / "library" / "gone.blend", False)):
+        if not library.exists():
+            shutil.copy(hero, library)
+        with bpy.data.libraries.load(str(library), link=True, relative=relative) as (_, to):
+            to.objects = ["Arm"]
+        bpy.context.scene.collection.objects.link(to.objects[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    (tmp_path / "library" / "gone.blend").unlink()
+
+    out = tmp_path / "out" / "deep"
+    run_sinew("reskin", shot, "--method", "dq", "--out", out, *FAST, status=1)
+    row = report_of(out)["shot.blend"]
+    assert [mesh["object"] for mesh in row["meshes"]] == ["Local"]
+    assert any("linked from another file" in reason for reason in row["left_out"])
+    assert [note for note in row["notes"] if "gone.blend is missing" in note]
+    files.open_file(out / "shot.blend")
+    libraries = {
+        os.path.normpath(bpy.path.abspath(library.filepath)): len(library.users_id)
+        for library in bpy.data.libraries
+    }
+    assert set(libraries) == {str(hero), str(tmp_path / "library" / "gone.blend")}
+    assert all(libraries.values())
+
+
+@newest_only
+def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
+    folder = tmp_path / "in"
+    good, broken = make_library(folder, 200)
+    before = contents(folder)
+    out = tmp_path / "local"
+    lock_folder(out / "locked")
+    result = run_sinew("reskin", folder, "--method", "dq", "--out", out, "--no-pictures", status=1)
+    assert contents(folder) == before
+    rows = report_of(out)
+    assert len(rows) == len(good) + len(broken) == 200
+    for name, reason in broken.items():
+        row = rows[name]
+        assert reason in (row.get("error") or " ".join(row["left_out"])), (name, row)
+    for name in good:
+        # What is not text in a name is shown as a ?.
+        name = name.encode("utf-8", "replace").decode()
+        assert rows[name]["status"] == "written", (name, rows[name])
+        assert not rows[name]["left_out"]
+    assert "written by a newer Blender, 99.0" in rows["from the future.blend"]["notes"][0]
+    assert f"{len(good)} of {len(good) + len(broken)} files re-skinned" in result.stdout
+    assert unfinished_in(out) == []
+
+    sample = [name for name in good if name.startswith(("names", "rig"))][::9]
+    with Cluster(tmp_path) as cluster:
+        there = tmp_path / "cluster"
+        lock_folder(there / "locked")
+        process = start_sinew(
+            "reskin", folder, "--method", "dq", "--out", there, *FAST, "--scheduler", cluster.address
+        )
+        for _ in range(40):
+            process.stderr.readline()
+        cluster.lose_a_worker()
+        _output, errors = process.communicate(timeout=300)
+        assert process.returncode == 1, errors
+    assert unfinished_in(there) == []
+    elsewhere = report_of(there)
+    assert {name: row["status"] for name, row in rows.items()} == {
+        name: row["status"] for name, row in elsewhere.items()
+    }
+    run_sinew(
+        "reskin",
+        *(folder / name for name in sample),
+        "--method",
+        "dq",
+        "--jobs",
+        1,
+        "--out",
+        tmp_path / "one",
+        *FAST,
+    )
+    for name in sample:
+        points = driven_points(out / name)
+        assert points == driven_points(there / name) == driven_points(tmp_path / "one" / Path(name).name), (
+            name
+        )
+
+
+@newest_only
+def test_killed_at_random_20_times(tmp_path):
+    folder, out = tmp_path / "in", tmp_path / "out"
+    paths = make_rigs(folder, 60)
+    before = contents(folder)
+    choose = random.Random(8)
+    arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
+    for _ in range(20):
+        process = start_sinew(*arguments, "--jobs", choose.randint(1, 2))
+        for _ in range(choose.randint(0, 3)):
+            line = process.stderr.readline()
+            while line and "unchanged" in line:
+                line = process.stderr.readline()
+        time.sleep(choose.uniform(0.0, 0.06))
+        blenders = blenders_of(process)
+        process.kill()
+        process.communicate()
+        _gone, left = psutil.wait_procs(blenders, timeout=10)
+        assert left == [], "a Blender outlived its batch"
+        # What has its name is whole: the very file that its record speaks of.
+        records = {r["file"]: r for r in journal_lines(out)}
+        for copy in out.glob("[!.]*.blend"):
+            status = copy.stat()
+            assert records[copy.name]["written"] == [status.st_size, status.st_mtime_ns]
+    killed = len(list(out.glob("[!.]*.blend")))
+    assert 0 < killed < 60, "the kills came too late to mean anything"
+    result = run_sinew(*arguments)
+    assert "60 of 60 files" in result.stdout
+    assert contents(folder) == before
+    assert unfinished_in(out) == []
+    times = Counter(record["file"] for record in journal_of(out) if "error" not in record)
+    assert times == {path.name: 1 for path in paths}, "lost, or done twice"
+    for path in paths:
+        assert driven_points(out / path.name)["Arm method"] == "dq"
+
+
+def journal_lines(out: Path) -> list[dict]:
+    """Its whole lines, of a journal that may end in half of one."""
+    try:
+        content = (out / "sinew-journal.jsonl").read_bytes()
+    except FileNotFoundError:
+        return []
+    return [json.loads(line) for line in content[: content.rfind(b"\n") + 1].splitlines()]
+
+
+def lock_folder(path: Path) -> None:
+    """A folder in which nothing can be made, not even by root."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if os.geteuid() == 0:
+        path.symlink_to("/proc", target_is_directory=True)
+    else:
+        path.mkdir(mode=0o555)
+
+
+def make_library(folder: Path, count: int) -> tuple[list[str], dict[str, str]]:
+    """Files good and bad: names of those to be re-skinned; of the others, with what is to be said of them."""
+    alphabets = ["Ünïcödé", "名前", "имя", "اسم", "שם", "ชื่อ", "नाम", "이름", "όνομα", "🦴 bone", "名" * 70]
+    signs = [
+        "it's",
+        'a "quote"',
+        "new\nline",
+        "-dash",
+        "100%",
+        "[brackets]",
+        "*",
+        "back\\slash",
+        "$HOME",
+        " space ",
+    ]
+    good = [f"names/{name}.blend" for name in [*alphabets, *signs, "dot.dot"]]
+    if sys.platform == "linux":
+        good.append(f"names/{os.fsdecode(b'latin-1 ' + bytes([0xE9]))}.blend")
+    template = make_rig(folder / "rig.blend")
+    good.append("rig.blend")
+    whole = template.read_bytes()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "plain.blend"), compress=False)
+    good.append("plain.blend")
+    plain = (folder / "plain.blend").read_bytes()
+    for name in good:
+        if name.startswith("names"):
+            (folder / "names").mkdir(exist_ok=True)
+            (folder / name).write_bytes(whole)
+
+    broken: dict[str, str] = {}
+
+    def broke(name: str, content: bytes, reason: str) -> None:
+        path = folder / "broken" / f"{name}.blend"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+        broken[f"broken/{name}.blend"] = reason
+
+    broke("empty", b"", "is empty")
+    broke("text", b"not a blend file", "is not a .blend file")
+    broke("picture", b"\x89PNG\r\n\x1a\n" + bytes(100), "is not a .blend file")
+    broke("header only", plain[:12], "Blender can not read it")
+    broke("magic only", b"BLENDER", "Blender can not read it")
+    broke("gzip of nothing", b"\x1f\x8b" + bytes(30), "Blender can not read it")
+    broke("zstd of nothing", b"\x28\xb5\x2f\xfd" + bytes(30), "Blender can not read it")
+    for part in (3, 10, 50, 90):
+        broke(f"{part} percent", plain[: len(plain) * part // 100], "Blender can not read it")
+        broke(f"{part} percent, compressed", whole[: len(whole) * part // 100], "Blender can not read it")
+    assert plain.startswith(b"BLENDER17-01v0")
+    (folder / "from the future.blend").write_bytes(b"BLENDER17-01v9900" + plain[17:])
+    good.append("from the future.blend")
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "broken" / "no armature.blend"))
+    broken["broken/no armature.blend"] = "no mesh is deformed by an armature"
+
+    # An armature in a library that is gone, with its absolute path.
+    library = make_rig(folder.parent / "library.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj, _armature = scenes.make_arm(sides=6, rings=5)
+    with bpy.data.libraries.load(str(library), link=True) as (_, to):
+        to.objects = ["Arm Rig"]
+    obj.modifiers["Armature"].object = to.objects[0]
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "broken" / "armature is gone.blend"))
+    library.unlink()
+    broken["broken/armature is gone.blend"] = "no mesh is deformed by an armature"
+
+    make_rig(folder / "locked" / "in a locked folder.blend")
+    broken["locked/in a locked folder.blend"] = "can not be written"
+    (folder / "a folder.blend").mkdir()
+    (folder / "nowhere.blend").symlink_to(folder / "no such file")
+    (folder / "backup.blend1").write_bytes(whole)
+
+    more = count - len(good) - len(broken)
+    make_rigs(folder / "rigs", more)
+    good += [f"rigs/rig {number:03d}.blend" for number in range(more)]
+    return good, broken
+
+
+class Cluster:
+    """A dask scheduler and two workers, in processes of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._processes: list[subprocess.Popen] = []
+        address_file = folder / "scheduler.json"
+        options = ("--scheduler-file", str(address_file), "--no-dashboard")
+        self._start("scheduler", *options, "--port", "0", "--host", "127.0.0.1")
+        for _ in range(2):
+            self._start("worker", *options, "--nthreads", "1", "--local-directory", str(folder))
+        end = time.monotonic() + 60
+        while not address_file.exists() and time.monotonic() < end:
+            time.sleep(0.1)
+        self.address = json.loads(address_file.read_text())["address"]
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        for process in reversed(self._processes):
+            process.terminate()
+        for process in self._processes:
+            process.wait(timeout=30)
+
+    def lose_a_worker(self) -> None:
+        """Kills one with what it is at; its keeper starts another."""
+        for process in psutil.Process(self._processes[-1].pid).children():
+            process.kill()
+
+    def _start(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "dask", *arguments]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        self._processes.append(subprocess.Popen(command, env=ENVIRONMENT, **quiet))

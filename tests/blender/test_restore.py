@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew reskin`, then `sinew restore`: every property of every datablock is what it was."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+
+import bpy
+import scenes
+import whole_file
+from conftest import REPOSITORY
+from program import run_sinew
+from sinew_addon.blender import files, properties
+
+FRAMES = [1, 6, 11]
+
+
+def save(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
+    return path
+
+
+def content(path: Path) -> dict[str, object]:
+    files.open_file(path, load_ui=True)
+    found = whole_file.of_open_file()
+    # Last, as going to a frame writes what is animated.
+    return found | whole_file.evaluated(FRAMES)
+
+
+def full_scene(folder: Path) -> Path:
+    """A file with something of everything that Sinew comes near to."""
+    bpy.data.workspaces[0].name = "Animator's own"
+    obj, armature = scenes.make_arm(sides=6, rings=9)
+    mesh = obj.data
+    mesh.uv_layers.new(name="UV")
+    mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+    mesh.attributes.new("sinew_notes", "FLOAT", "POINT")
+    mesh.attributes.active_index = 1
+    mesh["made by"] = {"who": "an artist", "when": [1, 2, 3]}
+    obj["price"] = 3.5
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    obj.modifiers.new("Second", "ARMATURE").object = armature
+    obj.modifiers["Second"].show_viewport = obj.modifiers["Second"].show_render = False
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    obj.modifiers["Armature"].show_on_cage = True
+    obj.modifiers["Armature"].use_pin_to_last = False
+    obj.modifiers.active = obj.modifiers["Subdivision"]
+    driver = obj.driver_add('modifiers["Subdivision"].render_levels').driver
+    driver.expression = "1 + 1"
+    obj.keyframe_insert('modifiers["Armature"].show_in_editmode', frame=3)
+
+    keyed, _ = scenes.make_arm(sides=6, rings=9, name="Keyed")
+    keyed.shape_key_add(name="Basis")
+    block = keyed.shape_key_add(name="Fat")
+    for point in block.data:
+        point.co *= 1.3
+    block.keyframe_insert("value", frame=1)
+    block.value = 1.0
+    block.keyframe_insert("value", frame=11)
+    keyed.active_shape_key_index = 1
+
+    # Animation data without anything in it, as unlinking an action leaves it.
+    bare, _ = scenes.make_arm(sides=6, rings=9, name="Bare")
+    bare.animation_data_create()
+    layered, _ = scenes.make_arm(sides=6, rings=9, name="Layered")
+    layered.keyframe_insert("location", frame=1)
+    track = layered.animation_data.nla_tracks.new()
+    track.strips.new("strip", 1, layered.animation_data.action)
+    layered.animation_data.action = None
+
+    # What Sinew needs helpers for: a modifier in front, chained modifiers, the parent's own deformation.
+    mirrored, _ = scenes.make_arm(sides=6, rings=9, name="Mirrored")
+    mirrored.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
+    mirrored.modifiers.move(1, 0)
+    chained, chain = scenes.make_arm(sides=6, rings=9, name="Chained")
+    second = chained.modifiers.new("Multi", "ARMATURE")
+    second.object, second.use_multi_modifier, second.vertex_group = chain, True, "bone.1"
+    chained.keyframe_insert('modifiers["Multi"].show_viewport', frame=2)
+    child, parent = scenes.make_arm(sides=6, rings=9, name="Child")
+    child.modifiers.clear()
+    child.parent, child.parent_type = parent, "ARMATURE"
+
+    # Two objects of one mesh; one that only renders; one that no armature deforms.
+    twin = obj.copy()
+    twin.name = "Twin"
+    bpy.context.scene.collection.objects.link(twin)
+    shadow, _ = scenes.make_arm(sides=6, rings=9, name="Render Only")
+    shadow.modifiers["Armature"].show_viewport = False
+    shadow.modifiers["Armature"].show_expanded = False
+    shadow.hide_viewport = True
+    off, _ = scenes.make_arm(sides=6, rings=9, name="Off")
+    off.modifiers["Armature"].show_viewport = off.modifiers["Armature"].show_render = False
+    other = bpy.data.scenes.new("Other Scene")
+    elsewhere, rig = scenes.make_arm(sides=6, rings=9, name="Elsewhere")
+    for each in (elsewhere, rig):
+        bpy.context.scene.collection.objects.unlink(each)
+        other.collection.objects.link(each)
+    hidden = bpy.data.collections.new("Hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
+    excluded, _ = scenes.make_arm(sides=6, rings=9, name="Excluded")
+    bpy.context.scene.collection.objects.unlink(excluded)
+    hidden.objects.link(excluded)
+
+    # Posed by hand, beside its keys: nobody may go to a frame before saving.
+    armature.pose.bones[0].rotation_quaternion = (math.cos(0.2), 0.0, math.sin(0.2), 0.0)
+    bpy.context.scene.frame_current = 4
+    path = save(folder / "full.blend")
+    library = folder / "library" / "props.blend"
+    library.parent.mkdir()
+    shutil.copy(path, library)
+    with bpy.data.libraries.load(str(library), link=True, relative=True) as (_, to):
+        to.materials, to.objects = ["Material"], ["Bare"]
+    mesh.materials.append(to.materials[0])
+    hero = to.objects[0]
+    bpy.context.scene.collection.objects.link(hero)
+    hero.override_create(remap_local_usages=True).name = "Override"
+    return save(path)
+
+
+def test_everything_comes_back(tmp_path):
+    """A full scene and two samples, as this Blender saves them, for it adds what older files lack."""
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+    paths = [full_scene(tmp_path / "input")]
+    for sample in (REPOSITORY / "blend_files" / name for name in ("tentacle.blend", "wrist.blend")):
+        files.open_file(sample, load_ui=True)
+        paths.append(save(tmp_path / "input" / sample.name))
+    bytes_before = [path.read_bytes() for path in paths]
+    run_sinew("reskin", *paths, "--method", "dq", "--out", tmp_path / "reskinned", "--no-pictures")
+    run_sinew("restore", tmp_path / "reskinned", "--out", tmp_path / "restored")
+    assert [path.read_bytes() for path in paths] == bytes_before
+    for path in paths:
+        files.open_file(tmp_path / "reskinned" / path.name)
+        assert [obj for obj in bpy.data.objects if properties.is_driven(obj)], path.name
+        before = content(path)
+        assert whole_file.differences(before, content(tmp_path / "restored" / path.name)) == [], path.name
+
+
+def test_the_comparison_sees_a_difference():
+    obj, _armature = scenes.make_arm()
+    before = whole_file.of_open_file()
+    obj.modifiers["Armature"].show_on_cage = True
+    obj.data.vertices[7].co.x += 1e-6
+    obj.animation_data_create()
+    changed = whole_file.differences(before, whole_file.of_open_file())
+    assert len([line for line in changed if "show_on_cage" in line]) == 1
+    assert len([line for line in changed if "vertices[7].co" in line]) == 1
+    assert len([line for line in changed if "animation_data" in line]) >= 1
+
+
+def test_what_sinew_is_not_on_is_a_sentence(tmp_path):
+    scenes.make_arm()
+    path = save(tmp_path / "plain.blend")
+    result = run_sinew("restore", path, "--out", tmp_path / "out", status=1)
+    assert "no mesh is deformed by Sinew" in result.stderr
+    assert not (tmp_path / "out" / "plain.blend").exists()

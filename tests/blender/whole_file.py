@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All that the open file holds: every property of every datablock, walked through RNA, to compare files."""
+
+from __future__ import annotations
+
+import os
+import warnings
+
+import bpy
+import scenes
+
+# Of this process, or computed anew from the rest; nothing that a file holds.
+VOLATILE = {
+    "bl_rna",
+    "corner_normals",
+    "depsgraph",
+    "execution_time",
+    "id_data",
+    "is_evaluated",
+    "is_runtime_data",
+    "loop_triangle_polygons",
+    "loop_triangles",
+    "original",
+    "polygon_normals",
+    "rna_type",
+    "session_uid",
+    "spaces",  # 4.2 crashes when asked what an editor shows
+    "tag",
+    "uv_sculpt",  # and when asked for its brush
+    "vertex_normals",
+}
+
+
+def of_open_file() -> dict[str, object]:
+    """Path of each value -> the value."""
+    found: dict[str, object] = {}
+    for collection in bpy.data.bl_rna.properties:
+        # 5.0 lists all once more.
+        if collection.type != "COLLECTION" or collection.identifier == "all_ids":
+            continue
+        for item in getattr(bpy.data, collection.identifier):
+            # The last render is this process's own.
+            is_render = isinstance(item, bpy.types.Image) and item.source == "VIEWER"
+            if isinstance(item, bpy.types.ID) and not is_render:
+                path = f"{collection.identifier}[{item.name_full}]"
+                found[path] = item.users
+                _Walk(found, item).struct(item, path)
+    return found
+
+
+def evaluated(frames: list[int]) -> dict[str, object]:
+    """The final points of every mesh of every scene's view layer at these frames."""
+    found = {}
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        for obj in bpy.context.view_layer.objects:
+            if obj.type == "MESH":
+                found[f"{obj.name_full} at {frame}"] = scenes.final_points(obj).tobytes()
+    return found
+
+
+def differences(before: dict[str, object], after: dict[str, object]) -> list[str]:
+    """One line for each value that is not the same."""
+    lines = [f"gone: {path} = {before[path]!r}" for path in before if path not in after]
+    lines += [f"new: {path} = {after[path]!r}" for path in after if path not in before]
+    lines += [
+        f"{path}: {before[path]!r} -> {after[path]!r}"
+        for path in before
+        if path in after and before[path] != after[path]
+    ]
+    return [line if len(line) < 300 else f"{line[:300]}…" for line in lines]
+
+
+class _Walk:
+    """Through one datablock: what it holds is walked, once; what it refers to elsewhere is noted by name."""
+
+    def __init__(self, found: dict[str, object], owner: bpy.types.ID) -> None:
+        self.found = found
+        self.owner = owner
+        self.seen: dict[tuple[int, str], str] = {}
+
+    def struct(self, data: bpy.types.bpy_struct, path: str) -> None:
+        key = (data.as_pointer(), data.bl_rna.identifier)
+        if key in self.seen:
+            self.found[path] = f"see {self.seen[key]}"
+            return
+        self.seen[key] = path
+        for prop in data.bl_rna.properties:
+            if prop.identifier not in VOLATILE:
+                self.value(data, prop, f"{path}.{prop.identifier}")
+        self.custom(data, path)
+
+    def value(self, data: bpy.types.bpy_struct, prop: bpy.types.Property, path: str) -> None:
+        if prop.is_runtime and not data.is_property_set(prop.identifier):
+            # Reading a group that an extension registered would make it.
+            self.found[path] = "not set"
+            return
+        try:
+            with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+                value = getattr(data, prop.identifier)
+        except (AttributeError, RuntimeError, ValueError, UnicodeDecodeError) as error:
+            self.found[path] = type(error).__name__
+            return
+        if prop.type == "COLLECTION":
+            self.found[path] = len(value)
+            for index, item in enumerate(value):
+                self.pointer(item, f"{path}[{index}]")
+        elif prop.type == "POINTER":
+            self.pointer(value, path)
+        elif getattr(prop, "is_array", False):
+            self.found[path] = _flat(value)
+        elif prop.type == "STRING" and isinstance(value, str) and len(value) > 2 and value.startswith("//"):
+            # A copy elsewhere has another way to the same place. Blender leaves // alone.
+            self.found[path] = os.path.normpath(bpy.path.abspath(value, library=self.owner.library))
+        else:
+            self.found[path] = repr(value)
+
+    def pointer(self, value: object, path: str) -> None:
+        if isinstance(value, bpy.types.ID) and not getattr(value, "is_embedded_data", False):
+            self.found[path] = f"{type(value).__name__} {value.name_full}"
+        elif isinstance(value, bpy.types.bpy_struct):
+            if value.id_data is not None and value.id_data != self.owner and not _embedded(value.id_data):
+                self.found[path] = f"{type(value).__name__} in {value.id_data.name_full}"
+            else:
+                self.struct(value, path)
+        else:
+            self.found[path] = repr(value)
+
+    def custom(self, data: bpy.types.bpy_struct, path: str) -> None:
+        try:
+            items = list(data.items())
+        except (AttributeError, TypeError):
+            return
+        for name, value in items:
+            self.found[f"{path}[{name!r}]"] = repr(_plain(value))
+
+
+def _plain(value: object) -> object:
+    """A custom property without the addresses that Blender shows it with."""
+    if hasattr(value, "to_dict"):
+        return {name: _plain(item) for name, item in value.items()}
+    if hasattr(value, "to_list"):
+        return value.to_list()
+    return [_plain(item) for item in value] if isinstance(value, list) else value
+
+
+def _embedded(block: bpy.types.ID) -> bool:
+    return bool(getattr(block, "is_embedded_data", False))
+
+
+def _flat(value: object) -> list[object]:
+    return [x for row in value for x in _flat(row)] if hasattr(value, "__len__") else [repr(value)]

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a batch reads, writes and remembers, without a Blender: inputs, job files, journals."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+from sinew_addon.batch.inputs import plan_jobs
+from sinew_addon.batch.job_file import Settings, read_job_file
+from sinew_addon.batch.journal import NAME, Journal, stamp
+from sinew_addon.core.errors import SinewError, WrongUse
+
+METHODS = ("lbs", "dq")
+
+
+@pytest.fixture
+def studio(tmp_path, monkeypatch):
+    """A folder with files in it, which is the current one."""
+    folder = tmp_path / "studio"
+    for name in ("a.blend", "chars/hero.blend", "chars/old/hero.blend", "chars/fox.glb", "notes.txt"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def planned(inputs, out="out", listed=()):
+    """Sources and copies, relative to the current folder."""
+    jobs = plan_jobs(inputs, Path(out), listed)
+    return {
+        job.source.relative_to(Path.cwd()).as_posix(): job.target.relative_to(Path.cwd()).as_posix()
+        for job in jobs
+    }
+
+
+@pytest.mark.parametrize(
+    ("inputs", "expected"),
+    [
+        (["a.blend"], {"a.blend": "out/a.blend"}),
+        (["chars/fox.glb"], {"chars/fox.glb": "out/fox.blend"}),
+        (
+            ["chars"],
+            {"chars/hero.blend": "out/hero.blend", "chars/old/hero.blend": "out/old/hero.blend"},
+        ),
+        (
+            ["chars/**/*.blend"],
+            {"chars/hero.blend": "out/hero.blend", "chars/old/hero.blend": "out/old/hero.blend"},
+        ),
+        (["ch*/old/*.blend"], {"chars/old/hero.blend": "out/chars/old/hero.blend"}),
+        (["a.blend", "./a.blend", "."], None),
+    ],
+)
+def test_inputs(studio, inputs, expected):
+    found = planned(inputs)
+    if expected is None:
+        # Named twice and in a folder, done once.
+        assert sorted(found) == ["a.blend", "chars/hero.blend", "chars/old/hero.blend"]
+    else:
+        assert found == expected
+
+
+def test_a_list_keeps_the_tree_below_what_its_files_have_in_common(studio):
+    lines = ["chars/hero.blend\n", "\n", f"{studio}/chars/old/hero.blend\r\n"]
+    assert planned(["-"], listed=lines) == {
+        "chars/hero.blend": "out/hero.blend",
+        "chars/old/hero.blend": "out/old/hero.blend",
+    }
+    assert planned(["-"], listed=["a.blend\n", "chars/hero.blend\n"]) == {
+        "a.blend": "out/a.blend",
+        "chars/hero.blend": "out/chars/hero.blend",
+    }
+
+
+def test_a_name_with_brackets_is_a_name_where_it_exists(studio):
+    (studio / "b[1].blend").touch()
+    assert planned(["b[1].blend"]) == {"b[1].blend": "out/b[1].blend"}
+
+
+def test_copies_of_an_earlier_run_are_not_inputs(studio):
+    (studio / "chars" / "out").mkdir()
+    (studio / "chars" / "out" / "hero.blend").touch()
+    (studio / "chars" / ".0123.unfinished.blend").touch()
+    assert sorted(planned(["chars"], "chars/out")) == ["chars/hero.blend", "chars/old/hero.blend"]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "out", "sentence"),
+    [
+        (["chars"], "chars", "would replace an input"),
+        (["a.blend"], ".", "would replace an input"),
+        (["chars/hero.blend", "chars/old/hero.blend"], "out", "would both be written"),
+        (["x*.blend"], "out", "no file matches"),
+        (["-"], "out", "no paths"),
+    ],
+)
+def test_plans_that_make_no_sense(studio, inputs, out, sentence):
+    with pytest.raises(WrongUse, match=sentence):
+        planned(inputs, out)
+
+
+def test_an_empty_folder(studio):
+    (studio / "empty").mkdir()
+    with pytest.raises(WrongUse, match=r"no \.blend files"):
+        planned(["empty"])
+
+
+JOB = """\
+# For all files.
+inputs = ["chars"]
+out = "done"
+method = "lbs"
+exclude = [
+    "Proxy*",  # said for all
+]
+
+[[objects]]
+match = "Face"
+method = "dq"
+
+[[files]]
+match = ["hero*.blend", "old/*.blend"]
+method = "dq"
+exclude = []
+
+[[files.objects]]
+match = "Face*"
+method = "lbs"
+"""
+
+
+def read(tmp_path, text):
+    (tmp_path / "job.toml").write_text(text, encoding="utf-8")
+    return read_job_file(tmp_path / "job.toml", METHODS)
+
+
+def test_settings_of_files(tmp_path):
+    job = read(tmp_path, JOB)
+    assert job.inputs == (str(tmp_path / "chars"),)
+    assert job.out == str(tmp_path / "done")
+    plain = job.settings_of(Path("/x/a.blend"), Settings())
+    assert plain.as_task() == {
+        "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [["Face", "dq"]]
+    }  # fmt: skip
+    hero = job.settings_of(Path("/x/hero 1.blend"), Settings())
+    assert hero.as_task() == {
+        "method": "dq", "include": [], "exclude": [], "objects": [["Face", "dq"], ["Face*", "lbs"]]
+    }  # fmt: skip
+    assert job.settings_of(Path("/x/old/a.blend"), Settings()).method == "dq"
+    # The command line speaks for all files, a rule for its own.
+    given = Settings(method="dq", include=("Body",))
+    assert job.settings_of(Path("/x/a.blend"), given).method == "dq"
+    assert job.settings_of(Path("/x/hero.blend"), given).include == ("Body",)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ('method = "lbs"\nexclude', 'method = "best"\nexclude', 4, "expected one of lbs, dq, got 'best'"),
+        ('out = "done"', "out = 3", 3, "out: expected text in quotes, got 3"),
+        ('out = "done"', 'output = "done"', 3, "output: no such key; expected one of inputs"),
+        ('"Proxy*",', "7,", 5, "exclude: expected a list such as"),
+        ('match = "Face"\n', "", 9, "match is missing"),
+        ('method = "dq"\nexclude', 'methd = "dq"\nexclude', 15, "methd: no such key"),
+        ('match = "Face*"\nmethod = "lbs"', 'match = "Face*"\nmethod = "dqs"', 20, "got 'dqs'"),
+        ('match = "Face*"\n', "match = []\n", 19, "match: expected text in quotes"),
+        (
+            "[[files.objects]]",
+            "[files.objects]",
+            18,
+            r"objects: expected entries that begin with \[\[files.objects",
+        ),
+    ],
+)
+def test_errors_have_a_line(tmp_path, old, new, line, sentence):
+    assert JOB.count(old) == 1
+    with pytest.raises(WrongUse, match=rf"job\.toml:{line}: .*{sentence}"):
+        read(tmp_path, JOB.replace(old, new))
+
+
+def test_errors_of_the_format_have_a_line(tmp_path):
+    with pytest.raises(WrongUse, match=r"line 4, column 10"):
+        read(tmp_path, JOB.replace('method = "lbs"\nexclude', "method = lbs\nexclude"))
+    (tmp_path / "job.toml").write_bytes(b"\n\nout = '\xff'\n")
+    with pytest.raises(WrongUse, match=r"job\.toml:3: is not UTF-8"):
+        read_job_file(tmp_path / "job.toml", METHODS)
+    with pytest.raises(WrongUse, match="can not be read"):
+        read_job_file(tmp_path / "none.toml", METHODS)
+
+
+def saved(folder, name="a.blend"):
+    """A copy saved but not named, and its record."""
+    unfinished = folder / ".1.unfinished.blend"
+    unfinished.write_bytes(b"a copy")
+    return {"unfinished": unfinished.name, "written": stamp(unfinished), "source": name}
+
+
+def test_a_run_killed_before_the_name_is_finished_by_the_next(tmp_path):
+    target = tmp_path / "a.blend"
+    with Journal(tmp_path) as journal:
+        record = saved(tmp_path)
+        journal.record(target, record)
+    assert not target.exists()
+    with Journal(tmp_path) as journal:
+        journal.recover()
+        assert target.read_bytes() == b"a copy"
+        assert journal.holds(target, journal.latest["a.blend"])
+        target.write_bytes(b"edited")
+        journal.recover()
+        assert not journal.holds(target, journal.latest["a.blend"])
+
+
+def test_what_has_no_record_is_cleared_away(tmp_path):
+    saved(tmp_path)
+    (tmp_path / ".2.unfinished.blend@").write_bytes(b"Blender's own")
+    with Journal(tmp_path) as journal:
+        journal.recover()
+        journal.clear_away([tmp_path / "a.blend"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == [NAME]
+
+
+def test_half_a_line_is_as_if_it_had_never_been(tmp_path):
+    with Journal(tmp_path) as journal:
+        journal.record(tmp_path / "a.blend", {"error": "one"})
+        journal.record(tmp_path / "b.blend", {"error": "two"})
+    whole = (tmp_path / NAME).read_bytes()
+    second = whole.index(b"\n") + 1
+    for length in range(second, len(whole)):
+        (tmp_path / NAME).write_bytes(whole[:length])
+        with Journal(tmp_path) as journal:
+            assert list(journal.latest) == ["a.blend"]
+            journal.record(tmp_path / "c.blend", {"error": "three"})
+        lines = [json.loads(line) for line in (tmp_path / NAME).read_bytes().splitlines()]
+        assert [line["file"] for line in lines] == ["a.blend", "c.blend"]
+
+
+def test_one_batch_at_a_time(tmp_path):
+    with Journal(tmp_path), pytest.raises(WrongUse, match="another batch is at work there"):
+        Journal(tmp_path)
+    Journal(tmp_path).__exit__()
+
+
+def test_a_journal_that_can_not_be_written(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(SinewError, match="can not be written"):
+        Journal(tmp_path / "file" / "out")
+    with Journal(tmp_path) as journal:
+        journal.record(tmp_path / os.fsdecode(b"\xff.blend"), {"error": "names need not be text"})
+    with Journal(tmp_path) as journal:
+        assert list(journal.latest) == [os.fsdecode(b"\xff.blend")]
