@@ -87,7 +87,9 @@ def test_a_frame_evaluates_the_mesh_once(set_up: Setup):
     assert evaluations(obj, 5) == 1
     scenes.add_sinew(obj)
     for _round in range(2):
-        bpy.context.scene.frame_set(2)
+        # The first frame after a switch may take a second round.
+        for frame in (1, 2):
+            bpy.context.scene.frame_set(frame)
         assert [evaluations(obj, frame) for frame in (3, 4, 5, 6)] == [1, 1, 1, 1]
         properties.of(obj).enabled = False
         bpy.context.scene.frame_set(2)
