@@ -14,7 +14,7 @@ _commands: list[object] = []
 
 def main(argv: list[str]) -> int:
     """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
-    from .commands import compare, console, inbetween, info, methods, points, render, report, reskin
+    from .commands import bake, compare, console, inbetween, info, methods, points, render, report, reskin
 
     modules = {
         "methods": methods,
@@ -22,6 +22,7 @@ def main(argv: list[str]) -> int:
         "points": points,
         "reskin": reskin,
         "inbetween": inbetween,
+        "bake": bake,
         "compare": compare,
         "render": render,
         "report": report,

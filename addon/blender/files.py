@@ -35,7 +35,7 @@ def open_file(path: Path) -> None:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
     except RuntimeError as error:
-        raise SinewError(f"{path}: Blender can not read it: {_telling_line(error)}") from None
+        raise SinewError(f"{path}: Blender can not read it: {telling_line(error)}") from None
 
 
 def save_copy(source: Path, target: Path) -> None:
@@ -49,7 +49,7 @@ def save_copy(source: Path, target: Path) -> None:
         os.replace(unfinished, target)
     except (OSError, RuntimeError) as error:
         unfinished.unlink(missing_ok=True)
-        raise SinewError(f"{target}: can not be written: {_telling_line(error)}") from None
+        raise SinewError(f"{target}: can not be written: {telling_line(error)}") from None
 
 
 def _check_readable(path: Path) -> None:
@@ -77,7 +77,8 @@ def _is_compressed(path: Path) -> bool:
         return file.read(4).startswith(COMPRESSED_MAGIC)
 
 
-def _telling_line(error: Exception) -> str:
+def telling_line(error: Exception) -> str:
+    """What was wrong, of all that Blender wrote."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     lines = [line.strip() for line in text.replace("Error: ", "").splitlines() if line.strip()]
     if not lines:
