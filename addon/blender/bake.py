@@ -16,27 +16,9 @@ import numpy as np
 
 from ..core import bake
 from ..core.errors import SinewError
-from . import actions, bake_export, drive, evaluate, front, handlers, properties, shape_animation, stack
+from . import actions, bake_export, drive, evaluate, files, front, handlers, properties, shape_animation, stack
 
 SHAPE_KEYS = "shape-keys"
-KINDS = (SHAPE_KEYS, *bake.FORMATS, *bake_export.SUFFIXES)
-
-
-def start(
-    meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], target: Path
-) -> Bake | bake_export.SceneExport | bake_export.MorphExport:
-    """A bake of driven meshes to one of KINDS; caches go to a folder beside `target`, exports to itself.
-
-    frames  in rising order
-    Raises SinewError where it can not be done.
-    """
-    if kind in bake_export.SCENES:
-        return bake_export.SceneExport(meshes, kind, frames, target)
-    if kind == bake_export.GLTF:
-        return bake_export.MorphExport(meshes, frames, target)
-    return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"))
-
-
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
     state = handlers.state_of(obj)
@@ -63,6 +45,9 @@ class ShapeKeys:
 
     def take(self, points: np.ndarray) -> None:
         self.samples.append(points.copy())
+
+    def end(self) -> None:
+        """Nothing is in files."""
 
     def place(self) -> None:
         obj, shapes = self.obj, self.samples
@@ -102,8 +87,10 @@ class Cache:
             )
         self.file.write(points)
 
-    def place(self) -> None:
+    def end(self) -> None:
         self.file.close()
+
+    def place(self) -> None:
         obj = self.obj
         place = list(obj.modifiers).index(stack.sinew_modifier(obj))
         shown = [(m.show_viewport, m.show_render) for m in obj.modifiers][place]
@@ -137,7 +124,12 @@ class Bake:
     """Several meshes at once, so that every frame is evaluated once."""
 
     def __init__(
-        self, meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], folder: Path
+        self,
+        meshes: list[bpy.types.Object],
+        kind: str,
+        frames: Sequence[float],
+        folder: Path,
+        overwrite: bool,
     ) -> None:
         self.frames, self.folder, self.made_folder = frames, folder, not folder.exists()
         self.bakes: list[ShapeKeys | Cache] = []
@@ -150,10 +142,15 @@ class Bake:
                     self.bakes.append(ShapeKeys(obj, frames))
                 else:
                     path = folder / f"{_file_name(obj, names)}.{kind}"
+                    files.check_free(path, overwrite)
                     self.bakes.append(Cache(obj, frames, path, kind))
         except SinewError:
             self.discard()
             raise
+
+    @property
+    def what(self) -> str:
+        return ", ".join(one.obj.name for one in self.bakes)
 
     def sample(self) -> Iterator[float]:
         """Goes through the frames; how much is done, 0 to 1, after each."""
@@ -164,6 +161,9 @@ class Bake:
                 evaluate.set_frame(scene, frame)
                 for one in self.bakes:
                     one.take(points_of(one.obj))
+                if number == len(self.frames) - 1:
+                    for one in self.bakes:
+                        one.end()
                 yield (number + 1) / len(self.frames)
         except BaseException:
             self.discard()
@@ -189,6 +189,32 @@ class Bake:
             one.discard()
         if self.made_folder and self.folder.exists() and not any(self.folder.iterdir()):
             self.folder.rmdir()
+
+
+Started = Bake | bake_export.SceneExport | bake_export.MorphExport
+
+
+def suffix_of(kind: str) -> str:
+    """How the file ends that a bake is for."""
+    return bake_export.SUFFIXES.get(kind, ".blend")
+
+
+def start(
+    meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], target: Path, overwrite: bool
+) -> Started:
+    """A bake of driven meshes; caches go to a folder beside `target`, exports to itself.
+
+    frames     in rising order
+    overwrite  whether files that are there already may be replaced
+    Raises SinewError where it can not be done.
+    """
+    if kind in bake_export.SUFFIXES:
+        files.check_free(target, overwrite)
+    if kind in bake_export.SCENES:
+        return bake_export.SceneExport(meshes, kind, frames, target)
+    if kind == bake_export.GLTF:
+        return bake_export.MorphExport(meshes, frames, target)
+    return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"), overwrite)
 
 
 def _take_off(obj: bpy.types.Object) -> None:

@@ -73,7 +73,8 @@ class SceneExport:
             with _selected(self.meshes):
                 scene.frame_start, scene.frame_end = self.first, self.last
                 _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
-            _check_method_held(self)
+            for obj in self.meshes:
+                _check_driven(obj)
             yield 1.0
         except BaseException:
             self.discard()
@@ -81,6 +82,10 @@ class SceneExport:
         finally:
             scene.frame_start, scene.frame_end = before[1:]
             evaluate.set_frame(scene, before[0])
+
+    @property
+    def what(self) -> str:
+        return str(self.path)
 
     def place(self) -> None:
         """The open file stays as it is."""
@@ -170,6 +175,10 @@ class MorphExport:
                 bpy.data.actions.remove(action)
         self.made.clear()
 
+    @property
+    def what(self) -> str:
+        return str(self.path)
+
     def place(self) -> None:
         """The open file stays as it is."""
 
@@ -197,11 +206,6 @@ def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path
 def _check_driven(obj: bpy.types.Object) -> None:
     if not obj.sinew.enabled:
         raise SinewError(obj.sinew.error or f"{obj.name}: switch Sinew on to bake what it shows")
-
-
-def _check_method_held(export: SceneExport) -> None:
-    for obj in export.meshes:
-        _check_driven(obj)
 
 
 def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> None:

@@ -52,6 +52,12 @@ def save_copy(source: Path, target: Path) -> None:
         raise SinewError(f"{target}: can not be written: {telling_line(error)}") from None
 
 
+def check_free(path: Path, overwrite: bool) -> None:
+    """Raises SinewError where a file is at `path` that may not be replaced."""
+    if path.exists() and not overwrite:
+        raise SinewError(f"{path}: is there already; choose to overwrite it, or another folder")
+
+
 def _check_readable(path: Path) -> None:
     if not path.exists():
         raise SinewError(f"{path}: no such file")

@@ -122,7 +122,7 @@ def _bake(
         raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     try:
-        started = bake.start(taken, args.to, chosen, target)
+        started = bake.start(taken, args.to, chosen, target, args.overwrite)
         for _part in console.progress(started.sample(), len(chosen), what):
             pass
         started.place()

@@ -205,7 +205,7 @@ def test_stopped_anywhere_nothing_is_left(arm, tmp_path):
     for kind in ("mdd", "pc2", "gltf"):
         target = tmp_path / "out" / "arm.blend"
         objects = len(bpy.data.objects)
-        started = bake.start([obj], kind, FRAMES, target)
+        started = bake.start([obj], kind, FRAMES, target, overwrite=False)
         steps = started.sample()
         for _ in range(4):
             next(steps)
@@ -261,6 +261,61 @@ def test_headers(tmp_path):
     assert struct.unpack("<12siiffi12f", pc2) == (
         b"POINTCACHE2\0", 1, 2, 12.0, 2.0, 2, *range(6), *range(1, 7)
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2", "alembic", "usd", "gltf"])
+def test_the_operator(arm, tmp_path, kind):
+    obj, path = arm
+    expected = shown(obj, FRAMES)
+    objects = set(bpy.data.objects)
+    assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
+    in_file = kind in ("shape-keys", "mdd", "pc2")
+    assert properties.is_driven(obj) == (not in_file)
+    assert set(bpy.data.objects) == objects if in_file else len(bpy.data.objects) == len(objects)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= TOLERANCE * scenes.diagonal(obj)
+    if kind != "shape-keys":
+        assert len([p for p in path.parent.rglob("*") if p.is_file() and p.name != "arm.blend"]) == 1
+    if not in_file:
+        with pytest.raises(RuntimeError, match="is there already; choose to overwrite it"):
+            bpy.ops.sinew.bake(kind=kind, frames="1-11")
+        assert bpy.ops.sinew.bake(kind=kind, frames="1-11", overwrite=True) == {"FINISHED"}
+
+
+def test_a_parent_that_deforms_does_not_deform_twice(arm, tmp_path):
+    obj, path = arm
+    obj.parent, obj.parent_type = obj.modifiers[0].object, "ARMATURE"
+    obj.modifiers.clear()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    expected = shown(obj, FRAMES)
+    run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("name", ["human.blend", "CesiumMan.glb"])
+@pytest.mark.parametrize("kind", ["mdd", "usd"])
+def test_real_rigs(real_rig, tmp_path, name, kind):
+    path = real_rig(name)
+    frames = [1, 2, 3]
+    options = ["--method", METHOD, "--frames", "1-3", "--out"]
+    run_sinew("points", path, *options, tmp_path / "points.npz")
+    run_sinew("bake", path, "--to", kind, *options, tmp_path / "out")
+    (written,) = (p for p in (tmp_path / "out").iterdir() if p.is_file())
+    with np.load(tmp_path / "points.npz") as expected:
+        names = [n for n in expected.files if n != "frames"]
+        assert names
+        read = read_elsewhere(written, frames, tmp_path)
+        for one in names:
+            assert len(expected[one]) == 3
+            got = read.get(one)
+            if got is None:
+                # USD allows no dots in names.
+                got = read[one.replace(".", "_")]
+            size = np.linalg.norm(np.ptp(expected[one][0], axis=0))
+            apart = np.linalg.norm(got[:, :, None] - got[:, None, :1], axis=-1)
+            wanted = np.linalg.norm(expected[one][:, :, None] - expected[one][:, None, :1], axis=-1)
+            scale = apart.max() / wanted.max()
+            assert np.abs(apart / scale - wanted).max() <= 2 * TOLERANCE * size
 
 
 def test_wrong_use(arm, tmp_path):

@@ -47,7 +47,7 @@ def arm_file(tmp_path):
 
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    for command in ("methods", "info", "points", "reskin", "inbetween", "compare", "report"):
+    for command in ("methods", "info", "points", "reskin", "inbetween", "bake", "compare", "report"):
         assert "usage: sinew" in run_sinew(command, "--help").stdout
 
 
