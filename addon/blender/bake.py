@@ -16,9 +16,22 @@ import numpy as np
 
 from ..core import bake
 from ..core.errors import SinewError
-from . import actions, bake_export, drive, evaluate, files, front, handlers, properties, shape_animation, stack
+from . import (
+    actions,
+    bake_export,
+    drive,
+    evaluate,
+    files,
+    front,
+    handlers,
+    properties,
+    shape_animation,
+    stack,
+)
 
 SHAPE_KEYS = "shape-keys"
+
+
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
     state = handlers.state_of(obj)
@@ -32,7 +45,9 @@ class ShapeKeys:
 
     def __init__(self, obj: bpy.types.Object, frames: Sequence[float]) -> None:
         if obj.override_library is not None:
-            raise SinewError(f"{obj.name}: a library override can not have shape keys of its own; bake a cache")
+            raise SinewError(
+                f"{obj.name}: a library override can not have shape keys of its own; bake a cache"
+            )
         if front.is_needed(obj):
             names = ", ".join(m.name for m in stack.changes_in_front(obj)) or "what its stack"
             raise SinewError(
@@ -218,7 +233,7 @@ def start(
 
 
 def _take_off(obj: bpy.types.Object) -> None:
-    """Takes Sinew off and leaves the Armature modifiers switched off, with their armatures, for the way back."""
+    """Takes Sinew off; the Armature modifiers stay, switched off, with their armatures for the way back."""
     # A parent that deforms would do so on top of the bake.
     properties.of(obj).parent_type = ""
     run = [modifier.name for modifier in stack.armature_modifiers(obj)]

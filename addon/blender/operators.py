@@ -228,9 +228,7 @@ class SINEW_OT_bake(_OnDriven, bpy.types.Operator):
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
         suffix = bake.suffix_of(self.kind)
         target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
-        return bake.start(
-            _driven_targets(context), self.kind, frames[:: self.step], target, self.overwrite
-        )
+        return bake.start(_driven_targets(context), self.kind, frames[:: self.step], target, self.overwrite)
 
     def _finish(self, started: bake.Started) -> set[str]:
         started.publish()

@@ -33,6 +33,8 @@ def make_straight(owner: bpy.types.ID, path: str | None = None) -> None:
     animation = owner.animation_data
     for curve in actions.all_curves(animation.action, actions.slot_of(animation)):
         if path is None or curve.data_path == path:
-            kinds = np.full(len(curve.keyframe_points), actions.key_value("interpolation", "LINEAR"), np.int32)
+            kinds = np.full(
+                len(curve.keyframe_points), actions.key_value("interpolation", "LINEAR"), np.int32
+            )
             curve.keyframe_points.foreach_set("interpolation", kinds)
             curve.update()

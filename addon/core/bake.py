@@ -7,6 +7,7 @@ import os
 import shutil
 import struct
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -70,11 +71,9 @@ class PointCache:
 
     def discard(self) -> None:
         """Leaves nothing behind, also where the disk is full."""
-        try:
+        # What could not be written is not wanted.
+        with suppress(OSError):
             self._file.close()
-        except OSError:
-            # What could not be written is not wanted.
-            pass
         self._unfinished.unlink(missing_ok=True)
 
 

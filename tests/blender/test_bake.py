@@ -169,7 +169,7 @@ def test_a_number_of_vertices_that_changes_is_refused(arm, tmp_path, kind):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     out = tmp_path / "out"
     refused = run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", out, status=1)
-    assert "one number" in refused.stderr and "bake to alembic or usd" in refused.stderr
+    assert "one number, bake to alembic or usd" in refused.stderr
     assert not list(out.rglob("*"))
 
 
@@ -239,10 +239,9 @@ def test_room_is_looked_for_first(arm, small_disk, kind):
 
 
 def test_a_disk_that_fills_up_meanwhile(small_disk):
-    cache = core.PointCache(small_disk / "a.mdd", "mdd", list(range(100)), 1000, 24.0)
+    cache = core.PointCache(small_disk / "a.mdd", "mdd", [1], 100_000, 24.0)
     with pytest.raises(SinewError, match=r"a\.mdd: can not be written: No space left on device"):
-        for _ in range(100):
-            cache.write(np.zeros((1000, 3), dtype=np.float32))
+        cache.write(np.zeros((100_000, 3), dtype=np.float32))
     cache.discard()
     assert not list(small_disk.iterdir())
 
