@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 import atexit
+import os
+import shutil
 import sys
 
 from .core.errors import SinewError
@@ -56,7 +58,13 @@ def main(argv: list[str]) -> int:
 
 def run() -> None:
     """Entry point of the program in plain Python."""
-    sys.exit(main(sys.argv[1:]))
+    status = main(sys.argv[1:])
+    bpy = sys.modules.get("bpy")
+    if bpy is not None and bpy.app.version < (4, 3) and "io_scene_gltf2.io.exp" in sys.modules:
+        # Having exported glTF, Blender 4.2 as a module crashes in its own ending, all work done.
+        shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+        os._exit(status)
+    sys.exit(status)
 
 
 def register_command() -> None:
