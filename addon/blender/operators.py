@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,9 @@ import bpy
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from . import bake, drive, handlers, inbetween, inbetween_bake, properties
+
+# A bake in the window draws in between: rarely enough to cost little, often enough for Esc.
+SECONDS_BETWEEN_REDRAWS = 0.1
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -185,7 +189,10 @@ class SINEW_OT_bake(_OnDriven, bpy.types.Operator):
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         try:
+            until = time.perf_counter() + SECONDS_BETWEEN_REDRAWS
             part = next(self.steps, None)
+            while part is not None and time.perf_counter() < until:
+                part = next(self.steps, None)
             if part is None:
                 self._end(context)
                 return self._finish(self.bake)
