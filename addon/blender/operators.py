@@ -157,7 +157,12 @@ class SINEW_OT_bake(_OnDriven, bpy.types.Operator):
         name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
     )
     folder: bpy.props.StringProperty(
-        name="Folder", description="Where files go; // is beside this file", default="//", subtype="DIR_PATH"
+        name="Folder",
+        description="Where files go; // is beside this file",
+        default="//",
+        subtype="DIR_PATH",
+        # Without it, newer versions warn of "//"; older ones do not know it.
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
     )
     overwrite: bpy.props.BoolProperty(
         name="Overwrite", description="Replace files that are there already", default=False
