@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 import atexit
+import os
+import shutil
 import sys
 
 from .core.errors import SinewError, WrongUse
@@ -18,6 +20,7 @@ _commands: list[object] = []
 def main(argv: list[str]) -> int:
     """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
     from .commands import (
+        bake,
         compare,
         console,
         inbetween,
@@ -37,6 +40,7 @@ def main(argv: list[str]) -> int:
         "reskin": reskin,
         "restore": restore,
         "inbetween": inbetween,
+        "bake": bake,
         "compare": compare,
         "render": render,
         "report": report,
@@ -69,7 +73,13 @@ def main(argv: list[str]) -> int:
 
 def run() -> None:
     """Entry point of the program in plain Python."""
-    sys.exit(main(sys.argv[1:]))
+    status = main(sys.argv[1:])
+    bpy = sys.modules.get("bpy")
+    if bpy is not None and bpy.app.version < (4, 3) and "io_scene_gltf2.io.exp" in sys.modules:
+        # Having exported glTF, Blender 4.2 as a module crashes in its own ending, all work done.
+        shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+        os._exit(status)
+    sys.exit(status)
 
 
 def register_command() -> None:

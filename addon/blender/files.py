@@ -46,7 +46,7 @@ def open_file(path: Path, load_ui: bool = False) -> None:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
     except RuntimeError as error:
-        raise SinewError(f"{path}: Blender can not read it: {_telling_line(error)}") from None
+        raise SinewError(f"{path}: Blender can not read it: {telling_line(error)}") from None
 
 
 def save_copy(source: Path, target: Path) -> None:
@@ -71,7 +71,13 @@ def save_beside(source: Path, target: Path, unfinished: Path) -> None:
             raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
     except (OSError, RuntimeError) as error:
         unfinished.unlink(missing_ok=True)
-        raise SinewError(f"{target}: can not be written: {_telling_line(error)}") from None
+        raise SinewError(f"{target}: can not be written: {telling_line(error)}") from None
+
+
+def check_free(path: Path, overwrite: bool) -> None:
+    """Raises SinewError where a file is at `path` that may not be replaced."""
+    if path.exists() and not overwrite:
+        raise SinewError(f"{path}: is there already; choose to overwrite it, or another folder")
 
 
 def _check_readable(path: Path) -> None:
@@ -125,7 +131,8 @@ def _is_compressed(path: Path) -> bool:
         return file.read(4).startswith(COMPRESSED_MAGIC)
 
 
-def _telling_line(error: Exception) -> str:
+def telling_line(error: Exception) -> str:
+    """What was wrong, of all that Blender wrote."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     lines = [line.strip() for line in text.replace("Error: ", "").splitlines() if line.strip()]
     if not lines:

@@ -35,6 +35,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
             row = layout.row(align=True)
             row.operator("sinew.rebind", icon="FILE_REFRESH")
             row.operator("sinew.remove", icon="X")
+            layout.operator("sinew.bake", text="Bake…", icon="RENDER_ANIMATION")
             if not context.scene.render.use_lock_interface:
                 draw_text(
                     layout, context, "Before rendering in this window, lock the interface:", icon="INFO"

@@ -30,7 +30,7 @@ def arm_file(tmp_path):
 
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    commands = ("methods", "info", "points", "reskin", "restore", "inbetween", "compare", "report")
+    commands = ("methods", "info", "points", "reskin", "restore", "inbetween", "bake", "compare", "report")
     for command in commands:
         assert "usage: sinew" in run_sinew(command, "--help").stdout
 

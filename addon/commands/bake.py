@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew bake`: Sinew's deformation as data that plays in any Blender, and in other programs."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..core.errors import SinewError
+from ..core.frames import parse_frames
+from ..core.jobs import Job, plan_jobs
+from .console import Console
+
+HELP = """\
+Writes what Sinew makes of every armature-deformed mesh as data that plays without it. Inputs are never
+written to. A folder stands for all .blend files below it.
+
+shape-keys  a .blend with one shape key a frame and keyed values
+mdd, pc2    a .blend with a Mesh Cache modifier for each mesh, and its caches in a folder beside
+alembic     an .abc of the final meshes, with UVs and materials
+usd         a .usdc of the same
+gltf        a .glb of the same, the frames as morph targets
+
+In a .blend the Armature modifiers stay, switched off. Between frames that are not neighbours shapes move in
+straight lines."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "bake",
+        help="write what Sinew deforms as shape keys, point caches, Alembic, USD or glTF",
+        description=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("inputs", nargs="+", type=Path, metavar="FILE_OR_FOLDER")
+    parser.add_argument("--method", required=True, help="a method of `sinew methods`")
+    parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
+    parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
+    parser.add_argument("--step", type=int, default=1, metavar="N", help="every Nth of the frames")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for what is written")
+    parser.add_argument("--overwrite", action="store_true", help="replace what is there already")
+    return parser
+
+
+# As blender/bake.py and blender/export.py have them, where the parser can not look.
+KINDS = ("shape-keys", "mdd", "pc2", "alembic", "usd", "gltf")
+SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
+
+
+@dataclass
+class Outcome:
+    """What became of one file."""
+
+    job: Job
+    meshes: int = 0
+    frames: int = 0
+    left_out: list[str] = field(default_factory=list)
+    error: str | None = None
+
+    @property
+    def failed(self) -> bool:
+        return self.error is not None or bool(self.left_out)
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    import sinew
+
+    names = [method.name for method in sinew.methods()]
+    if args.method not in names:
+        raise SinewError(f"method: expected one of {', '.join(names)}, got {args.method!r}")
+    if args.step < 1:
+        raise SinewError(f"step: expected 1 or more frames, got {args.step}")
+    frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
+    suffix = SUFFIXES.get(args.to, ".blend")
+    jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
+    outcomes = []
+    for number, job in enumerate(jobs):
+        what = f"Baking {job.source.name}" + (f" ({number + 1} of {len(jobs)})" if len(jobs) > 1 else "")
+        outcome = Outcome(job)
+        try:
+            _bake(outcome, args, frames, console, what)
+        except SinewError as error:
+            outcome.error = str(error)
+            console.complain(outcome.error)
+        for reason in outcome.left_out:
+            console.complain(f"{job.source}: left as it was: {reason}")
+        outcomes.append(outcome)
+    console.table(
+        ("file", "meshes", "frames", "result"),
+        [(str(o.job.source), str(o.meshes), str(o.frames), _result(o)) for o in outcomes],
+    )
+    failures = sum(outcome.failed for outcome in outcomes)
+    console.say(f"{len(outcomes) - failures} of {len(outcomes)} files baked with {args.method}")
+    return 1 if failures else 0
+
+
+def _bake(
+    outcome: Outcome, args: argparse.Namespace, frames: list[float] | None, console: Console, what: str
+) -> None:
+    import bpy
+
+    from ..blender import bake, evaluate, files
+
+    source, target = outcome.job.source, outcome.job.target
+    if target.exists() and not args.overwrite:
+        raise SinewError(f"{target}: is there already; use --overwrite to replace it")
+    files.open_file(source)
+    scene = bpy.context.scene
+    try:
+        meshes = evaluate.deformed_meshes(scene)
+    except SinewError as error:
+        raise SinewError(f"{source}: {error}; nothing written") from None
+    taken = []
+    for obj in meshes:
+        try:
+            evaluate.use_method(obj, args.method)
+            taken.append(obj)
+        except SinewError as error:
+            outcome.left_out.append(str(error))
+    if not taken:
+        raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
+    chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
+    try:
+        started = bake.start(taken, args.to, chosen, target, args.overwrite)
+        for _part in console.progress(started.sample(), len(chosen), what):
+            pass
+        started.place()
+        try:
+            if args.to not in SUFFIXES:
+                files.save_copy(source, target)
+            started.publish()
+        except BaseException:
+            started.discard()
+            raise
+    except SinewError as error:
+        raise SinewError(f"{source}: {error}") from None
+    outcome.meshes, outcome.frames = len(taken), len(chosen)
+
+
+def _result(outcome: Outcome) -> str:
+    if outcome.error is not None:
+        return "failed"
+    if outcome.left_out:
+        return f"{outcome.job.target}, {len(outcome.left_out)} left as they were"
+    return str(outcome.job.target)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that baked points go to: MDD and PC2 point caches, and the room for them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from .errors import SinewError
+
+
+def mdd_header(frames: Sequence[float], vertices: int, rate: float) -> bytes:
+    """Big-endian: number of frames, of points, and the time of each frame in seconds."""
+    times = (np.asarray(frames, dtype=np.float64) / rate).astype(">f4")
+    return struct.pack(">ii", len(frames), vertices) + times.tobytes()
+
+
+def pc2_header(frames: Sequence[float], vertices: int, _rate: float) -> bytes:
+    """Little-endian: version 1, number of points, first frame, frames from sample to sample, samples."""
+    step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+    return struct.pack("<12siiffi", b"POINTCACHE2\0", 1, vertices, frames[0], step, len(frames))
+
+
+# What a format starts with, and how it holds a coordinate.
+FORMATS: dict[str, tuple[Callable[[Sequence[float], int, float], bytes], str]] = {
+    "mdd": (mdd_header, ">f4"),
+    "pc2": (pc2_header, "<f4"),
+}
+
+
+class PointCache:
+    """A point cache that is written frame by frame beside its `path`, and takes its place in publish().
+
+    frames  of the samples to come
+    rate    frames a second
+    """
+
+    def __init__(self, path: Path, kind: str, frames: Sequence[float], vertices: int, rate: float) -> None:
+        self.path = path
+        header, self._coordinate = FORMATS[kind]
+        self._unfinished = path.with_name(f".{path.name}.unfinished")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._unfinished.open("wb")
+            self._file.write(header(frames, vertices, rate))
+        except OSError as error:
+            raise _unwritable(path, error) from None
+
+    def write(self, points: np.ndarray) -> None:
+        """The next sample, [vertices, 3]."""
+        try:
+            self._file.write(points.astype(self._coordinate).tobytes())
+        except OSError as error:
+            raise _unwritable(self.path, error) from None
+
+    def close(self) -> None:
+        """All samples are on disk from here on."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise _unwritable(self.path, error) from None
+
+    def publish(self) -> None:
+        publish(self._unfinished, self.path)
+
+    def discard(self) -> None:
+        """Leaves nothing behind, also where the disk is full."""
+        # What could not be written is not wanted.
+        with suppress(OSError):
+            self._file.close()
+        self._unfinished.unlink(missing_ok=True)
+
+
+def publish(unfinished: Path, path: Path) -> None:
+    try:
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+
+
+def check_space(folder: Path, needed: int) -> None:
+    """Raises SinewError where `folder`, which need not be there yet, can not take so many bytes."""
+    existing = next(parent for parent in (folder.resolve(), *folder.resolve().parents) if parent.exists())
+    free = shutil.disk_usage(existing).free
+    if free < needed:
+        raise SinewError(
+            f"{folder}: the bake takes {_megabytes(needed)} and {_megabytes(free)} are free; bake fewer "
+            "frames, or to another disk"
+        )
+
+
+def is_even(frames: Sequence[float], step: float | None = None) -> bool:
+    """Whether the frames are equally far apart, by `step` where it is given."""
+    gaps = np.diff(frames)
+    return len(gaps) == 0 or bool(np.all(gaps == (gaps[0] if step is None else step)))
+
+
+def ramps(frames: Sequence[float]) -> list[tuple[list[float], list[float]]]:
+    """For each frame the times and values of the keys of its shape: 1 at that frame, 0 at its neighbours, so
+    that straight lines between the keys mix two neighbours at a time, and all values sum to 1."""
+    result = []
+    for number in range(len(frames)):
+        near = range(max(number - 1, 0), min(number + 2, len(frames)))
+        result.append(([frames[i] for i in near], [float(i == number) for i in near]))
+    return result
+
+
+def _megabytes(count: int) -> str:
+    return f"{count / 1e6:,.1f} MB"
+
+
+def _unwritable(path: Path, error: OSError) -> SinewError:
+    return SinewError(f"{path}: can not be written: {error.strerror}")

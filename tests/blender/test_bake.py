@@ -1,0 +1,330 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes, opened again in a Blender that has never heard of Sinew, against what Sinew showed."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.blender import bake, properties
+from sinew_addon.core import bake as core
+from sinew_addon.core.errors import SinewError
+from test_command_line import run_sinew
+
+FRAMES = list(range(1, 12))
+TOLERANCE = 1e-6
+METHOD = "dq"
+
+READ = """
+import sys, bpy, numpy as np
+path, frames, result = sys.argv[1], [float(f) for f in sys.argv[2].split(",")], sys.argv[3]
+if path.endswith(".blend"):
+    bpy.ops.wm.open_mainfile(filepath=path)
+else:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    if path.endswith(".abc"):
+        bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
+    elif path.endswith(".usdc"):
+        bpy.ops.wm.usd_import(filepath=path)
+    else:
+        bpy.ops.import_scene.gltf(filepath=path)
+assert not hasattr(bpy.types.Object, "sinew")
+arrays, uvs, materials = {}, [], []
+scene = bpy.context.scene
+for obj in [o for o in scene.objects if o.type == "MESH" and len(o.data.vertices) > 50]:
+    per_frame = []
+    for frame in frames:
+        scene.frame_set(int(frame // 1), subframe=frame % 1)
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        points = np.empty((len(evaluated.data.vertices), 3), dtype=np.float32)
+        evaluated.data.vertices.foreach_get("co", points.ravel())
+        matrix = np.array(evaluated.matrix_world)
+        per_frame.append(points.astype(float) @ matrix[:3, :3].T + matrix[:3, 3])
+    arrays[obj.name] = np.stack(per_frame)
+    uvs.append(len(obj.data.uv_layers))
+    materials += [slot.material.name for slot in obj.material_slots if slot.material]
+np.savez(result, uvs=np.array(uvs), materials=np.array(materials), **arrays)
+"""
+
+
+def read_elsewhere(path, frames, tmp_path):
+    """World points [frames, vertices, 3] by object name, in a process without Sinew."""
+    result = tmp_path / "read.npz"
+    command = [sys.executable, "-c", READ, str(path), ",".join(map(str, frames)), str(result)]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    with np.load(result) as arrays:
+        return dict(arrays)
+
+
+@pytest.fixture
+def arm(tmp_path):
+    """A saved arm with UVs and a material: object, file, and what Sinew shows of it at FRAMES."""
+    obj, _armature = scenes.make_arm()
+    uv = obj.data.uv_layers.new(name="UVMap")
+    spread = np.linspace(0.0, 1.0, 2 * len(uv.data), dtype=np.float32)
+    uv.data.foreach_set("uv", spread)
+    obj.data.materials.append(bpy.data.materials.new("Skin"))
+    path = tmp_path / "in" / "arm.blend"
+    path.parent.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return obj, path
+
+
+def shown(obj, frames, method=METHOD):
+    scenes.add_sinew(obj, method)
+    return scenes.shapes(obj, frames)
+
+
+@pytest.mark.parametrize("method", ["lbs", "dq", "qv"])
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2"])
+def test_a_blend_file_plays_the_same_elsewhere(arm, tmp_path, kind, method):
+    obj, path = arm
+    expected = shown(obj, FRAMES, method)
+    out = tmp_path / "out"
+    before = path.read_bytes()
+    run_sinew("bake", path, "--method", method, "--to", kind, "--out", out)
+    assert path.read_bytes() == before
+    read = read_elsewhere(out / "arm.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+    assert scenes.worst(expected[0], expected[-1]) > 0.1
+    names = {p.name for p in out.rglob("*") if p.is_file()}
+    assert names == ({"arm.blend"} if kind == "shape-keys" else {"arm.blend", f"Arm.{kind}"})
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2"])
+def test_chosen_frames_and_straight_lines_between(arm, tmp_path, kind):
+    obj, path = arm
+    chosen = [2, 4.5, 9]
+    at = shown(obj, chosen)
+    frames = "2,4.5,9"
+    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--frames", frames, "--out", tmp_path / "out")
+    asked = [1, 2, 3.25, 4.5, 9, 11]
+    read = read_elsewhere(tmp_path / "out" / "arm.blend", asked, tmp_path)["Arm"]
+    expected = np.stack([at[0], at[0], (at[0] + at[1]) / 2, at[1], at[2], at[2]])
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("kind", ["alembic", "usd", "gltf"])
+def test_exports_are_the_final_meshes(arm, tmp_path, kind):
+    obj, path = arm
+    expected = shown(obj, FRAMES)
+    out = tmp_path / "out"
+    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", out)
+    (written,) = [p for p in out.iterdir()]
+    read = read_elsewhere(written, FRAMES, tmp_path)
+    assert all(read.pop("uvs") == 1)
+    assert list(read.pop("materials")) == ["Skin"]
+    (points,) = read.values()
+    if kind == "gltf":
+        # Vertices are split at seams: each must be where one of the object's is, in all frames.
+        nearest = np.linalg.norm(points[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
+        assert set(nearest) == set(range(len(expected[0])))
+        expected = expected[:, nearest]
+    assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("kind", ["mdd", "pc2"])
+def test_caches_follow_what_stands_in_front_and_behind(arm, tmp_path, kind):
+    obj, path = arm
+    mirror = obj.modifiers.new("Mirror", "MIRROR")
+    mirror.use_axis = (False, False, True)
+    mirror.use_mirror_merge = False
+    obj.modifiers.move(1, 0)
+    smooth = obj.modifiers.new("Subdivision", "SUBSURF")
+    smooth.levels = 1
+    key = obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Fat")
+    key.points[30].co.z += 0.2
+    key.value = 0.0
+    key.keyframe_insert("value", frame=1)
+    key.value = 1.0
+    key.keyframe_insert("value", frame=11)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    expected = shown(obj, FRAMES)
+    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+    refused = run_sinew(
+        "bake", path, "--method", METHOD, "--to", "shape-keys", "--out", tmp_path / "keys", status=1
+    )
+    assert "Mirror changes the mesh ahead of the armature" in refused.stderr
+    assert not (tmp_path / "keys").exists()
+
+
+@pytest.mark.parametrize("kind", ["mdd", "gltf"])
+def test_a_number_of_vertices_that_changes_is_refused(arm, tmp_path, kind):
+    obj, path = arm
+    weld = obj.modifiers.new("Weld", "WELD")
+    weld.merge_threshold = 0.0
+    weld.keyframe_insert("merge_threshold", frame=1)
+    weld.merge_threshold = 0.2
+    weld.keyframe_insert("merge_threshold", frame=5)
+    obj.modifiers.move(1, 0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    out = tmp_path / "out"
+    refused = run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", out, status=1)
+    assert "one number, bake to alembic or usd" in refused.stderr
+    assert not list(out.rglob("*"))
+
+
+def test_shape_keys_of_the_mesh_are_in_the_bake(arm, tmp_path):
+    obj, path = arm
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Fat")
+    key.points[30].co.z += 0.2
+    key.value = 0.5
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    expected = shown(obj, FRAMES)
+    run_sinew("bake", path, "--method", METHOD, "--to", "shape-keys", "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
+    _obj, path = arm
+    run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", tmp_path / "out")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "arm.blend"))
+    obj = bpy.data.objects["Arm"]
+    assert not properties.is_driven(obj)
+    assert [m.type for m in obj.modifiers] == ["MESH_CACHE", "ARMATURE"]
+    assert obj.modifiers[0].filepath == "//arm_cache/Arm.mdd"
+    armature = obj.modifiers[1]
+    assert (armature.object.name, armature.show_viewport, armature.show_render) == ("Arm Rig", False, False)
+    assert not [group for group in bpy.data.node_groups if group.name.startswith("Sinew")]
+
+
+def test_stopped_anywhere_nothing_is_left(arm, tmp_path):
+    obj, _path = arm
+    scenes.add_sinew(obj, METHOD)
+    for kind in ("mdd", "pc2", "gltf"):
+        target = tmp_path / "out" / "arm.blend"
+        objects = len(bpy.data.objects)
+        started = bake.start([obj], kind, FRAMES, target, overwrite=False)
+        steps = started.sample()
+        for _ in range(4):
+            next(steps)
+        steps.close()
+        assert not [p for p in (tmp_path / "out").rglob("*")]
+        assert (len(bpy.data.objects), bpy.context.scene.frame_current) == (objects, 1)
+        assert properties.is_driven(obj)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    folder = tmp_path / "small"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)], capture_output=True, check=False
+    )
+    if mounted.returncode != 0:
+        pytest.skip("may not mount a small disk here")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@pytest.mark.parametrize("kind", ["mdd", "alembic", "usd", "gltf"])
+def test_room_is_looked_for_first(arm, small_disk, kind):
+    _obj, path = arm
+    refused = run_sinew(
+        "bake", path, "--method", METHOD, "--to", kind, "--frames", "1-60", "--out", small_disk, status=1
+    )
+    assert "MB and 0.1 MB are free" in refused.stderr
+    assert not list(small_disk.iterdir())
+
+
+def test_a_disk_that_fills_up_meanwhile(small_disk):
+    cache = core.PointCache(small_disk / "a.mdd", "mdd", [1], 100_000, 24.0)
+    with pytest.raises(SinewError, match=r"a\.mdd: can not be written: No space left on device"):
+        cache.write(np.zeros((100_000, 3), dtype=np.float32))
+    cache.discard()
+    assert not list(small_disk.iterdir())
+
+
+def test_headers(tmp_path):
+    points = np.arange(6, dtype=np.float32).reshape(2, 3)
+    for kind in ("mdd", "pc2"):
+        cache = core.PointCache(tmp_path / f"a.{kind}", kind, [12, 14], 2, 24.0)
+        cache.write(points)
+        cache.write(points + 1)
+        cache.close()
+        cache.publish()
+    mdd = (tmp_path / "a.mdd").read_bytes()
+    assert struct.unpack(">iiff12f", mdd) == (2, 2, 0.5, np.float32(14 / 24), *range(6), *range(1, 7))
+    pc2 = (tmp_path / "a.pc2").read_bytes()
+    assert struct.unpack("<12siiffi12f", pc2) == (
+        b"POINTCACHE2\0", 1, 2, 12.0, 2.0, 2, *range(6), *range(1, 7)
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd", "pc2", "alembic", "usd", "gltf"])
+def test_the_operator(arm, tmp_path, kind):
+    obj, path = arm
+    expected = shown(obj, FRAMES)
+    objects = set(bpy.data.objects)
+    assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
+    in_file = kind in ("shape-keys", "mdd", "pc2")
+    assert properties.is_driven(obj) == (not in_file)
+    assert set(bpy.data.objects) == objects if in_file else len(bpy.data.objects) == len(objects)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= TOLERANCE * scenes.diagonal(obj)
+    if kind != "shape-keys":
+        assert len([p for p in path.parent.rglob("*") if p.is_file() and p.name != "arm.blend"]) == 1
+    if not in_file:
+        with pytest.raises(RuntimeError, match="is there already; choose to overwrite it"):
+            bpy.ops.sinew.bake(kind=kind, frames="1-11")
+        assert bpy.ops.sinew.bake(kind=kind, frames="1-11", overwrite=True) == {"FINISHED"}
+
+
+def test_a_parent_that_deforms_does_not_deform_twice(arm, tmp_path):
+    obj, path = arm
+    obj.parent, obj.parent_type = obj.modifiers[0].object, "ARMATURE"
+    obj.modifiers.clear()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    expected = shown(obj, FRAMES)
+    run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("name", ["human.blend", "CesiumMan.glb"])
+@pytest.mark.parametrize("kind", ["mdd", "usd"])
+def test_real_rigs(real_rig, tmp_path, name, kind):
+    path = real_rig(name)
+    frames = [1, 2, 3]
+    options = ["--method", METHOD, "--frames", "1-3", "--out"]
+    run_sinew("points", path, *options, tmp_path / "points.npz")
+    run_sinew("bake", path, "--to", kind, *options, tmp_path / "out")
+    (written,) = (p for p in (tmp_path / "out").iterdir() if p.is_file())
+    with np.load(tmp_path / "points.npz") as expected:
+        names = [n for n in expected.files if n != "frames"]
+        assert names
+        read = read_elsewhere(written, frames, tmp_path)
+        for one in names:
+            assert len(expected[one]) == 3
+            got = read.get(one)
+            if got is None:
+                # USD allows no dots in names.
+                got = read[one.replace(".", "_")]
+            size = np.linalg.norm(np.ptp(expected[one][0], axis=0))
+            apart = np.linalg.norm(got[:, :, None] - got[:, None, :1], axis=-1)
+            wanted = np.linalg.norm(expected[one][:, :, None] - expected[one][:, None, :1], axis=-1)
+            scale = apart.max() / wanted.max()
+            assert np.abs(apart / scale - wanted).max() <= 2 * TOLERANCE * size
+
+
+def test_wrong_use(arm, tmp_path):
+    _obj, path = arm
+    run_sinew("bake", path, "--method", METHOD, "--to", "fbx", "--out", tmp_path / "o", status=2)
+    bad = run_sinew(
+        "bake", path, "--method", METHOD, "--to", "usd", "--frames", "1,5", "--out", tmp_path / "o", status=1
+    )
+    assert "Blender exports every frame of a range" in bad.stderr
+    run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o")
+    again = run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o", status=1)
+    assert "use --overwrite to replace it" in again.stderr
+    run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o", "--overwrite")
