@@ -88,9 +88,9 @@ def _choose(obj: bpy.types.Object, method: str) -> None:
             properties.of(obj).enabled = False
         return
     drive.add(obj, method)
-    drive.use_one_method(obj, method)
     # What is asked for wins over keys in the file.
     animation.remove_keys(obj, "sinew.method")
+    drive.use_one_method(obj, method)
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
 

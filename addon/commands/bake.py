@@ -7,7 +7,7 @@ import argparse
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.jobs import Job, plan_jobs
 from .console import Console
@@ -68,9 +68,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     names = [method.name for method in sinew.methods()]
     if args.method not in names:
-        raise SinewError(f"method: expected one of {', '.join(names)}, got {args.method!r}")
+        raise WrongUse(f"method: expected one of {', '.join(names)}, got {args.method!r}")
     if args.step < 1:
-        raise SinewError(f"step: expected 1 or more frames, got {args.step}")
+        raise WrongUse(f"step: expected 1 or more frames, got {args.step}")
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
     suffix = SUFFIXES.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
