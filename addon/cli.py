@@ -10,6 +10,7 @@ import shutil
 import sys
 
 from .core.errors import SinewError, WrongUse
+from .prepare import prepare_blender
 
 # The batches have Blenders of their own, or ask for this one; a report without Blender has no pictures.
 WITHOUT_BLENDER = ("methods", "report", "reskin", "restore")
@@ -96,18 +97,3 @@ def unregister_command() -> None:
 
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
-
-
-def prepare_blender() -> None:
-    """Makes Sinew's own properties known to Blender. Raises SinewError where there is no Blender."""
-    try:
-        import bpy
-    except ImportError as error:
-        raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
-    from .blender import native, registration
-
-    reason = native.load_error()
-    if reason is not None:
-        raise SinewError(reason)
-    if not hasattr(bpy.types.Object, "sinew"):
-        registration.register()

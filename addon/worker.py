@@ -42,7 +42,7 @@ def main() -> None:
 
     _end_with_parent()
     try:
-        from .cli import prepare_blender
+        from .prepare import prepare_blender
 
         prepare_blender()
     except SinewError as error:

@@ -23,7 +23,7 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     modifier = armature_modifier(obj)
     if modifier is not None:
         return modifier.object
-    return obj.parent if _parent_deforms(obj) else None
+    return obj.parent if stack.parent_deforms(obj) else None
 
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -42,10 +42,6 @@ def not_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
     return [
         o for o in objects if o.type != "MESH" and any(m.type == "ARMATURE" and m.object for m in o.modifiers)
     ]
-
-
-def _parent_deforms(obj: bpy.types.Object) -> bool:
-    return obj.parent is not None and obj.parent_type == "ARMATURE" and obj.parent.type == "ARMATURE"
 
 
 def check_can_add(obj: bpy.types.Object) -> None:

@@ -38,7 +38,7 @@ def is_needed(obj: bpy.types.Object) -> bool:
     """Whether what comes to the Armature modifier is anything but the mesh and its relative shape keys."""
     keys = obj.data.shape_keys
     absolute = keys is not None and not keys.use_relative
-    return absolute or _parent_deforms(obj) or bool(stack.changes_in_front(obj))
+    return absolute or stack.parent_deforms(obj) or bool(stack.changes_in_front(obj))
 
 
 def check(obj: bpy.types.Object) -> None:
@@ -82,10 +82,6 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy
 def changes_weights(obj: bpy.types.Object) -> bool:
     """Whether weights can differ from frame to frame."""
     return any(m.type in WEIGHT_CHANGERS for m in stack.changes_in_front(obj))
-
-
-def _parent_deforms(obj: bpy.types.Object) -> bool:
-    return obj.parent is not None and obj.parent_type == "ARMATURE" and obj.parent.type == "ARMATURE"
 
 
 def _make(obj: bpy.types.Object) -> bpy.types.Object:

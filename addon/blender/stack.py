@@ -65,3 +65,8 @@ def in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 def changes_in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Those ahead that are on and change positions, topology or weights."""
     return [m for m in in_front(obj) if is_on(m) and m.type not in HARMLESS_IN_FRONT]
+
+
+def parent_deforms(obj: bpy.types.Object) -> bool:
+    """Whether the object's parent deforms it ahead of all modifiers (parent type Armature)."""
+    return obj.parent is not None and obj.parent_type == "ARMATURE" and obj.parent.type == "ARMATURE"

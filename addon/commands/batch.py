@@ -161,7 +161,7 @@ class _Workers:
     def run(self, tasks: list[dict]) -> Iterator[tuple[dict, dict]]:
         if not tasks or self._inside_blender:
             from .. import worker
-            from ..cli import prepare_blender
+            from ..prepare import prepare_blender
 
             if tasks:
                 prepare_blender()

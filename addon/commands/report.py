@@ -91,8 +91,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
     """Figures 3.6 to 3.11; where this installation can not draw, why."""
-    from ..cli import prepare_blender
     from ..core.report import meshes
+    from ..prepare import prepare_blender
 
     try:
         import PIL  # noqa: F401

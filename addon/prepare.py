@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes a plain Python with bpy ready for the commands."""
+
+from __future__ import annotations
+
+from .core.errors import SinewError
+
+
+def prepare_blender() -> None:
+    """Makes Sinew's own properties known to Blender. Raises SinewError where there is no Blender."""
+    try:
+        import bpy
+    except ImportError as error:
+        raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
+    from .blender import native, registration
+
+    reason = native.load_error()
+    if reason is not None:
+        raise SinewError(reason)
+    if not hasattr(bpy.types.Object, "sinew"):
+        registration.register()
