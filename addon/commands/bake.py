@@ -7,9 +7,9 @@ import argparse
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..batch.inputs import Job, plan_jobs
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..core.jobs import Job, plan_jobs
 from .console import Console
 
 HELP = """\
