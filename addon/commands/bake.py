@@ -33,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="+", type=Path, metavar="FILE_OR_FOLDER")
+    parser.add_argument("inputs", nargs="+", metavar="FILE_OR_FOLDER")
     parser.add_argument("--method", required=True, help="a method of `sinew methods`")
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
