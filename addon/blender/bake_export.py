@@ -54,7 +54,27 @@ GLTF = "gltf"
 SUFFIXES = {"alembic": ".abc", "usd": ".usdc", GLTF: ".glb"}
 
 
-class SceneExport:
+class _Export:
+    """What ends as one file: written at `unfinished` first, then moved to `path`."""
+
+    path: Path
+    unfinished: Path
+
+    @property
+    def what(self) -> str:
+        return str(self.path)
+
+    def place(self) -> None:
+        """The open file stays as it is."""
+
+    def publish(self) -> None:
+        core.publish(self.unfinished, self.path)
+
+    def discard(self) -> None:
+        self.unfinished.unlink(missing_ok=True)
+
+
+class SceneExport(_Export):
     """Alembic and USD. The exporter goes through the frames itself, and Sinew follows as in a render."""
 
     def __init__(
@@ -83,21 +103,8 @@ class SceneExport:
             scene.frame_start, scene.frame_end = before[1:]
             evaluate.set_frame(scene, before[0])
 
-    @property
-    def what(self) -> str:
-        return str(self.path)
 
-    def place(self) -> None:
-        """The open file stays as it is."""
-
-    def publish(self) -> None:
-        core.publish(self.unfinished, self.path)
-
-    def discard(self) -> None:
-        self.unfinished.unlink(missing_ok=True)
-
-
-class MorphExport:
+class MorphExport(_Export):
     """glTF: the final meshes of the first frame, and the others' points as morph targets."""
 
     def __init__(self, meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> None:
@@ -174,19 +181,6 @@ class MorphExport:
             if action is not None:
                 bpy.data.actions.remove(action)
         self.made.clear()
-
-    @property
-    def what(self) -> str:
-        return str(self.path)
-
-    def place(self) -> None:
-        """The open file stays as it is."""
-
-    def publish(self) -> None:
-        core.publish(self.unfinished, self.path)
-
-    def discard(self) -> None:
-        self.unfinished.unlink(missing_ok=True)
 
 
 def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> Path:

@@ -131,8 +131,8 @@ def _maintain(obj: bpy.types.Object, changes: Changes) -> None:
         raise SinewError(f"{obj.name}: its Sinew modifier was deleted; press Remove, then Add Sinew")
     if not properties.of(obj).standing_in:
         drive.switch(obj, on=True)
-    drive.adopt_pointers(obj)
     if obj.mode in MODES_THAT_NEED_THE_POINTER or _bones_are_edited(obj):
+        drive.adopt_pointers(obj)
         drive.give_back_pointers(obj)
     else:
         drive.clear_pointers(obj)

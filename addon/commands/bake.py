@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..batch.inputs import Job, plan_jobs
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from .console import Console
+from .outcome import Outcome
 
 HELP = """\
 Writes what Sinew makes of every armature-deformed mesh as data that plays without it. Inputs are never
@@ -49,18 +50,9 @@ SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 
 
 @dataclass
-class Outcome:
-    """What became of one file."""
-
-    job: Job
+class Baked(Outcome):
     meshes: int = 0
     frames: int = 0
-    left_out: list[str] = field(default_factory=list)
-    error: str | None = None
-
-    @property
-    def failed(self) -> bool:
-        return self.error is not None or bool(self.left_out)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -77,18 +69,16 @@ def run(args: argparse.Namespace, console: Console) -> int:
     outcomes = []
     for number, job in enumerate(jobs):
         what = f"Baking {job.source.name}" + (f" ({number + 1} of {len(jobs)})" if len(jobs) > 1 else "")
-        outcome = Outcome(job)
+        outcome = Baked(job)
         try:
             _bake(outcome, args, frames, console, what)
         except SinewError as error:
             outcome.error = str(error)
-            console.complain(outcome.error)
-        for reason in outcome.left_out:
-            console.complain(f"{job.source}: left as it was: {reason}")
+        outcome.complain(console)
         outcomes.append(outcome)
     console.table(
         ("file", "meshes", "frames", "result"),
-        [(str(o.job.source), str(o.meshes), str(o.frames), _result(o)) for o in outcomes],
+        [(str(o.job.source), str(o.meshes), str(o.frames), o.result) for o in outcomes],
     )
     failures = sum(outcome.failed for outcome in outcomes)
     console.say(f"{len(outcomes) - failures} of {len(outcomes)} files baked with {args.method}")
@@ -96,7 +86,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _bake(
-    outcome: Outcome, args: argparse.Namespace, frames: list[float] | None, console: Console, what: str
+    outcome: Baked, args: argparse.Namespace, frames: list[float] | None, console: Console, what: str
 ) -> None:
     import bpy
 
@@ -136,11 +126,3 @@ def _bake(
     except SinewError as error:
         raise SinewError(f"{source}: {error}") from None
     outcome.meshes, outcome.frames = len(taken), len(chosen)
-
-
-def _result(outcome: Outcome) -> str:
-    if outcome.error is not None:
-        return "failed"
-    if outcome.left_out:
-        return f"{outcome.job.target}, {len(outcome.left_out)} left as they were"
-    return str(outcome.job.target)

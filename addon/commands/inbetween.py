@@ -10,6 +10,7 @@ from pathlib import Path
 from ..batch.inputs import Job, plan_jobs
 from ..core.errors import SinewError, WrongUse
 from .console import Console
+from .outcome import Outcome
 
 HELP = """\
 Writes a copy of each file in which every armature with keyed poses moves between them by the method chosen,
@@ -47,19 +48,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 @dataclass
-class Outcome:
-    """What became of one file."""
-
-    job: Job
+class Inbetweened(Outcome):
     armatures: int = 0
     bones: int = 0
-    left_out: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    error: str | None = None
-
-    @property
-    def failed(self) -> bool:
-        return self.error is not None or bool(self.left_out)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -74,29 +66,26 @@ def run(args: argparse.Namespace, console: Console) -> int:
     outcomes = []
     for job in console.progress(jobs, len(jobs), "Making in-betweens"):
         outcome = _inbetween(job, args)
-        if outcome.error is not None:
-            console.complain(outcome.error)
-        for reason in outcome.left_out:
-            console.complain(f"{job.source}: left as it was: {reason}")
+        outcome.complain(console)
         for note in outcome.notes:
             console.note(f"{job.source}: {note}")
         outcomes.append(outcome)
     console.table(
         ("file", "armatures", "bones", "result"),
-        [(str(o.job.source), str(o.armatures), str(o.bones), _result(o)) for o in outcomes],
+        [(str(o.job.source), str(o.armatures), str(o.bones), o.result) for o in outcomes],
     )
     failures = sum(outcome.failed for outcome in outcomes)
     console.say(f"{len(outcomes) - failures} of {len(outcomes)} files with in-betweens by {args.method}")
     return 1 if failures else 0
 
 
-def _inbetween(job: Job, args: argparse.Namespace) -> Outcome:
+def _inbetween(job: Job, args: argparse.Namespace) -> Inbetweened:
     import bpy
 
     from ..blender import actions, files, inbetween, inbetween_bake, inbetween_handlers
     from ..core import inbetween as core
 
-    outcome = Outcome(job)
+    outcome = Inbetweened(job)
     path = core.SPLINE if args.spline else core.STRAIGHT
     try:
         if job.target.exists() and not args.overwrite:
@@ -130,11 +119,3 @@ def _inbetween(job: Job, args: argparse.Namespace) -> Outcome:
     except SinewError as error:
         outcome.error = str(error)
     return outcome
-
-
-def _result(outcome: Outcome) -> str:
-    if outcome.error is not None:
-        return "failed"
-    if outcome.left_out:
-        return f"{outcome.job.target}, {len(outcome.left_out)} left as they were"
-    return str(outcome.job.target)
