@@ -60,6 +60,17 @@ def handles_of(armature: bpy.types.Object, names: list[str]) -> list[str]:
     return sorted(set(handles) - set(names))
 
 
+def without_parents(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
+    """Those of `names` that are above no other in the hierarchy."""
+    above: set[str] = set()
+    for name in names:
+        parent = armature.data.bones[name].parent
+        while parent is not None and parent.name not in above:
+            above.add(parent.name)
+            parent = parent.parent
+    return [name for name in names if name not in above]
+
+
 def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
     """float32 [bones + joints, 4, 4]: each posed bone in armature space, then the joints of `bones`."""
     pose = _read_matrices(evaluated_armature.pose.bones, "matrix")

@@ -12,7 +12,7 @@ import bpy
 class Changes:
     """The data touched since the last update, by session_uid.
 
-    touched    objects that were touched in any way
+    touched    objects and meshes that were touched in any way
     objects    whose geometry was touched
     moved      that were moved
     gated      whose modifiers rested, which touches their geometry and mesh
@@ -46,8 +46,10 @@ class Changes:
                 if update.is_updated_transform:
                     changes.moved.add(uid)
             elif isinstance(what, bpy.types.Mesh):
+                uid = what.original.session_uid
+                changes.touched.add(uid)
                 if update.is_updated_geometry:
-                    changes.meshes.add(what.original.session_uid)
+                    changes.meshes.add(uid)
             elif isinstance(what, bpy.types.Armature):
                 changes.armatures.add(what.original.session_uid)
             elif isinstance(what, bpy.types.Scene | bpy.types.Collection):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass, field
 
@@ -33,6 +34,11 @@ class Driven:
     frames             what decided the last frame
     rest_points        of the last frame
     dirtied_by_frames  the last change of frame moved the object or its rest points
+    looks              what the artist can change of the object itself
+    asking             the driver asks for the points within Blender's evaluation
+    answered           the address of the evaluated mesh that was given points in the last evaluation, or 0
+    is_kept            the mesh itself holds the last points too, not only the evaluated one
+    lock               held while the chain works: a render may ask from a thread of its own
     """
 
     mode: str
@@ -46,6 +52,11 @@ class Driven:
     frames: list[LinkFrame | None] | None = None
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
+    looks: tuple = ()
+    asking: bool = False
+    answered: int = 0
+    is_kept: bool = True
+    lock: threading.Lock = field(default_factory=threading.Lock)
     milliseconds: float = 0.0
 
     def is_untouched_by(self, changes: Changes) -> bool:
@@ -81,19 +92,69 @@ def update(
     if mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
         drive.switch(obj, on=False)
         return None
+    answered = (
+        driven is not None
+        and driven.answered != 0
+        and driven.answered == obj.data.evaluated_get(depsgraph).as_pointer()
+    )
     touched = changes.structure or bool(changes.armatures) or obj.session_uid in changes.objects
+    if touched and answered and not (changes.structure or changes.armatures):
+        # Being asked for points touches the object by itself.
+        touched = _looks(obj) != driven.looks
     if driven is None or touched or driven.mode != mode:
         _maintain(obj, changes)
     if not source.is_ready(obj, depsgraph):
         return driven
-    driven = _current(obj, driven, depsgraph, changes)
+    known = (driven, driven.source) if driven is not None else None
+    driven = _current(obj, driven, depsgraph, changes, touched)
     if touched or not driven.watched:
-        driven.watched = {obj.session_uid, _uid(properties.of(obj).front), *driven.armatures}
+        driven.looks = _looks(obj)
+        mesh = obj.data.session_uid
+        driven.watched = {obj.session_uid, mesh, _uid(properties.of(obj).front), *driven.armatures}
+        hold_pose(obj, driven)
+    if answered and known == (driven, driven.source):
+        driven.dirtied_by_frames = False
+    else:
+        with driven.lock:
+            _deform(obj, driven, depsgraph, changes, touched)
+    driven.source.known_key_values = driven.source.key_values
+    return driven
+
+
+def _looks(obj: bpy.types.Object) -> tuple:
+    """What decides how the object is driven, but for its mesh and armatures."""
+    settings = properties.of(obj)
+    return (
+        settings.standing_in,
+        obj.parent_type,
+        obj.data.session_uid,
+        obj.show_only_shape_key,
+        obj.vertex_groups.keys(),
+        [
+            (m.name, m.show_viewport, m.show_render)
+            if m.type != "ARMATURE"
+            else (m.name, m.object, ModifierOptions.read(m), m.show_viewport, m.show_render)
+            for m in obj.modifiers
+        ],
+        [(s.name, s.armature, s.show_viewport, s.show_render) for s in settings.stand_ins],
+    )
+
+
+def _deform(
+    obj: bpy.types.Object,
+    driven: Driven,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    touched: bool,
+) -> None:
+    """Writes the points of this evaluation for the next one, where they differ from what is there."""
     # Binding is not part of a frame's time: it happens once.
     started = time.perf_counter()
-    frames = _frames(obj, driven, depsgraph, changes)
+    stand_ins = properties.of(obj).stand_ins
+    armatures = [s.armature and s.armature.evaluated_get(depsgraph) for s in stand_ins]
+    frames = _frames(obj.evaluated_get(depsgraph), armatures, driven, depsgraph.mode)
     if frames is None:
-        return driven
+        return
     driven.frames = frames
     rest_points = source.rest_points(obj, driven.source, depsgraph)
     if changes.frame:
@@ -103,20 +164,69 @@ def update(
     if driven.chain.deform(rest_points, frames):
         points.write(obj, driven.chain.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
-    elif touched and not points.are_written(obj, len(driven.chain.points)):
+    elif _are_lost(obj, driven, changes, touched):
         points.write(obj, driven.chain.points)
-    return driven
+    else:
+        return
+    driven.is_kept = True
+
+
+def _are_lost(obj: bpy.types.Object, driven: Driven, changes: Changes, touched: bool) -> bool:
+    """Whether the evaluated mesh may have other points than those that were given last."""
+    if not driven.is_kept and (not changes.complete or obj.data.session_uid in changes.touched):
+        # It was made anew of the mesh itself.
+        return True
+    return touched and not points.are_written(obj, len(driven.chain.points))
+
+
+def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: Driven) -> None:
+    """Writes the points into an evaluated mesh, while Blender evaluates its object.
+
+    Leaves it as it is where something is out of the ordinary: that is for update().
+    """
+    settings, obj = evaluated.sinew, evaluated.original
+    if not driven.asking or driven.mode != evaluated.mode or not _is_own(obj):
+        return
+    armatures = [stand_in.armature for stand_in in settings.stand_ins]
+    if len(armatures) != len(driven.chain.links) or not all(a and a.is_evaluated for a in armatures):
+        return
+    attribute = mesh.attributes.get(settings.attribute)
+    if attribute is None or len(attribute.data) != len(driven.source.points):
+        return
+    with driven.lock:
+        started = time.perf_counter()
+        frames = _frames(evaluated, armatures, driven, "VIEWPORT")
+        if frames is None:
+            return
+        driven.chain.deform(source.keyed_points(obj, mesh.shape_keys, driven.source), frames)
+        attribute.data.foreach_set("vector", driven.chain.points.ravel())
+        driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
+        driven.milliseconds = 1000.0 * (time.perf_counter() - started)
+
+
+def _is_own(obj: bpy.types.Object) -> bool:
+    """Whether nothing else uses the object's mesh, which could be read while it is written."""
+    return obj.data.users - obj.data.use_fake_user == 1
 
 
 def hold_pose(obj: bpy.types.Object, driven: Driven) -> None:
-    """Keeps the poses evaluated even where an armature is hidden."""
+    """Keeps the poses evaluated even where an armature is hidden, and has Blender ask for the points where it
+    can."""
+    settings, pairs = properties.of(obj), drive.stand_ins(obj)
+    driven.asking = (
+        bool(settings.attribute)
+        and _is_own(obj)
+        and not any(driven.keyed)
+        and all(stand_in.show_viewport == stand_in.show_render for _modifier, stand_in in pairs)
+    )
     bones = []
-    for (_modifier, stand_in), link in zip(drive.stand_ins(obj), driven.chain.links, strict=False):
+    for (_modifier, stand_in), link in zip(pairs, driven.chain.links, strict=False):
         if stand_in.armature is not None:
             moving = link.binding.moving_bones
             handles = armature_io.handles_of(stand_in.armature, moving)
-            bones += [(stand_in.armature, name) for name in (*moving, *handles)]
-    pose_driver.ensure(obj, list(dict.fromkeys(bones)))
+            names = armature_io.without_parents(stand_in.armature, [*moving, *handles])
+            bones += [(stand_in.armature, name) for name in names]
+    pose_driver.ensure(obj, list(dict.fromkeys(bones)), driven.asking)
 
 
 def _maintain(obj: bpy.types.Object, changes: Changes) -> None:
@@ -162,29 +272,27 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
 
 
 def _frames(
-    obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph, changes: Changes
+    evaluated: bpy.types.Object, armatures: list[bpy.types.Object | None], driven: Driven, mode: str
 ) -> list[LinkFrame | None] | None:
-    """What decides each link's part in this frame; None where that is unknown, and the last shape stays."""
-    evaluated = obj.evaluated_get(depsgraph)
+    """What decides each link's part in this frame; None where that is unknown, and the last shape stays.
+
+    armatures  each link's, evaluated
+    mode       the depsgraph's
+    """
     settings = evaluated.sinew
+    stand_ins = properties.of(evaluated.original).stand_ins
     frames: list[LinkFrame | None] = []
-    for number, link in enumerate(driven.chain.links):
-        stand_in = properties.of(obj).stand_ins[number]
-        armature = stand_in.armature
+    for number, (link, armature) in enumerate(zip(driven.chain.links, armatures, strict=False)):
+        stand_in = stand_ins[number]
         flags = evaluated.modifiers[stand_in.name] if driven.keyed[number] else stand_in
-        if armature is None or armature.mode == "EDIT" or not _takes_part(flags, depsgraph):
+        if armature is None or armature.mode == "EDIT" or not _takes_part(flags, mode):
             frames.append(None)
             continue
-        evaluated_armature = armature.evaluated_get(depsgraph)
-        last = driven.frames[number] if driven.frames is not None and changes.complete else None
-        if last is not None and changes.moved.isdisjoint((obj.session_uid, armature.session_uid)):
-            space = last.bones_from_model
-        else:
-            space = armature_io.bones_from_model(evaluated, evaluated_armature)
+        space = armature_io.bones_from_model(evaluated, armature)
         if space is None:
             # An armature scaled to nothing for a moment.
             return None
-        pose = armature_io.read_pose(evaluated_armature, link.binding.bones)
+        pose = armature_io.read_pose(armature, link.binding.bones)
         if not np.isfinite(pose).all():
             return None
         method = settings.stand_ins[number].method if number else properties.SAME_METHOD
@@ -193,18 +301,22 @@ def _frames(
     return frames
 
 
-def _takes_part(flags: properties.SinewStandIn | bpy.types.Modifier, depsgraph: bpy.types.Depsgraph) -> bool:
-    return flags.show_render if depsgraph.mode == "RENDER" else flags.show_viewport
+def _takes_part(flags: properties.SinewStandIn | bpy.types.Modifier, mode: str) -> bool:
+    return flags.show_render if mode == "RENDER" else flags.show_viewport
 
 
 def _current(
-    obj: bpy.types.Object, driven: Driven | None, depsgraph: bpy.types.Depsgraph, changes: Changes
+    obj: bpy.types.Object,
+    driven: Driven | None,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    touched: bool,
 ) -> Driven:
     """The object's state, bound anew where its mesh, weights, bones or modifiers changed."""
     if driven is None:
         return _bind(obj, depsgraph)
     driven.mode = obj.mode
-    if obj.session_uid in changes.objects:
+    if touched:
         pairs = drive.stand_ins(obj)
         armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
         options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]
@@ -212,7 +324,7 @@ def _current(
             return _bind(obj, depsgraph)
     if _bones_changed(obj, driven, depsgraph, changes):
         return _bind(obj, depsgraph, driven)
-    if source.has_changed(obj, driven.source, depsgraph, changes):
+    if source.has_changed(obj, driven.source, depsgraph, changes, touched):
         return _bind(obj, depsgraph, driven)
     return driven
 
@@ -263,9 +375,7 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
     facts = survey.describe(obj, pairs[0][1].armature, links[0].binding.weighting, read.points, depsgraph)
     armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
     keyed = [animation.is_visibility_animated(obj, modifier) for modifier, _stand_in in pairs]
-    driven = Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts)
-    hold_pose(obj, driven)
-    return driven
+    return Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:

@@ -16,6 +16,7 @@ from . import drive, driven, overrides, points, properties
 from .changes import Changes
 from .driven import Driven
 from .gate import Gate, is_allowed
+from .in_evaluation import Answers
 
 log = logging.getLogger("sinew")
 
@@ -49,6 +50,9 @@ session = Session()
 def state_of(obj: bpy.types.Object) -> Driven | None:
     """What the panel shows of a driven object; None before its first frame."""
     return session.driven.get(obj.session_uid)
+
+
+answers = Answers(state_of)
 
 
 def refresh(context: bpy.types.Context) -> None:
@@ -111,6 +115,7 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
 def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     try:
         if properties.of(obj).enabled:
+            answers.raise_error(obj)
             state = driven.update(obj, state_of(obj), depsgraph, changes)
             if state is None:
                 session.driven.pop(obj.session_uid, None)
@@ -153,7 +158,14 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
 
 
 @persistent
-def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    for state in session.driven.values():
+        state.answered = 0
+
+
+@persistent
+def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    before_update(scene, depsgraph)
     if session.idle or session.objects is None or not is_allowed():
         return
     for obj in session.objects:
@@ -190,11 +202,20 @@ def on_loaded(*_args: object) -> None:
     refresh(bpy.context)
 
 
+def keep_shown(obj: bpy.types.Object) -> None:
+    """What was given to the evaluated mesh alone becomes part of the file."""
+    state = state_of(obj)
+    if state is not None and not state.is_kept:
+        points.keep_shown(obj, bpy.context.view_layer.depsgraph)
+        state.is_kept = True
+
+
 @persistent
 def on_save(*_args: object) -> None:
     """A saved file has the Armature modifiers' pointers: without Sinew they need only switching on."""
     for obj in bpy.data.objects:
         if properties.is_driven(obj):
+            keep_shown(obj)
             drive.give_back(obj)
             overrides.keep(obj)
 
@@ -212,6 +233,7 @@ def on_saved(*_args: object) -> None:
 _HANDLERS = {
     "frame_change_pre": [before_frame_change],
     "frame_change_post": [on_frame_change],
+    "depsgraph_update_pre": [before_update],
     "depsgraph_update_post": [on_depsgraph_update],
     "undo_pre": [on_data_replaced],
     "undo_post": [on_data_replaced],
@@ -229,6 +251,8 @@ def register() -> None:
     session.forget()
     properties.listeners.method_changed = _method_changed
     properties.listeners.enabled_changed = _enabled_changed
+    properties.listeners.object_asked = answers.object_asked
+    properties.listeners.mesh_asked = answers.mesh_asked
     for event, functions in _HANDLERS.items():
         getattr(bpy.app.handlers, event).extend(functions)
 

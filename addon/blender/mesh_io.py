@@ -60,9 +60,9 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
     return ShapeKeys(tuple(points), points[basis.name], moves)
 
 
-def read_key_values(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
     """float32 [keys]: the value of each shape key at this evaluation; 0 where it is muted."""
-    blocks = obj.data.shape_keys.evaluated_get(depsgraph).key_blocks
+    blocks = evaluated_keys.key_blocks
     values = np.empty(len(blocks), dtype=np.float32)
     muted = np.empty(len(blocks), dtype=bool)
     blocks.foreach_get("value", values)
@@ -81,7 +81,14 @@ def read_pinned_points(obj: bpy.types.Object) -> np.ndarray:
 
 
 def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
-    """Stores float32 [vertices, 3] in the point attribute `name`, made where it is missing."""
+    """Stores float32 [vertices, 3] in the point attribute `name`, made where it is missing, and has Blender
+    evaluate the mesh."""
+    store_points(mesh, name, points)
+    mesh.update_tag()
+
+
+def store_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
+    """The same for what the evaluated mesh shows already."""
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
         if attribute is not None:
@@ -92,7 +99,6 @@ def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
         attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
         mesh.attributes.active_index = active
     attribute.data.foreach_set("vector", points.ravel())
-    mesh.update_tag()
 
 
 def write_points_once(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:

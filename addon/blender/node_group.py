@@ -8,7 +8,9 @@ import bpy
 # A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
 # where the group finds the points.
 MARK = "sinew_node_group"
-ATTRIBUTE, CARRIER = 1, 2
+ATTRIBUTE, CARRIER = 3, 2
+# An input that no node reads; pose_driver has its driver there.
+POSE = "Pose"
 
 
 def get_or_make(kind: int) -> bpy.types.NodeTree:
@@ -53,6 +55,15 @@ def get_input(modifier: bpy.types.Modifier, name: str) -> object:
     return modifier.get(identifier)
 
 
+def input_path(modifier: bpy.types.Modifier, name: str) -> str:
+    """The path of an input from the modifier's object, for a driver."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+    identifier = _identifier(modifier, name)
+    if hasattr(modifier, "properties"):
+        return f"{start}.properties.inputs.{identifier}.value"
+    return f'{start}["{identifier}"]'
+
+
 def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
     if modifier.node_group is None:
         return None
@@ -89,7 +100,10 @@ def _make_for_attribute() -> bpy.types.NodeTree:
     group = _new_group(
         "Sinew",
         ATTRIBUTE,
-        {"Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex")},
+        {
+            "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
+            POSE: ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points"),
+        },
     )
     source, named, place, result = _nodes(
         group,

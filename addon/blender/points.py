@@ -45,6 +45,16 @@ def write(obj: bpy.types.Object, points: np.ndarray) -> None:
         mesh_io.write_points(obj.data, settings.attribute, points)
 
 
+def keep_shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Stores in the mesh itself the points that were given to the evaluated one."""
+    name = properties.of(obj).attribute
+    shown = obj.data.evaluated_get(depsgraph).attributes.get(name) if name else None
+    if shown is not None and len(shown.data) == len(obj.data.vertices):
+        points = np.empty((len(shown.data), 3), dtype=np.float32)
+        shown.data.foreach_get("vector", points.ravel())
+        mesh_io.store_points(obj.data, name, points)
+
+
 def are_written(obj: bpy.types.Object, count: int) -> bool:
     """Whether points of as many vertices are held."""
     settings = properties.of(obj)

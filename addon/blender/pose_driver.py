@@ -1,45 +1,96 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A driver that makes Blender evaluate a pose whose armature is hidden.
+"""The driver that ties a driven object to the poses, which no modifier does while Sinew is at work.
 
-Blender evaluates a hidden armature only for something visible that depends on it. While Sinew is at work no
-modifier does; a driver on a property of the mesh object that reads the bones does instead, without making the
-mesh itself dirty (seen on 4.2 and 5.2, viewport and render). Its value means nothing.
+Its variables read the bones, so Blender evaluates their poses even where the armature is hidden. On an input
+of Sinew's modifier it also places Sinew within Blender's own evaluation: whenever a pose, the object's place,
+its settings or its shape keys change, Blender evaluates the driver after them and before the modifiers, and
+the last two variables ask Sinew for the points (in_evaluation). So a frame is evaluated once, as with a
+modifier (seen on 4.2 to 5.2, viewport and render). A variable that reads a property is no script: it is also
+read where files may not run any.
+
+On a property of the object, which makes nothing dirty, it only keeps the poses evaluated: for points that can
+not be written there. Its value means nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import bpy
 
-from . import properties
+from . import node_group, properties, stack
 
 PATH = "sinew.pose"
+# What the last two variables read.
+ASK_FOR_OBJECT, ASK_FOR_MESH = "sinew.asked", "sinew_asked"
+_PREFIX = "sinew_"
 
 
-def ensure(obj: bpy.types.Object, bones: Sequence[tuple[bpy.types.Object, str]]) -> None:
-    """The driver reads exactly `bones`, each an armature and a bone's name. All bones that move vertices must
-    be named: Blender evaluates those, their parents and their constraints' targets, and no others."""
+@dataclass(frozen=True)
+class _Variable:
+    """What a variable reads: a property, or where no path is given the place of an object."""
+
+    target: bpy.types.ID
+    path: str = ""
+
+    def is_read_by(self, variable: bpy.types.DriverVariable) -> bool:
+        target = variable.targets[0]
+        kind = "SINGLE_PROP" if self.path else "TRANSFORMS"
+        return variable.type == kind and target.id == self.target and target.data_path == self.path
+
+    def add_to(self, driver: bpy.types.Driver, name: str) -> None:
+        variable = driver.variables.new()
+        variable.name = name
+        variable.type = "SINGLE_PROP" if self.path else "TRANSFORMS"
+        target = variable.targets[0]
+        if self.path:
+            target.id_type = self.target.id_type
+        target.id = self.target
+        target.data_path = self.path
+
+
+def ensure(obj: bpy.types.Object, bones: Sequence[tuple[bpy.types.Object, str]], asking: bool) -> None:
+    """Makes the driver as it has to be.
+
+    bones   each an armature and a bone's name. All bones that move vertices must be among them or above one:
+            Blender evaluates those, their parents and their constraints' targets, and no others.
+    asking  it asks Sinew for the points; requires that they are held in an attribute
+    """
+    variables = [
+        _Variable(armature, f'pose.bones["{bpy.utils.escape_identifier(name)}"].length')
+        for armature, name in bones
+    ]
+    path = PATH
+    if asking:
+        path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
+        armatures = dict.fromkeys(armature for armature, _name in bones)
+        variables += [_Variable(each) for each in (*armatures, obj)]
+        if obj.data.shape_keys is not None:
+            variables.append(_Variable(obj.data.shape_keys, "eval_time"))
+        variables += [_Variable(obj, ASK_FOR_OBJECT), _Variable(obj.data, ASK_FOR_MESH)]
     curve = _find(obj)
     if curve is not None:
-        variables = curve.driver.variables
-        if [(v.targets[0].id, v.targets[0].bone_target) for v in variables] == list(bones):
+        if curve.data_path == path and _reads(curve.driver, variables):
             return
-        remove(obj)
-    driver = obj.driver_add(PATH).driver
+        obj.animation_data.drivers.remove(curve)
+    driver = obj.driver_add(path).driver
     driver.type = "SUM"
-    for number, (target, name) in enumerate(bones):
-        variable = driver.variables.new()
-        variable.name = f"bone{number}"
-        variable.type = "TRANSFORMS"
-        variable.targets[0].id = target
-        variable.targets[0].bone_target = name
+    for number, variable in enumerate(variables):
+        variable.add_to(driver, f"{_PREFIX}{number}")
+
+
+def _reads(driver: bpy.types.Driver, variables: list[_Variable]) -> bool:
+    return len(driver.variables) == len(variables) and all(
+        new.is_read_by(old) for new, old in zip(variables, driver.variables, strict=True)
+    )
 
 
 def remove(obj: bpy.types.Object) -> None:
     """Takes the driver off, and the animation data where it was all of it."""
-    if _find(obj) is not None:
-        obj.driver_remove(PATH)
+    curve = _find(obj)
+    if curve is not None:
+        obj.animation_data.drivers.remove(curve)
         remove_empty_animation(obj)
 
 
@@ -53,5 +104,10 @@ def remove_empty_animation(obj: bpy.types.Object) -> None:
 
 
 def _find(obj: bpy.types.Object) -> bpy.types.FCurve | None:
+    """Known by its variables, as its path is that of a modifier which may have gone."""
     animation = obj.animation_data
-    return animation.drivers.find(PATH) if animation is not None else None
+    for curve in animation.drivers if animation is not None else ():
+        variables = curve.driver.variables
+        if curve.data_path == PATH or (len(variables) and variables[0].name.startswith(_PREFIX)):
+            return curve
+    return None

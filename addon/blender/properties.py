@@ -23,6 +23,8 @@ class Listeners:
     method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     inbetween_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    object_asked: Callable[[bpy.types.Object], None] | None = None
+    mesh_asked: Callable[[bpy.types.Mesh], None] | None = None
 
 
 listeners = Listeners()
@@ -36,6 +38,18 @@ def _method_changed(settings: SinewSettings | SinewStandIn, context: bpy.types.C
 def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
     if listeners.enabled_changed is not None:
         listeners.enabled_changed(settings.id_data, context)
+
+
+def _object_asked(settings: SinewSettings) -> float:
+    if listeners.object_asked is not None:
+        listeners.object_asked(settings.id_data)
+    return 0.0
+
+
+def _mesh_asked(mesh: bpy.types.Mesh) -> float:
+    if listeners.mesh_asked is not None:
+        listeners.mesh_asked(mesh)
+    return 0.0
 
 
 # On a library override, only what is marked so is kept with the file.
@@ -128,6 +142,9 @@ class SinewSettings(bpy.types.PropertyGroup):
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )
+    asked: bpy.props.FloatProperty(
+        get=_object_asked, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
+    )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     @property
@@ -197,6 +214,11 @@ class SinewActionHold(bpy.types.PropertyGroup):
 
 
 CLASSES = (SinewStandIn, SinewSettings, SinewActionHold)
+
+# A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
+ASKED_OF_MESH = bpy.props.FloatProperty(
+    get=_mesh_asked, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
+)
 
 # Properties of objects themselves, as a group that the linked file does not have is lost from a library
 # override on saving (Blender 5.0 and 5.2).

@@ -26,6 +26,7 @@ def register() -> None:
     bpy.types.Object.sinew = bpy.props.PointerProperty(
         type=properties.SinewSettings, override=properties.OVERRIDABLE
     )
+    bpy.types.Mesh.sinew_asked = properties.ASKED_OF_MESH
     bpy.types.Action.sinew_holds = bpy.props.CollectionProperty(type=properties.SinewActionHold)
     for name, choice in properties.INBETWEEN.items():
         setattr(bpy.types.Object, name, choice)
@@ -44,13 +45,14 @@ def unregister() -> None:
         from . import drive, handlers, inbetween_handlers, properties
 
         atexit.unregister(unregister)
-        handlers.unregister()
-        inbetween_handlers.unregister()
-        # As in a saved file: the Armature modifiers point to their armatures again.
+        # As in a saved file: the last shape stays, and the Armature modifiers point to their armatures again.
         for obj in bpy.data.objects:
             if properties.is_driven(obj):
+                handlers.keep_shown(obj)
                 drive.give_back(obj)
-        del bpy.types.Object.sinew, bpy.types.Action.sinew_holds
+        handlers.unregister()
+        inbetween_handlers.unregister()
+        del bpy.types.Object.sinew, bpy.types.Mesh.sinew_asked, bpy.types.Action.sinew_holds
         for name in properties.INBETWEEN:
             delattr(bpy.types.Object, name)
     while _registered:

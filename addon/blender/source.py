@@ -19,8 +19,10 @@ from .changes import Changes
 class Source:
     """Read once, and again when it may be out of date.
 
-    points      float32 [vertices, 3], object space, without shape keys
-    from_front  read from what the modifiers in front make of the mesh
+    points            float32 [vertices, 3], object space, without shape keys
+    from_front        read from what the modifiers in front make of the mesh
+    key_values        of the shape keys that are mixed in mixed_points
+    known_key_values  of those when changes were looked at last
     """
 
     group_names: list[str]
@@ -29,6 +31,7 @@ class Source:
     shape_keys: ShapeKeys | None
     from_front: bool = False
     key_values: np.ndarray | None = None
+    known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
 
     def equals_but_for_points(self, other: Source) -> bool:
@@ -54,11 +57,18 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
 
 
 def has_changed(
-    obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph, changes: Changes
+    obj: bpy.types.Object,
+    source: Source,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    touched: bool,
 ) -> bool:
     """Whether points, weights, groups or shape keys may differ from those read, but for key values and for
-    what moves points in front."""
-    if obj.session_uid in changes.objects and [g.name for g in obj.vertex_groups] != source.group_names:
+    what moves points in front.
+
+    touched  the object itself may have changed
+    """
+    if touched and [g.name for g in obj.vertex_groups] != source.group_names:
         return True
     helper = properties.of(obj).front
     if (helper is not None) != source.from_front:
@@ -85,7 +95,8 @@ def has_changed(
     # every step of a slider or every frame of an animation would cost more than the frame.
     if changes.frame and keys.animation_data is not None:
         return False
-    return np.array_equal(mesh_io.read_key_values(obj, depsgraph), source.key_values)
+    values = mesh_io.read_key_values(keys.evaluated_get(depsgraph))
+    return np.array_equal(values, source.known_key_values)
 
 
 def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
@@ -98,9 +109,15 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
         if not np.array_equal(points, source.points):
             source.points = points
         return source.points
+    keys = obj.data.shape_keys
+    return keyed_points(obj, keys and keys.evaluated_get(depsgraph), source)
+
+
+def keyed_points(obj: bpy.types.Object, evaluated_keys: bpy.types.Key | None, source: Source) -> np.ndarray:
+    """The same for a source that is the mesh itself."""
     if source.shape_keys is None:
         return source.points
-    values = mesh_io.read_key_values(obj, depsgraph)
+    values = mesh_io.read_key_values(evaluated_keys)
     if source.mixed_points is None or not np.array_equal(values, source.key_values):
         source.key_values = values
         source.mixed_points = source.shape_keys.mix(values)
