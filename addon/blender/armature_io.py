@@ -49,26 +49,32 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
     )
 
 
-def handles_of(armature: bpy.types.Object, names: list[str]) -> list[str]:
-    """The bones that shape the bendy ones among `names`: their handles, neighbours or chosen ones."""
+def paths_to_wait_for(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
+    """Properties of an armature object that Blender reads, for a driver, no sooner than it has posed all of
+    `names`, with the joints of bendy ones and the bones that shape these."""
+    bones = armature.data.bones
+    bendy = [name for name in names if bones[name].bbone_segments > 1]
+    wanted = dict.fromkeys([*names, *_handles_of(armature, bendy)])
+    above = {parent.name for name in wanted for parent in bones[name].parent_recursive}
+    # A bone is posed after those above it; joints come later, and only properties of theirs wait for them.
+    return [
+        *(f"{_path(name)}.length" for name in wanted if name not in above),
+        *(f"{_path(name)}.bbone_curveinx" for name in bendy),
+    ]
+
+
+def _path(name: str) -> str:
+    return f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
+
+
+def _handles_of(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
+    """The bones that shape bendy ones: their handles, neighbours or chosen ones."""
     handles = []
     for name in names:
         bone = armature.data.bones[name]
-        if bone.bbone_segments > 1:
-            chosen = (bone.bbone_custom_handle_start, bone.bbone_custom_handle_end, bone.parent)
-            handles += [b.name for b in (*chosen, *bone.children) if b is not None]
-    return sorted(set(handles) - set(names))
-
-
-def without_parents(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
-    """Those of `names` that are above no other in the hierarchy."""
-    above: set[str] = set()
-    for name in names:
-        parent = armature.data.bones[name].parent
-        while parent is not None and parent.name not in above:
-            above.add(parent.name)
-            parent = parent.parent
-    return [name for name in names if name not in above]
+        chosen = (bone.bbone_custom_handle_start, bone.bbone_custom_handle_end, bone.parent)
+        handles += [b.name for b in (*chosen, *bone.children) if b is not None]
+    return sorted(set(handles))
 
 
 def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:

@@ -105,14 +105,14 @@ def update(
         _maintain(obj, changes)
     if not source.is_ready(obj, depsgraph):
         return driven
-    known = (driven, driven.source) if driven is not None else None
+    known, known_source = driven, driven and driven.source
     driven = _current(obj, driven, depsgraph, changes, touched)
     if touched or not driven.watched:
         driven.looks = _looks(obj)
         mesh = obj.data.session_uid
         driven.watched = {obj.session_uid, mesh, _uid(properties.of(obj).front), *driven.armatures}
         hold_pose(obj, driven)
-    if answered and known == (driven, driven.source):
+    if answered and driven is known and driven.source is known_source:
         driven.dirtied_by_frames = False
     else:
         with driven.lock:
@@ -219,14 +219,13 @@ def hold_pose(obj: bpy.types.Object, driven: Driven) -> None:
         and not any(driven.keyed)
         and all(stand_in.show_viewport == stand_in.show_render for _modifier, stand_in in pairs)
     )
-    bones = []
-    for (_modifier, stand_in), link in zip(pairs, driven.chain.links, strict=False):
-        if stand_in.armature is not None:
-            moving = link.binding.moving_bones
-            handles = armature_io.handles_of(stand_in.armature, moving)
-            names = armature_io.without_parents(stand_in.armature, [*moving, *handles])
-            bones += [(stand_in.armature, name) for name in names]
-    pose_driver.ensure(obj, list(dict.fromkeys(bones)), driven.asking)
+    poses = [
+        (stand_in.armature, path)
+        for (_modifier, stand_in), link in zip(pairs, driven.chain.links, strict=False)
+        if stand_in.armature is not None
+        for path in armature_io.paths_to_wait_for(stand_in.armature, link.binding.moving_bones)
+    ]
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), driven.asking)
 
 
 def _maintain(obj: bpy.types.Object, changes: Changes) -> None:

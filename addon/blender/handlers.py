@@ -115,7 +115,6 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
 def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     try:
         if properties.of(obj).enabled:
-            answers.raise_error(obj)
             state = driven.update(obj, state_of(obj), depsgraph, changes)
             if state is None:
                 session.driven.pop(obj.session_uid, None)

@@ -8,6 +8,7 @@ changed weights, is left to the handlers, which come afterwards and may change t
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 
@@ -15,6 +16,8 @@ import bpy
 
 from . import driven
 from .driven import Driven
+
+log = logging.getLogger("sinew")
 
 
 class Answers:
@@ -25,28 +28,23 @@ class Answers:
 
     def __init__(self, state_of: Callable[[bpy.types.Object], Driven | None]) -> None:
         self._state_of = state_of
-        self._thread = threading.local()
-        self._errors: dict[int, Exception] = {}
+        # By thread. Python's own thread-local data is gone between two calls from a thread of Blender's.
+        self._asking: dict[int, bpy.types.Object] = {}
 
     def object_asked(self, evaluated: bpy.types.Object) -> None:
-        self._thread.object = evaluated if evaluated.is_evaluated else None
+        if evaluated.is_evaluated:
+            self._asking[threading.get_ident()] = evaluated
 
     def mesh_asked(self, evaluated_mesh: bpy.types.Mesh) -> None:
-        evaluated = getattr(self._thread, "object", None)
-        self._thread.object = None
+        evaluated = self._asking.pop(threading.get_ident(), None)
         if evaluated is None or not evaluated_mesh.is_evaluated:
             # Somebody else reads the property.
             return
-        state = self._state_of(evaluated)
-        if state is None or evaluated.session_uid in self._errors:
+        state = self._state_of(evaluated.original)
+        if state is None:
             return
         try:
             driven.deform_evaluated(evaluated, evaluated_mesh, state)
         except Exception as error:
-            self._errors[evaluated.session_uid] = error
-
-    def raise_error(self, obj: bpy.types.Object) -> None:
-        """Raises what went wrong with an object's points since this was asked last."""
-        error = self._errors.pop(obj.session_uid, None) if self._errors else None
-        if error is not None:
-            raise error
+            # Bones or mesh differ from what is bound. The handlers see to that, and report what stays wrong.
+            log.debug("%s: %s", evaluated.name, error)

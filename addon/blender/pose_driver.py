@@ -50,21 +50,18 @@ class _Variable:
         target.data_path = self.path
 
 
-def ensure(obj: bpy.types.Object, bones: Sequence[tuple[bpy.types.Object, str]], asking: bool) -> None:
+def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]], asking: bool) -> None:
     """Makes the driver as it has to be.
 
-    bones   each an armature and a bone's name. All bones that move vertices must be among them or above one:
-            Blender evaluates those, their parents and their constraints' targets, and no others.
+    poses   each an armature and the path of a property that is read no sooner than its bones are posed.
+            Blender evaluates these bones, their parents and their constraints' targets, and no others.
     asking  it asks Sinew for the points; requires that they are held in an attribute
     """
-    variables = [
-        _Variable(armature, f'pose.bones["{bpy.utils.escape_identifier(name)}"].length')
-        for armature, name in bones
-    ]
+    variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
     if asking:
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
-        armatures = dict.fromkeys(armature for armature, _name in bones)
+        armatures = dict.fromkeys(armature for armature, _path in poses)
         variables += [_Variable(each) for each in (*armatures, obj)]
         if obj.data.shape_keys is not None:
             variables.append(_Variable(obj.data.shape_keys, "eval_time"))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 import snapshot
-from sinew_addon.blender import drive, handlers, mesh_io, properties
+from sinew_addon.blender import armature_io, drive, handlers, mesh_io, properties
 
 
 def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)) -> None:
@@ -347,18 +347,18 @@ def test_another_armature_chosen_in_the_modifier_is_taken_over():
 
 
 def test_an_error_turns_one_object_off_once_and_no_other(monkeypatch, caplog):
-    obj, _armature = scenes.make_arm()
+    obj, armature = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj)
     scenes.add_sinew(other)
-    write = mesh_io.write_points
+    read = armature_io.read_pose
 
-    def fail_for_one(mesh, name, points):
-        if mesh == obj.data:
+    def fail_for_one(evaluated, bones):
+        if evaluated.original == armature:
             raise RuntimeError("disk on fire")
-        write(mesh, name, points)
+        return read(evaluated, bones)
 
-    monkeypatch.setattr(mesh_io, "write_points", fail_for_one)
+    monkeypatch.setattr(armature_io, "read_pose", fail_for_one)
     scenes.shapes(obj, [4, 5, 6])
     assert not properties.of(obj).enabled
     assert "disk on fire" in properties.of(obj).error

@@ -26,12 +26,17 @@ def counting() -> Iterator[None]:
 
 def evaluations(obj: bpy.types.Object, frame: int) -> int:
     """How often Blender evaluates the modifiers of `obj` on going to a frame."""
+    return evaluations_of(obj, lambda: bpy.context.scene.frame_set(frame))
+
+
+def evaluations_of(obj: bpy.types.Object, change: Callable[[], None]) -> int:
+    """How often Blender evaluates the modifiers of `obj` in what `change` does."""
     with tempfile.TemporaryFile() as said:
         sys.stdout.flush()
         stdout = os.dup(1)
         os.dup2(said.fileno(), 1)
         try:
-            bpy.context.scene.frame_set(frame)
+            change()
         finally:
             ctypes.CDLL(None).fflush(None)
             os.dup2(stdout, 1)
@@ -79,7 +84,9 @@ Setup = Callable[[bpy.types.Object, bpy.types.Object], None]
 
 
 @pytest.mark.usefixtures("counting")
-@pytest.mark.parametrize("set_up", [still, moving_armature, modifier_in_front])
+@pytest.mark.parametrize(
+    "set_up", [still, moving_armature, modifier_in_front, moving_parent, moving_mesh, moving_keys]
+)
 def test_a_frame_evaluates_the_mesh_once(set_up: Setup):
     obj, armature = scenes.make_arm()
     set_up(obj, armature)
@@ -96,11 +103,31 @@ def test_a_frame_evaluates_the_mesh_once(set_up: Setup):
         properties.of(obj).enabled = True
 
 
+@pytest.mark.usefixtures("counting")
+def test_posing_evaluates_the_mesh_once():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(2)
+
+    def pose() -> None:
+        armature.pose.bones[1].rotation_quaternion[1] += 0.25
+        bpy.context.view_layer.update()
+
+    assert [evaluations_of(obj, pose) for _ in range(3)] == [1, 1, 1]
+
+
+def share_mesh(obj: bpy.types.Object) -> None:
+    """What is shared can not be written while Blender evaluates."""
+    other = bpy.data.objects.new("Other", obj.data)
+    bpy.context.collection.objects.link(other)
+
+
 @pytest.mark.parametrize("set_up", [moving_parent, moving_mesh, moving_keys])
 def test_what_stands_behind_is_evaluated_once_where_the_frame_dirties_the_mesh(set_up: Setup):
     obj, armature = scenes.make_arm()
     obj.modifiers.new("Behind", "SUBSURF")
     set_up(obj, armature)
+    share_mesh(obj)
     expected = scenes.shapes(obj, [2, 3, 4, 5])
     scenes.add_sinew(obj)
     first_round = []
