@@ -98,9 +98,12 @@ def update(
         and driven.answered == obj.data.evaluated_get(depsgraph).as_pointer()
     )
     touched = changes.structure or bool(changes.armatures) or obj.session_uid in changes.objects
-    if touched and answered and not (changes.structure or changes.armatures):
+    if answered and not (changes.structure or changes.armatures):
         # Being asked for points touches the object by itself.
         touched = _looks(obj) != driven.looks
+        if not touched and driven.mode == mode and obj.data.session_uid not in changes.touched:
+            driven.dirtied_by_frames = False
+            return driven
     if driven is None or touched or driven.mode != mode:
         _maintain(obj, changes)
     if not source.is_ready(obj, depsgraph):
