@@ -52,7 +52,7 @@ class Driven:
     frames: list[LinkFrame | None] | None = None
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
-    looks: tuple = ()
+    looks: list = field(default_factory=list)
     asking: bool = False
     answered: int = 0
     is_kept: bool = True
@@ -124,23 +124,16 @@ def update(
     return driven
 
 
-def _looks(obj: bpy.types.Object) -> tuple:
-    """What decides how the object is driven, but for its mesh and armatures."""
+def _looks(obj: bpy.types.Object) -> list:
+    """What the artist can change of the object itself that decides how it is driven."""
     settings = properties.of(obj)
-    return (
-        settings.standing_in,
-        obj.parent_type,
-        obj.data.session_uid,
-        obj.show_only_shape_key,
-        obj.vertex_groups.keys(),
-        [
-            (m.name, m.show_viewport, m.show_render)
-            if m.type != "ARMATURE"
-            else (m.name, m.object, ModifierOptions.read(m), m.show_viewport, m.show_render)
-            for m in obj.modifiers
-        ],
-        [(s.name, s.armature, s.show_viewport, s.show_render) for s in settings.stand_ins],
-    )
+    looks = [settings.standing_in, obj.parent_type, obj.data.session_uid, obj.show_only_shape_key]
+    looks += obj.vertex_groups.keys()
+    for modifier in obj.modifiers:
+        looks += (modifier.name, modifier.show_viewport, modifier.show_render)
+        if modifier.type == "ARMATURE":
+            looks += (modifier.object, ModifierOptions.read(modifier))
+    return looks
 
 
 def _deform(
