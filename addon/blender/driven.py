@@ -166,7 +166,8 @@ def _frames(
 ) -> list[LinkFrame | None] | None:
     """What decides each link's part in this frame; None where that is unknown, and the last shape stays."""
     evaluated = obj.evaluated_get(depsgraph)
-    settings = evaluated.sinew
+    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
+    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
     frames: list[LinkFrame | None] = []
     for number, link in enumerate(driven.chain.links):
         stand_in = properties.of(obj).stand_ins[number]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import bpy
@@ -67,6 +67,17 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
 
 def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
     """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
+    return _use_methods(wanted, handlers.refresh)
+
+
+def use_methods_for_file(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
+    """The same for a file that was opened to be saved with them: see handlers.deform_for_file."""
+    return _use_methods(wanted, handlers.deform_for_file)
+
+
+def _use_methods(
+    wanted: Sequence[tuple[bpy.types.Object, str]], deform: Callable[[bpy.types.Context], None]
+) -> list[SinewError | None]:
     errors: list[SinewError | None] = []
     with handlers.held():
         for obj, method in wanted:
@@ -75,7 +86,7 @@ def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewErr
                 errors.append(None)
             except SinewError as error:
                 errors.append(error)
-    handlers.refresh(bpy.context)
+    deform(bpy.context)
     for index, (obj, method) in enumerate(wanted):
         if errors[index] is None and method != BLENDER and properties.of(obj).error:
             errors[index] = SinewError(properties.of(obj).error)

@@ -56,7 +56,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         driven, left_out = _drive(_meant(settings, source), settings)
     if not driven:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
-    with clock.doing("saving"):
+    with clock.doing("saving"), handlers.held():
         files.save_beside(source, Path(task["target"]), Path(task["unfinished"]))
     outcome = {
         "meshes": [mesh for _obj, mesh in driven],
@@ -105,7 +105,7 @@ def _drive(
     wanted = [(obj, _method_of(obj, settings)) for obj in objects]
     driven, left_out = [], []
     for (obj, method), (way, was_driven), error in zip(
-        wanted, before, evaluate.use_methods(wanted), strict=True
+        wanted, before, evaluate.use_methods_for_file(wanted), strict=True
     ):
         if error is not None:
             left_out.append(str(error))
@@ -201,6 +201,7 @@ def _compare(task: dict, driven: list[tuple[bpy.types.Object, dict]], outcome: d
         return
     objects = [obj for obj, _mesh in shown]
     with clock.doing("comparing"):
+        handlers.take_up()
         evaluate.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]
