@@ -95,6 +95,11 @@ def _section(row: dict) -> str:
     parts += [f'<p class="bad">left as it was: {escape(reason)}</p>' for reason in row["left_out"]]
     parts += [f'<p class="note">{escape(note)}</p>' for note in row["notes"]]
     parts.append(_meshes(row["meshes"]))
+    parts += [
+        f"<p>{escape(bake['file'])}: {escape(bake['to'])} of {escape(', '.join(bake['objects']))}, "
+        f"{bake['frames']} frames</p>"
+        for bake in row.get("bakes", ())
+    ]
     if "pictures" in row:
         pictures = row["pictures"]
         parts.append('<div class="pair">')

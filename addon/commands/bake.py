@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..batch.inputs import Job, plan_jobs
+from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from .console import Console
@@ -44,11 +45,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     return parser
 
 
-# As blender/bake.py and blender/export.py have them, where the parser can not look.
-KINDS = ("shape-keys", "mdd", "pc2", "alembic", "usd", "gltf")
-SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
-
-
 @dataclass
 class Baked(Outcome):
     meshes: int = 0
@@ -64,7 +60,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if args.step < 1:
         raise WrongUse(f"step: expected 1 or more frames, got {args.step}")
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
-    suffix = SUFFIXES.get(args.to, ".blend")
+    suffix = EXPORTS.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
     outcomes = []
     for number, job in enumerate(jobs):
@@ -117,7 +113,7 @@ def _bake(
             pass
         started.place()
         try:
-            if args.to not in SUFFIXES:
+            if args.to not in EXPORTS:
                 files.save_copy(source, target)
             started.publish()
         except BaseException:

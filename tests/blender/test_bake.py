@@ -36,6 +36,8 @@ else:
 assert not hasattr(bpy.types.Object, "sinew")
 arrays, uvs, materials = {}, [], []
 scene = bpy.context.scene
+for name in sys.argv[4:]:
+    bpy.data.objects[name].hide_viewport = False
 for obj in [o for o in scene.objects if o.type == "MESH" and len(o.data.vertices) > 50]:
     per_frame = []
     for frame in frames:
@@ -52,10 +54,10 @@ np.savez(result, uvs=np.array(uvs), materials=np.array(materials), **arrays)
 """
 
 
-def read_elsewhere(path, frames, tmp_path):
-    """World points [frames, vertices, 3] by object name, in a process without Sinew."""
+def read_elsewhere(path, frames, tmp_path, hidden=()):
+    """World points [frames, vertices, 3] by name, in a process without Sinew; of `hidden` objects too."""
     result = tmp_path / "read.npz"
-    command = [sys.executable, "-c", READ, str(path), ",".join(map(str, frames)), str(result)]
+    command = [sys.executable, "-c", READ, str(path), ",".join(map(str, frames)), str(result), *hidden]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     with np.load(result) as arrays:
@@ -253,7 +255,7 @@ def test_headers(tmp_path):
         cache.write(points)
         cache.write(points + 1)
         cache.close()
-        cache.publish()
+        core.publish(cache.unfinished, cache.path)
     mdd = (tmp_path / "a.mdd").read_bytes()
     assert struct.unpack(">iiff12f", mdd) == (2, 2, 0.5, np.float32(14 / 24), *range(6), *range(1, 7))
     pc2 = (tmp_path / "a.pc2").read_bytes()

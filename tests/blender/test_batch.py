@@ -24,6 +24,7 @@ import scenes
 import whole_file
 from program import COMMAND, ENVIRONMENT, run_sinew
 from sinew_addon.blender import files, properties
+from test_bake import read_elsewhere
 
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="long: runs with the newest Blender alone")
 FAST = ("--frames", "none", "--no-pictures")
@@ -182,6 +183,119 @@ def test_settings_for_files_and_objects(tmp_path):
     rows = report_of(tmp_path / "out")
     deviation = {mesh["object"]: mesh["deviation_part"] for mesh in rows["sub/hero.blend"]["meshes"]}
     assert deviation["Face"] <= scenes.TOLERANCE < 0.01 < deviation["Body"]
+
+
+BAKES = """
+inputs = ["in"]
+out = "out"
+method = "dq"
+scale = "none"
+bake = "usd"
+bake_frames = "1-11"
+
+[[files]]
+match = "hero.blend"
+
+[[files.objects]]
+match = "Body"
+bake = ["alembic", "mdd"]
+
+[[files.objects]]
+match = "Face"
+bake = "shape-keys"
+scale = "3.x"
+
+[[files]]
+match = "plain.blend"
+bake = []
+"""
+
+
+def make_heroes(folder: Path) -> None:
+    folder.mkdir()
+    for name in ("hero", "plain"):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        for part in ("Body", "Face", "Hair"):
+            scenes.make_arm(name=part)
+        bpy.data.objects["Face"].hide_viewport = True
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
+
+
+def test_bakes_of_a_job_file(tmp_path):
+    """Bakes by file and object, beside the copies; in the journal and the report like those."""
+    make_heroes(tmp_path / "in")
+    (tmp_path / "job.toml").write_text(BAKES)
+    out = tmp_path / "out"
+    arguments = ("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
+    run_sinew(*arguments)
+    names = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    bakes = {"hero.usdc", "hero.abc", "hero.baked.blend", "hero.baked_cache/Body.mdd"}
+    assert names == {
+        "hero.blend", "plain.blend", "report.html", "report.json", "sinew-journal.jsonl", *bakes
+    }  # fmt: skip
+    rows = report_of(out)
+    assert {
+        bake["to"]: (bake["objects"], bake["frames"], bake["file"]) for bake in rows["hero.blend"]["bakes"]
+    } == {
+        "usd": (["Hair"], 11, "hero.usdc"),
+        "alembic": (["Body"], 11, "hero.abc"),
+        "mdd": (["Body"], 11, "hero.baked.blend"),
+        "shape-keys": (["Face"], 11, "hero.baked.blend"),
+    }
+    assert "bakes" not in rows["plain.blend"]
+    assert "hero.usdc: usd of Hair, 11 frames" in (out / "report.html").read_text(encoding="utf-8")
+
+    files.open_file(out / "hero.blend")
+    rules = {name: properties.of(bpy.data.objects[name]).scale_rule for name in ("Body", "Face", "Hair")}
+    assert rules == {"Body": "none", "Face": "3.x", "Hair": "none"}
+    bpy.data.objects["Face"].hide_viewport = False
+    frames = list(range(1, 12))
+    expected = {name: scenes.shapes(bpy.data.objects[name], frames) for name in rules}
+    baked = read_elsewhere(out / "hero.baked.blend", frames, tmp_path, ("Face",))
+    exported = read_elsewhere(out / "hero.usdc", frames, tmp_path)
+    for name, points in (("Body", baked), ("Face", baked), ("Hair", exported)):
+        assert scenes.worst(points[name], expected[name]) <= 1e-6 * scenes.diagonal(bpy.data.objects[name])
+    files.open_file(out / "hero.baked.blend")
+    assert bpy.data.objects["Face"].hide_viewport
+    assert [o.name for o in bpy.data.objects if properties.is_driven(o)] == ["Hair"]
+    assert bpy.data.objects["Body"].modifiers[0].filepath == "//hero.baked_cache/Body.mdd"
+
+    before = contents(out)
+    run_sinew(*arguments, "--resume")
+    assert {row["status"] for row in report_of(out).values()} == {"unchanged"}
+    (out / "hero.usdc").unlink()
+    (out / "hero.baked_cache" / "Body.mdd").unlink()
+    run_sinew(*arguments, "--resume")
+    assert [row["status"] for row in report_of(out).values()] == ["written", "unchanged"]
+    assert set(contents(out)) == set(before)
+    (out / "hero.usdc").write_bytes(b"an artist's own")
+    result = run_sinew(*arguments, "--resume", status=1)
+    assert "hero.usdc: is there already" in result.stderr
+    assert (out / "hero.usdc").read_bytes() == b"an artist's own"
+    assert unfinished_in(out) == []
+    run_sinew(*arguments, "--overwrite")
+    assert (out / "hero.usdc").read_bytes() != b"an artist's own"
+
+
+def test_a_bake_that_fails_leaves_nothing(tmp_path):
+    make_heroes(tmp_path / "in")
+    bpy.data.objects["Body"].modifiers.new("Mirror", "MIRROR")
+    bpy.data.objects["Body"].modifiers.move(1, 0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in" / "plain.blend"))
+    (tmp_path / "job.toml").write_text(
+        'inputs = ["in"]\nout = "out"\nmethod = "lbs"\nbake = ["usd", "shape-keys"]\nbake_frames = "1-3"\n'
+    )
+    result = run_sinew("reskin", "--job", tmp_path / "job.toml", *FAST, status=1)
+    assert "Mirror changes the mesh ahead of the armature" in result.stderr
+    assert "1 of 2 files re-skinned" in result.stdout
+    out = tmp_path / "out"
+    assert {path.name for path in out.iterdir() if path.suffix in (".blend", ".usdc")} == {
+        "hero.blend", "hero.baked.blend", "hero.usdc"
+    }  # fmt: skip
+    assert unfinished_in(out) == []
+    shutil.copy(tmp_path / "in" / "hero.blend", tmp_path / "in" / "hero.baked.blend")
+    refused = run_sinew("reskin", "--job", tmp_path / "job.toml", *FAST, status=2)
+    assert "hero.baked.blend: is for the bake of" in refused.stderr
 
 
 def test_report_has_pictures_of_the_worst_frame(tmp_path):

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from sinew_addon.batch.job_file import Settings
 from sinew_addon.blender import files, handlers, mesh_io, properties, reskin
 
 
@@ -130,13 +131,12 @@ def test_what_stands_behind_is_evaluated_once_where_the_frame_dirties_the_mesh(s
 
 
 def task(path: Path) -> dict:
-    settings = {"method": "dq", "include": [], "exclude": [], "objects": []}
     return {
         "command": "reskin",
         "source": str(path),
         "target": str(path.with_name("copy.blend")),
         "unfinished": str(path.with_name("unfinished.blend")),
-        "settings": settings,
+        "settings": Settings(method="dq").as_task(),
         "frames": "none",
         "pictures": None,
     }
