@@ -46,7 +46,9 @@ def open_file(path: Path, load_ui: bool = False) -> None:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
     except RuntimeError as error:
-        raise SinewError(f"{path}: Blender can not read it: {telling_line(error)}") from None
+        # Blender names the file again, up to twice.
+        reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ")
+        raise SinewError(f"{path}: Blender can not read it: {reason}") from None
 
 
 def save_copy(source: Path, target: Path) -> None:

@@ -130,8 +130,9 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
                     results[Path(task["target"])] = result
                     _tell(console, progress, task, result)
         except KeyboardInterrupt:
-            console.note(f"{len(results)} of {len(jobs)} files are done; --resume does the others")
-            raise
+            raise KeyboardInterrupt(
+                f"{len(results)} of {len(jobs)} files are done; --resume does the others"
+            ) from None
         finally:
             journal.clear_away(job.target for job in jobs)
         seconds = time.monotonic() - started
