@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from ..core.errors import SinewError
+from ..core.output import remove
 
 PICTURES = "report-pictures"
 
@@ -48,7 +49,7 @@ def _write(path: Path, text: str) -> None:
         unfinished.write_text(text, encoding="utf-8", errors="replace")
         os.replace(unfinished, path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{path}: can not be written: {error.strerror}") from None
 
 

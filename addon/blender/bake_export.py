@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core import bake as core
 from ..core.errors import SinewError
+from ..core.output import remove
 from . import evaluate, files, shape_animation
 
 
@@ -76,7 +77,7 @@ class _Export:
             core.publish(unfinished, path)
 
     def discard(self) -> None:
-        self.unfinished.unlink(missing_ok=True)
+        remove(self.unfinished)
 
 
 class SceneExport(_Export):

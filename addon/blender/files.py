@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import SinewError
+from ..core.output import remove
 
 IMPORTERS = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
@@ -58,7 +59,7 @@ def save_copy(source: Path, target: Path) -> None:
     try:
         os.replace(unfinished, target)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{target}: can not be written: {error.strerror}") from None
 
 
@@ -72,7 +73,7 @@ def save_beside(source: Path, target: Path, unfinished: Path) -> None:
         if not unfinished.exists() or not _is_whole(unfinished):
             raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
     except (OSError, RuntimeError) as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{target}: can not be written: {telling_line(error)}") from None
 
 

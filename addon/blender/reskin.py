@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
+from ..core.output import remove
 from ..core.views import seen_extent, whole_view
 from . import bake_copy, drive, evaluate, files, handlers, properties, render, stack
 
@@ -78,7 +79,7 @@ def _bake(task: dict, names: set[str]) -> dict:
     try:
         return bake_copy.bake_copy(task, unfinished, names)
     except SinewError:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise
 
 

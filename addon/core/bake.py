@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import SinewError, WrongUse
+from .output import remove
 
 # Bakes that a .blend plays, and those that are files of their own.
 IN_FILE = ("shape-keys", "mdd", "pc2")
@@ -81,7 +82,7 @@ class PointCache:
         # What could not be written is not wanted.
         with suppress(OSError):
             self._file.close()
-        self.unfinished.unlink(missing_ok=True)
+        remove(self.unfinished)
 
 
 def publish(unfinished: Path, path: Path) -> None:

@@ -567,33 +567,89 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
 
 @newest_only
 def test_killed_at_random_20_times(tmp_path):
+    """The batch itself each time, and before that, half the time, one of its Blenders."""
     folder, out = tmp_path / "in", tmp_path / "out"
-    paths = make_rigs(folder, 60)
+    paths = make_rigs(folder, 150)
     before = contents(folder)
     choose = random.Random(8)
     arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
     for _ in range(20):
         process = start_sinew(*arguments, "--jobs", choose.randint(1, 2))
-        for _ in range(choose.randint(0, 3)):
-            line = process.stderr.readline()
-            while line and "unchanged" in line:
-                line = process.stderr.readline()
-        time.sleep(choose.uniform(0.0, 0.06))
+        read_some(process, choose)
+        if choose.random() < 0.5:
+            kill_one(blenders_of(process), choose)
+            time.sleep(choose.uniform(0.0, 0.1))
         blenders = blenders_of(process)
         process.kill()
         process.communicate()
         _gone, left = psutil.wait_procs(blenders, timeout=10)
         assert left == [], "a Blender outlived its batch"
-        # What has its name is whole: the very file that its record speaks of.
-        records = {r["file"]: r for r in journal_lines(out)}
-        for copy in out.glob("[!.]*.blend"):
-            status = copy.stat()
-            assert records[copy.name]["written"] == [status.st_size, status.st_mtime_ns]
+        check_whole(out)
     killed = len(list(out.glob("[!.]*.blend")))
-    assert 0 < killed < 60, "the kills came too late to mean anything"
+    assert 0 < killed < 150, "the kills came too late to mean anything"
     result = run_sinew(*arguments)
-    assert "60 of 60 files" in result.stdout
+    assert "150 of 150 files" in result.stdout
     assert contents(folder) == before
+    check_each_once(out, paths)
+
+
+@newest_only
+def test_killed_at_random_on_a_cluster(tmp_path):
+    """The batch, a worker with what it is at, or a Blender."""
+    folder, out = tmp_path / "in", tmp_path / "out"
+    paths = make_rigs(folder, 60)
+    choose = random.Random(9)
+    with Cluster(tmp_path) as cluster:
+        arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
+        arguments = (*arguments, "--scheduler", cluster.address)
+        lost = Counter()
+        for _ in range(8):
+            process = start_sinew(*arguments)
+            read_some(process, choose)
+            for kind, victims in (("worker", cluster.workers), ("Blender", cluster.blenders)):
+                if choose.random() < 0.5:
+                    lost[kind] += kill_one(victims(), choose)
+                    read_some(process, choose)
+            process.kill()
+            process.communicate()
+            check_whole(out)
+        assert 0 < len(list(out.glob("[!.]*.blend"))) < 60
+        assert {kind for kind, times in lost.items() if times} == {"worker", "Blender"}
+        # Two at a time can be lost with a file: it is named, and done by the next run.
+        process = start_sinew(*arguments)
+        _output, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+    check_each_once(out, paths)
+
+
+def read_some(process: subprocess.Popen, choose: random.Random) -> None:
+    """Waits until a few files are done, and a little longer."""
+    for _ in range(choose.randint(0, 3)):
+        line = process.stderr.readline()
+        while line and "unchanged" in line:
+            line = process.stderr.readline()
+    time.sleep(choose.uniform(0.0, 0.06))
+
+
+def kill_one(processes: list[psutil.Process], choose: random.Random) -> bool:
+    if not processes:
+        return False
+    try:
+        choose.choice(processes).kill()
+    except psutil.NoSuchProcess:
+        return False
+    return True
+
+
+def check_whole(out: Path) -> None:
+    """What has its name is whole: the very file that its record speaks of."""
+    records = {r["file"]: r for r in journal_lines(out)}
+    for copy in out.glob("[!.]*.blend"):
+        status = copy.stat()
+        assert records[copy.name]["written"] == [status.st_size, status.st_mtime_ns]
+
+
+def check_each_once(out: Path, paths: list[Path]) -> None:
     assert unfinished_in(out) == []
     times = Counter(record["file"] for record in journal_of(out) if "error" not in record)
     assert times == {path.name: 1 for path in paths}, "lost, or done twice"
@@ -726,6 +782,22 @@ class Cluster:
         """Kills one with what it is at; its keeper starts another."""
         for process in psutil.Process(self._processes[-1].pid).children():
             process.kill()
+
+    def workers(self) -> list[psutil.Process]:
+        return [
+            child
+            for keeper in self._processes[1:]
+            for child in psutil.Process(keeper.pid).children()
+            if "spawn_main" in " ".join(child.cmdline())
+        ]
+
+    def blenders(self) -> list[psutil.Process]:
+        return [
+            child
+            for worker in self.workers()
+            for child in worker.children()
+            if any(part.endswith(".worker") for part in child.cmdline())
+        ]
 
     def _start(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "dask", *arguments]
