@@ -194,11 +194,15 @@ def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path
     vertices = sum(len(evaluate.final_points(obj)) for obj in meshes)
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(frames))
+    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # Known before the frames are read, and not from an exporter's traceback.
+        unfinished.touch()
+        unfinished.unlink()
     except OSError as error:
         raise SinewError(f"{path}: can not be written: {error.strerror}") from None
-    return path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    return unfinished
 
 
 def _check_driven(obj: bpy.types.Object) -> None:

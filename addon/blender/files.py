@@ -137,7 +137,9 @@ def _is_compressed(path: Path) -> bool:
 def telling_line(error: Exception) -> str:
     """What was wrong, of all that Blender wrote."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    lines = [line.strip() for line in text.replace("Error: ", "").splitlines() if line.strip()]
+    lines = [line.strip() for line in text.replace("Error: ", "").splitlines()]
+    # Where in its own code Blender was is of no use to whoever reads this.
+    lines = [line for line in lines if line and not line.startswith("Location: ")]
     if not lines:
         return type(error).__name__
     # An importer written in Python hands over its whole traceback: the last line says what was wrong.
