@@ -4,8 +4,8 @@
 
     .venv/bin/python bench/batch.py [--files 48] [--repetitions 5] [--json FILE]
 
-From the first file that is done to the last, so that no start counts; the processor's time (user and system) is
-that of whole runs, starts included. Candidates take turns, and the least of each is taken, as on a shared
+From the first file that is done to the last, so that no start counts; the processor's time (user and system)
+is that of whole runs, starts included. Candidates take turns, and the least of each is taken, as on a shared
 machine only that is the machine's own.
 """
 
