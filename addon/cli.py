@@ -64,8 +64,8 @@ def main(argv: list[str]) -> int:
     except SinewError as error:
         output.complain(error)
         return 2 if isinstance(error, WrongUse) else 1
-    except KeyboardInterrupt:
-        output.complain("stopped")
+    except KeyboardInterrupt as stop:
+        output.complain(": ".join(("stopped", *map(str, stop.args))))
         return 130
     finally:
         output.out.flush()

@@ -4,8 +4,9 @@
 
     .venv/bin/python bench/batch.py [--files 48] [--repetitions 5] [--json FILE]
 
-From the first file that is done to the last, so that no start counts; candidates take turns, and the least of
-each is taken, as on a shared machine only that is the machine's own.
+From the first file that is done to the last, so that no start counts; the processor's time (user and system)
+is that of whole runs, starts included. Candidates take turns, and the least of each is taken, as on a shared
+machine only that is the machine's own.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import argparse
 import importlib.metadata
 import json
 import os
+import resource
 import shutil
 import statistics
 import subprocess
@@ -35,6 +37,24 @@ for path in paths:
 print("seconds", time.perf_counter() - started)
 """
 
+SMALL = """
+import sys, bpy
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+bpy.ops.object.armature_add(enter_editmode=True)
+first = bpy.context.object.data.edit_bones[0]
+second = bpy.context.object.data.edit_bones.new("Second")
+second.head, second.tail, second.parent = (0, 0, 1), (0, 0, 2), first
+bpy.ops.object.mode_set(mode="OBJECT")
+armature = bpy.context.object
+bpy.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=5)
+obj = bpy.context.object
+for index, bone in enumerate(armature.data.bones):
+    obj.vertex_groups.new(name=bone.name).add(range(len(obj.data.vertices)), 0.3 + 0.4 * index, "REPLACE")
+obj.modifiers.new("Armature", "ARMATURE").object = armature
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1], copy=True, compress=True)
+print("vertices", len(obj.data.vertices))
+"""
+
 SUBDIVIDE = """
 import sys, bpy
 source, target, times = sys.argv[1:]
@@ -51,6 +71,12 @@ print("vertices", len(obj.data.vertices))
 """
 
 
+def processor_time() -> float:
+    """Seconds of all processes that were started and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def run(command: list[str]) -> str:
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
@@ -60,24 +86,29 @@ def number(output: str, name: str) -> float:
     return float(next(line.split()[1] for line in output.splitlines() if line.startswith(name + " ")))
 
 
-def plain(folder: Path) -> float:
-    """Seconds for opening and saving each file of a folder in one Blender, started before."""
+def plain(folder: Path) -> dict[str, float]:
+    """Seconds a file for opening and saving in one Blender; of the processor, with Blender's start."""
     paths = [str(path) for path in sorted(folder.glob("*.blend"))]
-    return number(run([sys.executable, "-c", OPEN_AND_SAVE, str(folder / "plain.out"), *paths]), "seconds")
+    before = processor_time()
+    command = [sys.executable, "-c", OPEN_AND_SAVE, str(folder / "plain.out"), *paths]
+    seconds = number(run(command), "seconds")
+    return {"file": seconds / len(paths), "processor": (processor_time() - before) / len(paths)}
 
 
 def batch(folder: Path, *options: str) -> dict[str, float]:
     """Seconds a file in a batch, from the first that is done to the last; and in each step of it."""
     with tempfile.TemporaryDirectory(dir=folder.parent) as out:
         command = [*SINEW, "reskin", str(folder), "--method", "dq", "--out", out, *options]
+        before = processor_time()
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         done = [time.perf_counter() for line in process.stderr]
         if process.wait() != 0:
             raise SystemExit("the batch failed")
+        processor = (processor_time() - before) / len(done)
         rows = json.loads(Path(out, "report.json").read_text(encoding="utf-8"))["files"]
     steps = rows[0]["seconds"]
     found = {step: statistics.mean(row["seconds"][step] for row in rows[1:]) for step in steps}
-    return {"file": (done[-1] - done[0]) / (len(done) - 1), **found}
+    return {"file": (done[-1] - done[0]) / (len(done) - 1), "processor": processor, **found}
 
 
 def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str, float]:
@@ -96,7 +127,7 @@ def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str,
         "compared, 2 jobs": [],
     }
     for _ in range(repetitions):
-        runs["plain"].append(plain(folder) / files)
+        runs["plain"].append(plain(folder))
         runs["bare"].append(batch(folder, *bare, "--jobs", "1"))
         runs["bare, 2 jobs"].append(batch(folder, *bare, "--jobs", "2"))
         runs["compared"].append(batch(folder, *compared, "--jobs", "1"))
@@ -109,15 +140,18 @@ def measure(source: Path, files: int, repetitions: int, work: Path) -> dict[str,
 
     beside = [run["file"] - run["opening"] - run["deforming"] - run["saving"] for run in runs["bare"]]
     # Of neighbours in time, as what else the machine does slows down both.
-    parts = [extra / own for extra, own in zip(beside, runs["plain"], strict=True)]
+    parts = [extra / own["file"] for extra, own in zip(beside, runs["plain"], strict=True)]
     result = {
-        "Blender opens and saves": 1000 * min(runs["plain"]),
+        "Blender opens and saves": 1000 * least("plain", "file"),
+        "Blender opens and saves, processor": 1000 * least("plain", "processor"),
         "opening, in the batch": 1000 * least("bare", "opening"),
         "saving, in the batch": 1000 * least("bare", "saving"),
         "deforming": 1000 * least("bare", "deforming"),
         "beside those": 1000 * min(beside),
         "beside those, % of Blender's own": 100 * statistics.median(parts),
         "whole, 1 job": 1000 * least("bare", "file"),
+        "whole, 1 job, processor": 1000 * least("bare", "processor"),
+        "whole, 2 jobs, processor": 1000 * least("bare, 2 jobs", "processor"),
         "comparing 9 frames": 1000 * least("compared", "comparing"),
         "drawing 2 pictures": 1000 * drawn["drawing"],
         "2 jobs, times as fast": least("bare", "file") / least("bare, 2 jobs", "file"),
@@ -135,16 +169,18 @@ def main() -> None:
     results: dict[str, object] = {
         "bpy": importlib.metadata.version("bpy"),
         "cores": os.cpu_count(),
+        "load": os.getloadavg(),
         "unit": "milliseconds a file",
     }
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
-        for times, share in ((0, 1), (2, 2)):
-            source = work / f"{times}.blend"
-            command = [sys.executable, "-c", SUBDIVIDE, str(WRIST), str(source), str(times)]
+        sources = ((SMALL, (), 4), (SUBDIVIDE, ("0",), 1), (SUBDIVIDE, ("2",), 0.5))
+        for script, times, share in sources:
+            source = work / "source.blend"
+            command = [sys.executable, "-c", script, *([str(WRIST)] if times else []), str(source), *times]
             vertices = number(run(command), "vertices")
             name = f"{vertices:,.0f} vertices, {source.stat().st_size / 1e6:.1f} MB"
-            results[name] = measure(source, options.files // share, options.repetitions, work)
+            results[name] = measure(source, int(options.files * share), options.repetitions, work)
             print(name)
             for what, value in results[name].items():
                 print(f"  {what:36} {value:9.2f}", flush=True)

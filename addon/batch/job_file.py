@@ -8,15 +8,25 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
+from ..core.bake import IN_FILE, KINDS, check_frames
 from ..core.errors import WrongUse
+from ..core.frames import parse_frames
+from ..core.scale_rule import SCALE_RULES
 
 
 @dataclass(frozen=True)
 class ObjectRule:
-    """The method of the objects whose name matches."""
+    """What is said of the objects whose name matches; None where nothing is."""
 
     match: str
-    method: str
+    method: str | None = None
+    scale: str | None = None
+    bake: tuple[str, ...] | None = None
+
+    def as_task(self) -> dict:
+        bake = None if self.bake is None else list(self.bake)
+        said = {"method": self.method, "scale": self.scale, "bake": bake}
+        return {"match": self.match} | {key: value for key, value in said.items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -24,12 +34,18 @@ class Settings:
     """What is done to the meshes of a file; None or empty where nothing is said.
 
     include, exclude  patterns of names of objects and of collections
+    scale             name of a scale rule
+    bake              kinds of bakes, written beside the copy
+    bake_frames       as typed; None: those of the file's scene
     objects           later ones win
     """
 
     method: str | None = None
     include: tuple[str, ...] | None = None
     exclude: tuple[str, ...] | None = None
+    scale: str | None = None
+    bake: tuple[str, ...] | None = None
+    bake_frames: str | None = None
     objects: tuple[ObjectRule, ...] = ()
 
     def overridden_by(self, other: Settings) -> Settings:
@@ -37,8 +53,23 @@ class Settings:
             other.method or self.method,
             self.include if other.include is None else other.include,
             self.exclude if other.exclude is None else other.exclude,
+            other.scale or self.scale,
+            self.bake if other.bake is None else other.bake,
+            other.bake_frames or self.bake_frames,
             self.objects + other.objects,
         )
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """All kinds of bakes that an object of the file may ask for, each once."""
+        every = [*(self.bake or ()), *(kind for rule in self.objects for kind in rule.bake or ())]
+        return tuple(dict.fromkeys(every))
+
+    def check_bakes(self) -> None:
+        """Raises WrongUse where a bake can not have the frames."""
+        if self.bake_frames is not None:
+            for kind in self.kinds:
+                check_frames(kind, parse_frames(self.bake_frames))
 
     def as_task(self) -> dict:
         """What a task takes along, and the journal keeps."""
@@ -46,7 +77,10 @@ class Settings:
             "method": self.method,
             "include": list(self.include or ()),
             "exclude": list(self.exclude or ()),
-            "objects": [[rule.match, rule.method] for rule in self.objects],
+            "scale": self.scale,
+            "bake": list(self.bake or ()),
+            "bake_frames": self.bake_frames,
+            "objects": [rule.as_task() for rule in self.objects],
         }
 
 
@@ -97,6 +131,8 @@ def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
     return _Reader(path, text, methods).job_file(table)
 
 
+SETTINGS = ("method", "scale", "include", "exclude", "bake", "bake_frames", "objects")
+
 Place = tuple[str | int, ...]
 """Where a value stands: keys, and numbers in arrays of tables, from the file's beginning."""
 
@@ -112,7 +148,7 @@ class _Reader:
         self.base = self.path.resolve().parent
 
     def job_file(self, table: dict) -> JobFile:
-        self._known_keys(table, (), ("inputs", "out", "method", "include", "exclude", "objects", "files"))
+        self._known_keys(table, (), ("inputs", "out", *SETTINGS, "files"))
         return JobFile(
             inputs=tuple(str(self.base / name) for name in self._strings(table, (), "inputs") or ()),
             out=str(self.base / self._string(table, (), "out")) if "out" in table else None,
@@ -121,28 +157,67 @@ class _Reader:
         )
 
     def _file_rule(self, table: dict, place: Place) -> FileRule:
-        self._known_keys(table, place, ("match", "method", "include", "exclude", "objects"))
+        self._known_keys(table, place, ("match", *SETTINGS))
         self._required(table, place, "match")
         return FileRule(self._strings(table, place, "match"), self._settings(table, place), self._line(place))
 
     def _settings(self, table: dict, place: Place) -> Settings:
-        return Settings(
-            self._method(table, place) if "method" in table else None,
+        settings = Settings(
+            self._method(table, place),
             self._strings(table, place, "include"),
             self._strings(table, place, "exclude"),
+            self._one_of(table, place, "scale", [rule.name for rule in SCALE_RULES]),
+            self._bake(table, place),
+            self._bake_frames(table, place),
             tuple(self._object_rule(entry, at) for entry, at in self._tables(table, place, "objects")),
         )
+        try:
+            settings.check_bakes()
+        except WrongUse as error:
+            self._fail((*place, "bake_frames"), str(error))
+        return settings
 
     def _object_rule(self, table: dict, place: Place) -> ObjectRule:
-        self._known_keys(table, place, ("match", "method"))
-        for key in ("match", "method"):
-            self._required(table, place, key)
-        return ObjectRule(self._string(table, place, "match"), self._method(table, place))
+        self._known_keys(table, place, ("match", "method", "scale", "bake"))
+        self._required(table, place, "match")
+        if len(table) == 1:
+            self._fail(place, "nothing is said of these objects; expected method, scale or bake")
+        return ObjectRule(
+            self._string(table, place, "match"),
+            self._method(table, place),
+            self._one_of(table, place, "scale", [rule.name for rule in SCALE_RULES]),
+            self._bake(table, place),
+        )
 
-    def _method(self, table: dict, place: Place) -> str:
-        name = self._string(table, place, "method")
-        if name not in self.methods:
-            self._fail((*place, "method"), f"method: expected one of {', '.join(self.methods)}, got {name!r}")
+    def _bake(self, table: dict, place: Place) -> tuple[str, ...] | None:
+        kinds = self._strings(table, place, "bake")
+        for kind in kinds or ():
+            if kind not in KINDS:
+                self._fail((*place, "bake"), f"bake: expected some of {', '.join(KINDS)}, got {kind!r}")
+        in_file = [kind for kind in kinds or () if kind in IN_FILE]
+        if len(in_file) > 1:
+            self._fail((*place, "bake"), f"bake: an object can have one of {', '.join(in_file)}")
+        return kinds
+
+    def _bake_frames(self, table: dict, place: Place) -> str | None:
+        if "bake_frames" not in table:
+            return None
+        text = self._string(table, place, "bake_frames")
+        try:
+            parse_frames(text)
+        except WrongUse as error:
+            self._fail((*place, "bake_frames"), f"bake_{error}")
+        return text
+
+    def _method(self, table: dict, place: Place) -> str | None:
+        return self._one_of(table, place, "method", self.methods)
+
+    def _one_of(self, table: dict, place: Place, key: str, names: Collection[str]) -> str | None:
+        if key not in table:
+            return None
+        name = self._string(table, place, key)
+        if name not in names:
+            self._fail((*place, key), f"{key}: expected one of {', '.join(names)}, got {name!r}")
         return name
 
     def _string(self, table: dict, place: Place, key: str) -> str:

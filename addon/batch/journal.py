@@ -16,7 +16,9 @@ from pathlib import Path
 from ..core.errors import SinewError, WrongUse
 
 NAME = "sinew-journal.jsonl"
-UNFINISHED = ".unfinished.blend"
+MARK = ".unfinished"
+UNFINISHED = f"{MARK}.blend"
+CACHES = ".baked_cache"
 
 
 class Journal:
@@ -30,6 +32,7 @@ class Journal:
     def __init__(self, out: Path) -> None:
         self.out = out
         self.path = out / NAME
+        self._start = len(os.path.join(out, ""))
         try:
             out.mkdir(parents=True, exist_ok=True)
             self._file = self.path.open("a+b", buffering=0)
@@ -47,7 +50,8 @@ class Journal:
         self._file.close()
 
     def name_of(self, target: Path) -> str:
-        return target.relative_to(self.out).as_posix()
+        """The path of a copy below `out`."""
+        return str(target)[self._start :].replace(os.sep, "/")
 
     def record(self, target: Path, record: dict) -> None:
         """Adds what became of a copy; on disk when this returns."""
@@ -67,27 +71,50 @@ class Journal:
         self.latest[record["file"]] = record
 
     def finish(self, target: Path, record: dict) -> None:
-        """Gives a copy its name, after its record."""
-        os.replace(target.with_name(record["unfinished"]), target)
+        """Gives a copy and its bakes their names, after their record: the copy last, so that where it is, all
+        is. What has its name already keeps it."""
+        for unfinished, path, written in self._files(target, record):
+            if _stamp(unfinished) == written:
+                os.replace(unfinished, path)
 
     def holds(self, target: Path, record: dict | None) -> bool:
         """Whether `target` is the very file that its record speaks of."""
         return record is not None and record.get("written") == _stamp(target)
 
+    def holds_all(self, target: Path, record: dict) -> bool:
+        """Whether its bakes are as well."""
+        files = self._files(target, record)
+        return all(_stamp(path) == written for _unfinished, path, written in files)
+
+    def baked(self, target: Path, record: dict | None) -> list[Path]:
+        """The bakes of a record that are the very files still."""
+        files = self._files(target, record)[:-1] if record is not None else []
+        return [path for _unfinished, path, written in files if _stamp(path) == written]
+
     def recover(self) -> None:
-        """Finishes what a killed run had recorded, and clears away what it had not."""
+        """Finishes what a killed run had recorded."""
         for name, record in self.latest.items():
             if "unfinished" in record:
-                target = self.out / name
-                if record["written"] == _stamp(target.with_name(record["unfinished"])):
-                    self.finish(target, record)
+                files = self._files(self.out / name, record)
+                if all(written in (_stamp(left), _stamp(path)) for left, path, written in files):
+                    self.finish(self.out / name, record)
+
+    def _files(self, target: Path, record: dict) -> list[tuple[Path, Path, list[int] | None]]:
+        """Of each file of a record: where it was made, where it is to be, its stamp. The copy is the last."""
+        beside = [
+            (self.out / unfinished, self.out / path, written)
+            for unfinished, path, written in record.get("beside", ())
+        ]
+        unfinished = target.with_name(record.get("unfinished", target.name))
+        return [*beside, (unfinished, target, record.get("written"))]
 
     def clear_away(self, targets: Iterable[Path]) -> None:
         """Removes the half-written copies of runs that were killed, which no record speaks of."""
         for folder in {target.parent for target in targets}:
-            # Blender writes beside, too, with an @.
-            for left in folder.glob(f".*{UNFINISHED}*"):
-                left.unlink(missing_ok=True)
+            # Blender writes beside, too, with an @; bakes have other endings, and caches a folder.
+            for pattern in (f".*{MARK}*", f"*{CACHES}/.*{MARK}"):
+                for left in folder.glob(pattern):
+                    left.unlink(missing_ok=True)
 
     def _read(self) -> dict[str, dict]:
         self._file.seek(0)

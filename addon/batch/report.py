@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from ..core.errors import SinewError
+from ..core.output import remove
 
 PICTURES = "report-pictures"
 
@@ -17,8 +18,8 @@ STYLE = """
 :root { color-scheme: light dark; --line: #8884; --bad: #c0392b; --note: #b9770e; }
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 70rem; padding: 0 1rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin: 0; overflow-wrap: anywhere; }
-table { border-collapse: collapse; }
-td, th { padding: .15rem .9rem .15rem 0; text-align: left; vertical-align: top; }
+table { border-collapse: collapse; margin-top: .4rem; }
+td, th { padding: .15rem .9rem .15rem 0; text-align: left; vertical-align: top; overflow-wrap: break-word; }
 .sum td { font-size: 1.2rem; font-weight: 600; padding-right: 2rem; }
 .sum th { font-weight: 400; opacity: .7; padding-right: 2rem; }
 section { border-top: 1px solid var(--line); padding: 1rem 0; }
@@ -48,7 +49,7 @@ def _write(path: Path, text: str) -> None:
         unfinished.write_text(text, encoding="utf-8", errors="replace")
         os.replace(unfinished, path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{path}: can not be written: {error.strerror}") from None
 
 
@@ -90,11 +91,16 @@ def _section(row: dict) -> str:
         facts.append(f"{row['attempts']} attempts")
     parts.append(f'<div class="path">{escape(" · ".join(facts))}</div>')
     if "error" in row:
-        parts.append(f'<p class="bad">{escape(row["error"])}</p></section>')
+        parts.append(f'<p class="bad">{escape(_without_source(row))}</p></section>')
         return "".join(parts)
     parts += [f'<p class="bad">left as it was: {escape(reason)}</p>' for reason in row["left_out"]]
     parts += [f'<p class="note">{escape(note)}</p>' for note in row["notes"]]
     parts.append(_meshes(row["meshes"]))
+    parts += [
+        f"<p>{escape(bake['file'])}: {escape(bake['to'])} of {escape(', '.join(bake['objects']))}, "
+        f"{bake['frames']} frames</p>"
+        for bake in row.get("bakes", ())
+    ]
     if "pictures" in row:
         pictures = row["pictures"]
         parts.append('<div class="pair">')
@@ -108,8 +114,12 @@ def _section(row: dict) -> str:
     return "".join([*parts, "</section>"])
 
 
+def _without_source(row: dict) -> str:
+    return row["error"].removeprefix(f"{row['source']}: ")
+
+
 def _meshes(meshes: list[dict]) -> str:
-    rows = []
+    rows = [("mesh", "changed", "largest deviation", "warnings")]
     for mesh in meshes:
         deviation = ""
         if "deviation" in mesh:
@@ -117,12 +127,16 @@ def _meshes(meshes: list[dict]) -> str:
                 f"{mesh['deviation']:.3g} ({100 * mesh['deviation_part']:.2g} % of its size) "
                 f"at frame {mesh['frame']}"
             )
-        cells = (
-            mesh["object"],
-            f"{mesh['before']} → {mesh['method']}" if "before" in mesh else f"{mesh['method']} taken off",
-            deviation,
-            "; ".join(mesh["warnings"]),
+        rows.append(
+            (
+                mesh["object"],
+                f"{mesh['before']} → {mesh['method']}" if "before" in mesh else f"{mesh['method']} taken off",
+                deviation,
+                "; ".join(mesh["warnings"]),
+            )
         )
-        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    head = "<tr><th>mesh</th><th>changed</th><th>largest deviation</th><th>warnings</th></tr>"
-    return f"<table>{head}{''.join(rows)}</table>"
+    said = [column for column in zip(*rows, strict=True) if any(column[1:])]
+    head, *body = zip(*said, strict=True)
+    lines = [f"<th>{'</th><th>'.join(head)}</th>"]
+    lines += ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in body]
+    return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"

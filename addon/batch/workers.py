@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Who does the work of a batch: Blenders on this machine, or those of a dask cluster.
 
-dask hands out the tasks either way. On this machine its scheduler and its worker are threads of this process:
-the Blenders are processes already, and dask's own would only cost their start and memory.
+On this machine threads of this process hand out the tasks: the Blenders are processes already, and dask would
+take as much time for a small file as Blender takes to save it (bench/README.md).
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import cache
 from pathlib import Path
 
 import sinew
@@ -26,6 +28,7 @@ ATTEMPTS = 2
 CONNECT_LIMIT = 30.0
 
 
+@cache
 def versions() -> dict[str, str]:
     """What decides over results in this Python: releases of Sinew and of Blender."""
     try:
@@ -137,7 +140,14 @@ def do_task(
         break
     if "error" in outcome:
         return {**outcome, **facts}
-    return {**outcome, **facts, "unfinished": unfinished.name, "written": stamp(unfinished)}
+    beside = [[left, path, stamp(Path(left))] for left, path in outcome.pop("beside", ())]
+    return {
+        **outcome,
+        **facts,
+        "unfinished": unfinished.name,
+        "written": stamp(unfinished),
+        "beside": beside,
+    }
 
 
 def run_here(
@@ -150,75 +160,57 @@ def run_here(
         yield task, do_task(task, Limits(), run, versions)
 
 
-def run_in_dask(
-    tasks: Sequence[dict], limits: Limits, jobs: int, scheduler: str | None
-) -> Iterator[tuple[dict, dict]]:
-    """Each task and what became of it, as they are done: by `jobs` Blenders here, or by those of the cluster
-    at `scheduler`, as many on each worker as it has threads.
+def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Iterator[tuple[dict, dict]]:
+    """Each task and what became of it, as they are done, by `jobs` Blenders.
 
-    Raises SinewError where the cluster can not be used. What is not done when the generator is closed, or
+    Raises SinewError where no Blender can be had. What is not done when the generator is closed, or
     interrupted, is given up.
     """
-    import distributed
-
-    with _client(jobs, scheduler) as client:
-        futures = client.map(do_task, tasks, limits=limits, pure=False)
-        task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
-        done = False
-        try:
-            for future in distributed.as_completed(futures):
-                # A worker that was lost has its file done by another; one that takes several along does not.
-                error = future.exception()
-                if error is None:
-                    outcome = future.result()
-                else:
-                    outcome = {"error": f"{task_of[future.key]['source']}: {_sentence(error)}"}
-                yield task_of[future.key], outcome
-                future.release()
-            done = True
-        finally:
-            if not done:
-                client.cancel(futures)
-            if scheduler is None and not done:
-                _blenders.stop()
-            elif scheduler is None:
-                _blenders.end()
-            else:
-                client.run(end_blenders)
+    versions()
+    _blenders.slots = threading.Semaphore(jobs)
+    # Those without a Blender have a task ready for the next that is free.
+    pool = ThreadPoolExecutor(2 * jobs)
+    task_of = {pool.submit(do_task, task, limits): task for task in tasks}
+    end = _blenders.stop
+    try:
+        for future in as_completed(task_of):
+            yield _outcome(task_of[future], future)
+        end = _blenders.end
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        end()
 
 
-@contextlib.contextmanager
-def _client(jobs: int, scheduler: str | None) -> Iterator:
+def run_in_dask(tasks: Sequence[dict], limits: Limits, scheduler: str) -> Iterator[tuple[dict, dict]]:
+    """The same by the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
+
+    Raises SinewError where the cluster can not be used.
+    """
     import distributed
 
     # Its warnings are of load and lost connections; what matters comes back as an error of a task.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    if scheduler is None:
-        versions()
-        _blenders.slots = threading.Semaphore(jobs)
-        with (
-            distributed.LocalCluster(
-                n_workers=1,
-                # Those without a Blender have a task ready for the next that is free.
-                threads_per_worker=2 * jobs,
-                processes=False,
-                memory_limit=None,
-                dashboard_address="127.0.0.1:0",
-                worker_dashboard_address="127.0.0.1:0",
-                scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.CRITICAL,
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):
-            yield client
-        return
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_LIMIT)
     except (OSError, ValueError) as error:
         raise SinewError(f"{scheduler}: no dask scheduler answers there: {error}") from None
     with client:
         _check_workers(client, scheduler)
-        yield client
+        futures = client.map(do_task, tasks, limits=limits, pure=False)
+        task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
+        try:
+            # A worker that was lost has its file done by another; one that takes several along does not.
+            for future in distributed.as_completed(futures):
+                yield _outcome(task_of[future.key], future)
+                future.release()
+        finally:
+            client.cancel(futures)
+            client.run(end_blenders)
+
+
+def _outcome(task: dict, future) -> tuple[dict, dict]:
+    error = future.exception()
+    return task, future.result() if error is None else {"error": f"{task['source']}: {_sentence(error)}"}
 
 
 def _check_workers(client, scheduler: str) -> None:
@@ -245,9 +237,7 @@ def _check_workers(client, scheduler: str) -> None:
 
 
 def _sentence(error: BaseException) -> str:
-    import distributed
-
-    if isinstance(error, distributed.KilledWorker):
+    if type(error).__name__ == "KilledWorker":  # dask's, which need not be installed
         return "lost with each worker that took it on"
     lines = str(error).strip().splitlines()
     return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__

@@ -77,8 +77,9 @@ class ShapeKeys:
             obj.shape_key_clear()
         shape_animation.add(obj, self.frames, shapes)
 
-    def publish(self) -> None:
-        """Nothing is in files."""
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        return []
 
     def discard(self) -> None:
         self.samples.clear()
@@ -128,8 +129,9 @@ class Cache:
             obj.keyframe_insert(path, frame=frame)
         shape_animation.make_straight(obj, path)
 
-    def publish(self) -> None:
-        self.file.publish()
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        return [(self.file.unfinished, self.file.path)]
 
     def discard(self) -> None:
         self.file.discard()
@@ -195,9 +197,14 @@ class Bake:
             raise
         handlers.session.forget()
 
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        """Each that is written, with the name that publish() gives it."""
+        return [pair for one in self.bakes for pair in one.files]
+
     def publish(self) -> None:
-        for one in self.bakes:
-            one.publish()
+        for unfinished, path in self.files:
+            bake.publish(unfinished, path)
 
     def discard(self) -> None:
         for one in self.bakes:
@@ -211,7 +218,7 @@ Started = Bake | bake_export.SceneExport | bake_export.MorphExport
 
 def suffix_of(kind: str) -> str:
     """How the file ends that a bake is for."""
-    return bake_export.SUFFIXES.get(kind, ".blend")
+    return bake.EXPORTS.get(kind, ".blend")
 
 
 def start(
@@ -223,7 +230,7 @@ def start(
     overwrite  whether files that are there already may be replaced
     Raises SinewError where it can not be done.
     """
-    if kind in bake_export.SUFFIXES:
+    if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
     if kind in bake_export.SCENES:
         return bake_export.SceneExport(meshes, kind, frames, target)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core import bake as core
 from ..core.errors import SinewError
+from ..core.output import remove
 from . import evaluate, files, shape_animation
 
 
@@ -51,7 +52,6 @@ def _usd(path: str, _first: int, _last: int) -> None:
 
 SCENES: dict[str, Callable[[str, int, int], None]] = {"alembic": _alembic, "usd": _usd}
 GLTF = "gltf"
-SUFFIXES = {"alembic": ".abc", "usd": ".usdc", GLTF: ".glb"}
 
 
 class _Export:
@@ -64,14 +64,20 @@ class _Export:
     def what(self) -> str:
         return str(self.path)
 
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        """Each that is written, with the name that publish() gives it."""
+        return [(self.unfinished, self.path)]
+
     def place(self) -> None:
         """The open file stays as it is."""
 
     def publish(self) -> None:
-        core.publish(self.unfinished, self.path)
+        for unfinished, path in self.files:
+            core.publish(unfinished, path)
 
     def discard(self) -> None:
-        self.unfinished.unlink(missing_ok=True)
+        remove(self.unfinished)
 
 
 class SceneExport(_Export):
@@ -80,8 +86,7 @@ class SceneExport(_Export):
     def __init__(
         self, meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], path: Path
     ) -> None:
-        if not core.is_even(frames, 1) or not _is_whole(frames):
-            raise SinewError(f"{kind}: Blender exports every frame of a range; give frames such as 1-48")
+        core.check_frames(kind, frames)
         self.meshes, self.kind, self.path = meshes, kind, path
         self.first, self.last = int(frames[0]), int(frames[-1])
         self.unfinished = _prepare(meshes, frames, path)
@@ -108,8 +113,7 @@ class MorphExport(_Export):
     """glTF: the final meshes of the first frame, and the others' points as morph targets."""
 
     def __init__(self, meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> None:
-        if not _is_whole(frames):
-            raise SinewError("gltf: Blender exports whole frames; give frames such as 1,12,40-48")
+        core.check_frames(GLTF, frames)
         self.meshes, self.frames, self.path = meshes, frames, path
         self.unfinished = _prepare(meshes, frames, path)
         self.made: list[bpy.types.Object] = []
@@ -190,11 +194,15 @@ def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path
     vertices = sum(len(evaluate.final_points(obj)) for obj in meshes)
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(frames))
+    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # Known before the frames are read, and not from an exporter's traceback.
+        unfinished.touch()
+        unfinished.unlink()
     except OSError as error:
         raise SinewError(f"{path}: can not be written: {error.strerror}") from None
-    return path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    return unfinished
 
 
 def _check_driven(obj: bpy.types.Object) -> None:
@@ -209,10 +217,6 @@ def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> Non
         raise SinewError(f"{export.path}: can not be written: {files.telling_line(error)}") from None
     if not export.unfinished.exists():
         raise SinewError(f"{export.path}: can not be written: Blender's exporter made no file")
-
-
-def _is_whole(frames: Sequence[float]) -> bool:
-    return all(float(frame).is_integer() for frame in frames)
 
 
 @contextmanager

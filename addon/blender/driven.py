@@ -274,8 +274,10 @@ def _frames(
     armatures  each link's, evaluated
     mode       the depsgraph's
     """
-    settings = evaluated.sinew
-    stand_ins = properties.of(evaluated.original).stand_ins
+    obj = evaluated.original
+    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
+    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
+    stand_ins = properties.of(obj).stand_ins
     frames: list[LinkFrame | None] = []
     for number, (link, armature) in enumerate(zip(driven.chain.links, armatures, strict=False)):
         stand_in = stand_ins[number]

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 import bpy
 import numpy as np
@@ -58,6 +60,30 @@ def show(meshes: list[bpy.types.Object]) -> None:
             obj.hide_set(False)
 
 
+@contextmanager
+def shown(meshes: list[bpy.types.Object]) -> Iterator[None]:
+    """Makes meshes of the scene visible as show() does, and as they were afterwards."""
+    layers = list(_layers(bpy.context.view_layer.layer_collection))
+    flags = [
+        *((layer, name, getattr(layer, name)) for layer in layers for name in ("exclude", "hide_viewport")),
+        *(
+            (owner, name, getattr(owner, name))
+            for owner in (*(layer.collection for layer in layers), *meshes)
+            for name in ("hide_viewport", "hide_render")
+        ),
+    ]
+    hidden = [obj for obj in meshes if obj.hide_get()]
+    show(meshes)
+    try:
+        yield
+    finally:
+        for obj in hidden:
+            obj.hide_set(True)
+        for owner, name, value in flags:
+            if getattr(owner, name) != value:
+                setattr(owner, name, value)
+
+
 def use_method(obj: bpy.types.Object, method: str) -> None:
     """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not drive it."""
     error = use_methods([(obj, method)])[0]
@@ -67,15 +93,35 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
 
 def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
     """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
+    return _use_methods(wanted, handlers.refresh)
+
+
+def use_methods_for_file(
+    wanted: Sequence[tuple[bpy.types.Object, str]], scales: Mapping[bpy.types.Object, str | None]
+) -> list[SinewError | None]:
+    """The same for a file that was opened to be saved with them (see handlers.deform_for_file), and with the
+    names of their scale rules; None leaves an object its own."""
+    return _use_methods(wanted, handlers.deform_for_file, scales)
+
+
+def _use_methods(
+    wanted: Sequence[tuple[bpy.types.Object, str]],
+    deform: Callable[[bpy.types.Context], None],
+    scales: Mapping[bpy.types.Object, str | None] = MappingProxyType({}),
+) -> list[SinewError | None]:
     errors: list[SinewError | None] = []
     with handlers.held():
         for obj, method in wanted:
             try:
                 _choose(obj, method)
+                if scales.get(obj) is not None:
+                    # As of the method: what is asked for wins over keys in the file.
+                    animation.remove_keys(obj, "sinew.scale_rule")
+                    properties.of(obj).scale_rule = scales[obj]
                 errors.append(None)
             except SinewError as error:
                 errors.append(error)
-    handlers.refresh(bpy.context)
+    deform(bpy.context)
     for index, (obj, method) in enumerate(wanted):
         if errors[index] is None and method != BLENDER and properties.of(obj).error:
             errors[index] = SinewError(properties.of(obj).error)
@@ -168,9 +214,15 @@ def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
 
 
 def _show_layers(layer: bpy.types.LayerCollection) -> None:
-    layer.exclude = False
-    layer.hide_viewport = False
-    layer.collection.hide_viewport = False
-    layer.collection.hide_render = False
+    for each in _layers(layer):
+        each.exclude = False
+        each.hide_viewport = False
+        each.collection.hide_viewport = False
+        each.collection.hide_render = False
+
+
+def _layers(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:
+    """The layer and all below it, parents first."""
+    yield layer
     for child in layer.children:
-        _show_layers(child)
+        yield from _layers(child)

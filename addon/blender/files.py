@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import SinewError
+from ..core.output import remove
 
 IMPORTERS = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
@@ -46,7 +47,9 @@ def open_file(path: Path, load_ui: bool = False) -> None:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
     except RuntimeError as error:
-        raise SinewError(f"{path}: Blender can not read it: {telling_line(error)}") from None
+        # Blender names the file again, up to twice.
+        reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ")
+        raise SinewError(f"{path}: Blender can not read it: {reason}") from None
 
 
 def save_copy(source: Path, target: Path) -> None:
@@ -56,7 +59,7 @@ def save_copy(source: Path, target: Path) -> None:
     try:
         os.replace(unfinished, target)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{target}: can not be written: {error.strerror}") from None
 
 
@@ -70,7 +73,7 @@ def save_beside(source: Path, target: Path, unfinished: Path) -> None:
         if not unfinished.exists() or not _is_whole(unfinished):
             raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
     except (OSError, RuntimeError) as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{target}: can not be written: {telling_line(error)}") from None
 
 
@@ -134,7 +137,9 @@ def _is_compressed(path: Path) -> bool:
 def telling_line(error: Exception) -> str:
     """What was wrong, of all that Blender wrote."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    lines = [line.strip() for line in text.replace("Error: ", "").splitlines() if line.strip()]
+    lines = [line.strip() for line in text.replace("Error: ", "").splitlines()]
+    # Where in its own code Blender was is of no use to whoever reads this.
+    lines = [line for line in lines if line and not line.startswith("Location: ")]
     if not lines:
         return type(error).__name__
     # An importer written in Python hands over its whole traceback: the last line says what was wrong.

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
@@ -65,17 +65,71 @@ def refresh(context: bpy.types.Context) -> None:
     _update(depsgraph, Changes())
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
-        context.view_layer.update()
+        # Where all is known, only what was just written is new: weights need not be read again for that.
+        with contextlib.nullcontext() if _wants_evaluation() else held():
+            context.view_layer.update()
 
 
-@contextmanager
+@contextlib.contextmanager
 def held() -> Iterator[None]:
-    """What is changed inside is not looked at before the refresh() that has to follow."""
-    session.updating = True
+    """Changes and events inside are not looked at before the refresh() that has to follow."""
+    before, session.updating = session.updating, True
     try:
         yield
     finally:
-        session.updating = False
+        session.updating = before
+
+
+def deform_for_file(context: bpy.types.Context) -> None:
+    """Deforms all driven objects at the current frame and lays Sinew down, as a saved file has it.
+
+    For a file that was opened for that: Blender has the poses from opening it, and has to evaluate only what
+    was driven before or has something in front. To go on with it afterwards, take_up() and refresh().
+    """
+    with held():
+        session.objects = None
+        depsgraph, changes = context.view_layer.depsgraph, Changes()
+        driven_before = depsgraph is not None and any(
+            properties.is_driven(obj.evaluated_get(depsgraph)) for obj in _driven_objects(changes)
+        )
+        if depsgraph is None or driven_before:
+            depsgraph = context.evaluated_depsgraph_get()
+        _update(depsgraph, changes)
+        if _wants_evaluation():
+            _update(context.evaluated_depsgraph_get(), changes)
+        lay_down()
+
+
+def _wants_evaluation() -> bool:
+    """Whether a driven object waits for what Blender makes of the modifiers in front of it."""
+    return any(properties.of(obj).enabled and state_of(obj) is None for obj in _driven_objects(Changes()))
+
+
+def lay_down() -> None:
+    """A saved file has the Armature modifiers' pointers: without Sinew they need only switching on."""
+    for obj in bpy.data.objects:
+        if properties.is_driven(obj):
+            keep_shown(obj)
+            drive.give_back(obj)
+            overrides.keep(obj)
+
+
+def keep_shown(obj: bpy.types.Object) -> None:
+    """What was given to the evaluated mesh alone becomes part of the file."""
+    state, depsgraph = state_of(obj), bpy.context.view_layer.depsgraph
+    if state is not None and not state.is_kept and depsgraph is not None:
+        points.keep_shown(obj, depsgraph)
+        state.is_kept = True
+
+
+def take_up() -> None:
+    """The way back from lay_down()."""
+    for obj in bpy.data.objects:
+        if properties.is_driven(obj) and properties.of(obj).standing_in:
+            drive.clear_pointers(obj)
+            state = state_of(obj)
+            if state is not None:
+                driven.hold_pose(obj, state)
 
 
 def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -104,12 +158,9 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 
 def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
-    session.updating = True
-    try:
+    with held():
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
-    finally:
-        session.updating = False
 
 
 def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
@@ -184,7 +235,7 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not session.idle:
+    if not session.idle and not session.updating:
         _update(depsgraph, _read_changes(depsgraph, frame=False))
 
 
@@ -201,32 +252,22 @@ def on_loaded(*_args: object) -> None:
     refresh(bpy.context)
 
 
-def keep_shown(obj: bpy.types.Object) -> None:
-    """What was given to the evaluated mesh alone becomes part of the file."""
-    state = state_of(obj)
-    if state is not None and not state.is_kept:
-        points.keep_shown(obj, bpy.context.view_layer.depsgraph)
-        state.is_kept = True
-
-
 @persistent
 def on_save(*_args: object) -> None:
-    """A saved file has the Armature modifiers' pointers: without Sinew they need only switching on."""
-    for obj in bpy.data.objects:
-        if properties.is_driven(obj):
-            keep_shown(obj)
-            drive.give_back(obj)
-            overrides.keep(obj)
+    if session.updating or session.idle:
+        return
+    # What the artist changed last is looked at now, for what saving changes will not be.
+    bpy.context.evaluated_depsgraph_get()
+    lay_down()
 
 
 @persistent
 def on_saved(*_args: object) -> None:
-    for obj in bpy.data.objects:
-        if properties.is_driven(obj) and properties.of(obj).standing_in:
-            drive.clear_pointers(obj)
-            state = state_of(obj)
-            if state is not None:
-                driven.hold_pose(obj, state)
+    if session.updating or session.idle:
+        return
+    take_up()
+    with held():
+        bpy.context.view_layer.update()
 
 
 _HANDLERS = {

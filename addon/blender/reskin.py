@@ -15,8 +15,9 @@ import numpy as np
 
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
+from ..core.output import remove
 from ..core.views import seen_extent, whole_view
-from . import drive, evaluate, files, handlers, properties, render, stack
+from . import bake_copy, drive, evaluate, files, handlers, properties, render, stack
 
 PICTURE_SIZE = 360
 # Frames that a comparison looks at where none are named.
@@ -56,7 +57,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         driven, left_out = _drive(_meant(settings, source), settings)
     if not driven:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
-    with clock.doing("saving"):
+    with clock.doing("saving"), handlers.held():
         files.save_beside(source, Path(task["target"]), Path(task["unfinished"]))
     outcome = {
         "meshes": [mesh for _obj, mesh in driven],
@@ -64,9 +65,22 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         "notes": notes,
         "seconds": clock.seconds,
     }
+    names = {mesh["object"] for mesh in outcome["meshes"]}
     if task["frames"] != "none":
         _compare(task, driven, outcome, clock)
+    if settings["bake"] or any(rule.get("bake") for rule in settings["objects"]):
+        with clock.doing("baking"):
+            outcome |= _bake(task, names)
     return outcome
+
+
+def _bake(task: dict, names: set[str]) -> dict:
+    unfinished = Path(task["unfinished"])
+    try:
+        return bake_copy.bake_copy(task, unfinished, names)
+    except SinewError:
+        remove(unfinished)
+        raise
 
 
 def restore(task: dict, report: Callable[[str], None]) -> dict:
@@ -102,10 +116,11 @@ def _drive(
 ) -> tuple[list[tuple[bpy.types.Object, dict]], list[str]]:
     """Puts Sinew on meshes: each with what is to be known of it; and why others stay as they were."""
     before = [(_described(obj), properties.is_driven(obj)) for obj in objects]
-    wanted = [(obj, _method_of(obj, settings)) for obj in objects]
+    wanted = [(obj, _said_of(obj, settings, "method")) for obj in objects]
+    scales = {obj: _said_of(obj, settings, "scale") for obj in objects}
     driven, left_out = [], []
     for (obj, method), (way, was_driven), error in zip(
-        wanted, before, evaluate.use_methods(wanted), strict=True
+        wanted, before, evaluate.use_methods_for_file(wanted, scales), strict=True
     ):
         if error is not None:
             left_out.append(str(error))
@@ -118,6 +133,7 @@ def _drive(
             "vertices": len(obj.data.vertices),
             "before": way,
             "method": method,
+            "scale": properties.of(obj).scale_rule,
             "warnings": list(state.facts.warnings) if state is not None else [],
         }
         driven.append((obj, mesh))
@@ -152,9 +168,11 @@ def _is_meant(obj: bpy.types.Object, settings: dict) -> bool:
     return (not include or is_one_of(include)) and not is_one_of(exclude)
 
 
-def _method_of(obj: bpy.types.Object, settings: dict) -> str:
-    rules = [method for pattern, method in settings["objects"] if fnmatchcase(obj.name, pattern)]
-    return rules[-1] if rules else settings["method"]
+def _said_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
+    """What the last rule for the object says, or the settings for all."""
+    rules = settings["objects"]
+    said = [rule[key] for rule in rules if key in rule and fnmatchcase(obj.name, rule["match"])]
+    return said[-1] if said else settings[key]
 
 
 def _described(obj: bpy.types.Object) -> str:
@@ -201,6 +219,7 @@ def _compare(task: dict, driven: list[tuple[bpy.types.Object, dict]], outcome: d
         return
     objects = [obj for obj, _mesh in shown]
     with clock.doing("comparing"):
+        handlers.take_up()
         evaluate.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..batch.inputs import Job, plan_jobs
+from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from .console import Console
@@ -44,11 +45,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     return parser
 
 
-# As blender/bake.py and blender/export.py have them, where the parser can not look.
-KINDS = ("shape-keys", "mdd", "pc2", "alembic", "usd", "gltf")
-SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
-
-
 @dataclass
 class Baked(Outcome):
     meshes: int = 0
@@ -64,7 +60,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if args.step < 1:
         raise WrongUse(f"step: expected 1 or more frames, got {args.step}")
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
-    suffix = SUFFIXES.get(args.to, ".blend")
+    suffix = EXPORTS.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]
     outcomes = []
     for number, job in enumerate(jobs):
@@ -90,39 +86,38 @@ def _bake(
 ) -> None:
     import bpy
 
-    from ..blender import bake, evaluate, files
+    from ..blender import bake, drive, evaluate, files
 
     source, target = outcome.job.source, outcome.job.target
     if target.exists() and not args.overwrite:
         raise SinewError(f"{target}: is there already; use --overwrite to replace it")
     files.open_file(source)
     scene = bpy.context.scene
-    try:
-        meshes = evaluate.deformed_meshes(scene)
-    except SinewError as error:
-        raise SinewError(f"{source}: {error}; nothing written") from None
-    taken = []
-    for obj in meshes:
-        try:
-            evaluate.use_method(obj, args.method)
-            taken.append(obj)
-        except SinewError as error:
-            outcome.left_out.append(str(error))
-    if not taken:
-        raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
+    meshes = drive.deformed_meshes(list(scene.objects))
+    if not meshes:
+        raise SinewError(f"{source}: no mesh is deformed by an armature; nothing written")
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
-    try:
-        started = bake.start(taken, args.to, chosen, target, args.overwrite)
-        for _part in console.progress(started.sample(), len(chosen), what):
-            pass
-        started.place()
+    # What is hidden is baked as well, and hidden in the copy.
+    with evaluate.shown(meshes):
+        errors = evaluate.use_methods([(obj, args.method) for obj in meshes])
+        outcome.left_out += [str(error) for error in errors if error is not None]
+        taken = [obj for obj, error in zip(meshes, errors, strict=True) if error is None]
+        if not taken:
+            raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:
-            if args.to not in SUFFIXES:
-                files.save_copy(source, target)
-            started.publish()
-        except BaseException:
-            started.discard()
-            raise
-    except SinewError as error:
-        raise SinewError(f"{source}: {error}") from None
+            started = bake.start(taken, args.to, chosen, target, args.overwrite)
+            for _part in console.progress(started.sample(), len(chosen), what):
+                pass
+        except SinewError as error:
+            raise SinewError(f"{source}: {error}") from None
+    try:
+        started.place()
+        if args.to not in EXPORTS:
+            files.save_copy(source, target)
+        started.publish()
+    except BaseException as error:
+        started.discard()
+        if isinstance(error, SinewError):
+            raise SinewError(f"{source}: {error}") from None
+        raise
     outcome.meshes, outcome.frames = len(taken), len(chosen)

@@ -19,7 +19,8 @@ from ..batch.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..batch.job_file import JobFile, Settings, read_job_file
 from ..batch.journal import Journal
 from ..batch.report import PICTURES, write_report
-from ..batch.workers import run_here, run_in_dask
+from ..batch.workers import run_here, run_in_dask, run_on_this_machine
+from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
 from .console import Console
 
@@ -94,6 +95,11 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     for job, wanted in zip(jobs, settings, strict=True):
         if action.methods and wanted.method is None:
             raise WrongUse(f"no method for {job.source}: give --method, or one in a job file")
+        try:
+            wanted.check_bakes()
+        except WrongUse as error:
+            raise WrongUse(f"{action.job}: {job.source}: {error}") from None
+    _check_bakes(jobs, settings)
     for rule in job_file.files:
         if not any(rule.matches(job.source) for job in jobs):
             console.note(f"{action.job}:{rule.line}: no file matches {', '.join(rule.match)}")
@@ -124,8 +130,9 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
                     results[Path(task["target"])] = result
                     _tell(console, progress, task, result)
         except KeyboardInterrupt:
-            console.note(f"{len(results)} of {len(jobs)} files are done; --resume does the others")
-            raise
+            raise KeyboardInterrupt(
+                f"{len(results)} of {len(jobs)} files are done; --resume does the others"
+            ) from None
         finally:
             journal.clear_away(job.target for job in jobs)
         seconds = time.monotonic() - started
@@ -133,6 +140,17 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
         summary = _summary(action, rows, seconds)
         report = write_report(out, summary, rows)
     return _conclude(console, action, rows, summary, report)
+
+
+def _check_bakes(jobs: list[Job], settings: list[Settings]) -> None:
+    """Raises WrongUse where a bake would be written over an input or another's copy."""
+    taken = {path: job.source for job in jobs for path in (job.source, job.target)}
+    for job, wanted in zip(jobs, settings, strict=True):
+        for path in {bake_path(job.target, kind) for kind in wanted.kinds}:
+            if path in taken:
+                raise WrongUse(
+                    f"{path}: is for the bake of {job.source} and for {taken[path]}; rename one of them"
+                )
 
 
 class _Workers:
@@ -166,7 +184,9 @@ class _Workers:
             if tasks:
                 prepare_blender()
             return run_here(tasks, lambda task, _limits: worker.run(task, lambda _doing: None), _versions)
-        return run_in_dask(tasks, self._limits, self._jobs, self._args.scheduler)
+        if self._args.scheduler is not None:
+            return run_in_dask(tasks, self._limits, self._args.scheduler)
+        return run_on_this_machine(tasks, self._limits, self._jobs)
 
     def _memory(self, text: str | None) -> int:
         if text is None:
@@ -198,6 +218,7 @@ def _versions() -> dict[str, str]:
 
 
 def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings, journal: Journal) -> dict:
+    record = journal.latest.get(journal.name_of(job.target))
     name = hashlib.blake2b(os.fsencode(journal.name_of(job.target)), digest_size=8).hexdigest()
     return {
         "command": action.command,
@@ -206,6 +227,8 @@ def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings
         "settings": settings.as_task(),
         "frames": args.frames,
         "pictures": str(journal.out / PICTURES / name) if args.pictures else None,
+        "overwrite": args.overwrite,
+        "ours": [str(path) for path in journal.baked(job.target, record)] if args.resume else [],
     }
 
 
@@ -220,7 +243,8 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
             f"{job.target}: is there already; use --overwrite to replace it, or --resume to go on"
         )
     same = ("command", "source", "settings")
-    if args.resume and is_ours and "error" not in record and all(record[k] == task[k] for k in same):
+    stands = args.resume and is_ours and "error" not in record and journal.holds_all(job.target, record)
+    if stands and all(record[k] == task[k] for k in same):
         return {"hash": record["hash"], "versions": record["versions"]}
     return None
 
@@ -232,6 +256,10 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
     if "unchanged" in outcome:
         return {**before, "unchanged": True}
     record = {key: task[key] for key in ("command", "source", "settings")} | outcome
+    record["beside"] = [
+        [journal.name_of(Path(left)), journal.name_of(Path(path)), written]
+        for left, path, written in outcome.get("beside", ())
+    ]
     if "error" in record:
         _record_failure(journal, target, record, before)
         return record
@@ -245,11 +273,12 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
 
 
 def _record_failure(journal: Journal, target: Path, record: dict, before: dict) -> None:
-    for key in ("unfinished", "written"):
+    record.pop("unfinished", None)
+    # The older copy is still ours.
+    for key in ("written", "beside"):
         record.pop(key, None)
-    if "written" in before:
-        # The older copy is still ours.
-        record["written"] = before["written"]
+        if key in before:
+            record[key] = before[key]
     journal.record(target, record)
 
 
@@ -272,7 +301,7 @@ def _tell(console: Console, progress, task: dict, result: dict) -> None:
 def _row(job: Job, name: str, result: dict) -> dict:
     """What the report says of a file."""
     status = "failed" if "error" in result else "unchanged" if "unchanged" in result else "written"
-    shown = ("error", "meshes", "left_out", "notes", "versions", "seconds", "attempts", "pictures")
+    shown = ("error", "meshes", "left_out", "bakes", "notes", "versions", "seconds", "attempts", "pictures")
     return {"source": str(job.source), "file": name, "status": status} | {
         key: result[key] for key in shown if key in result
     }

@@ -49,7 +49,8 @@ class Console:
             import rich.table
             import rich.text
 
-            table = rich.table.Table(*columns)
+            # A path is nothing without its end.
+            table = rich.table.Table(*(rich.table.Column(name, overflow="fold") for name in columns))
             for row in rows:
                 table.add_row(*(rich.text.Text(cell) for cell in row))
             # Not cut to 80 columns where there is no terminal to fit.
@@ -80,7 +81,8 @@ class Console:
 
         columns = (
             TextColumn("{task.description}"),
-            BarColumn(),
+            # Room for a terminal's ^C in 80 columns: where that wraps, the bar is drawn twice.
+            BarColumn(bar_width=20),
             MofNCompleteColumn(),
             TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
             TimeRemainingColumn(),

@@ -12,7 +12,18 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import SinewError
+from .errors import SinewError, WrongUse
+from .output import remove
+
+# Bakes that a .blend plays, and those that are files of their own.
+IN_FILE = ("shape-keys", "mdd", "pc2")
+EXPORTS = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
+KINDS = (*IN_FILE, *EXPORTS)
+
+
+def bake_path(copy: Path, kind: str) -> Path:
+    """What a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for all that a .blend plays."""
+    return copy.with_suffix(EXPORTS.get(kind, ".baked.blend"))
 
 
 def mdd_header(frames: Sequence[float], vertices: int, rate: float) -> bytes:
@@ -44,10 +55,10 @@ class PointCache:
     def __init__(self, path: Path, kind: str, frames: Sequence[float], vertices: int, rate: float) -> None:
         self.path = path
         header, self._coordinate = FORMATS[kind]
-        self._unfinished = path.with_name(f".{path.name}.unfinished")
+        self.unfinished = path.with_name(f".{path.name}.unfinished")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self._unfinished.open("wb")
+            self._file = self.unfinished.open("wb")
             self._file.write(header(frames, vertices, rate))
         except OSError as error:
             raise _unwritable(path, error) from None
@@ -66,15 +77,12 @@ class PointCache:
         except OSError as error:
             raise _unwritable(self.path, error) from None
 
-    def publish(self) -> None:
-        publish(self._unfinished, self.path)
-
     def discard(self) -> None:
         """Leaves nothing behind, also where the disk is full."""
         # What could not be written is not wanted.
         with suppress(OSError):
             self._file.close()
-        self._unfinished.unlink(missing_ok=True)
+        remove(self.unfinished)
 
 
 def publish(unfinished: Path, path: Path) -> None:
@@ -93,6 +101,15 @@ def check_space(folder: Path, needed: int) -> None:
             f"{folder}: the bake takes {_megabytes(needed)} and {_megabytes(free)} are free; bake fewer "
             "frames, or to another disk"
         )
+
+
+def check_frames(kind: str, frames: Sequence[float]) -> None:
+    """Raises WrongUse where a bake of this kind can not have the frames, in rising order."""
+    is_whole = all(float(frame).is_integer() for frame in frames)
+    if kind in ("alembic", "usd") and not (is_whole and is_even(frames, 1)):
+        raise WrongUse(f"{kind}: Blender exports every frame of a range; give frames such as 1-48")
+    if kind in EXPORTS and not is_whole:
+        raise WrongUse(f"{kind}: Blender exports whole frames; give frames such as 1,12,40-48")
 
 
 def is_even(frames: Sequence[float], step: float | None = None) -> bool:

@@ -4,9 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from .errors import SinewError
+
+
+def remove(path: Path) -> None:
+    """Takes away what is not wanted, if it is there and can be: on a read-only disk even asking fails."""
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
@@ -21,7 +28,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
         write(unfinished)
         unfinished.replace(path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        remove(unfinished)
         raise SinewError(f"{path}: can not be written: {error.strerror or error}") from None
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import struct
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -36,6 +37,8 @@ else:
 assert not hasattr(bpy.types.Object, "sinew")
 arrays, uvs, materials = {}, [], []
 scene = bpy.context.scene
+for name in sys.argv[4:]:
+    bpy.data.objects[name].hide_viewport = False
 for obj in [o for o in scene.objects if o.type == "MESH" and len(o.data.vertices) > 50]:
     per_frame = []
     for frame in frames:
@@ -52,10 +55,10 @@ np.savez(result, uvs=np.array(uvs), materials=np.array(materials), **arrays)
 """
 
 
-def read_elsewhere(path, frames, tmp_path):
-    """World points [frames, vertices, 3] by object name, in a process without Sinew."""
+def read_elsewhere(path, frames, tmp_path, hidden=()):
+    """World points [frames, vertices, 3] by name, in a process without Sinew; of `hidden` objects too."""
     result = tmp_path / "read.npz"
-    command = [sys.executable, "-c", READ, str(path), ",".join(map(str, frames)), str(result)]
+    command = [sys.executable, "-c", READ, str(path), ",".join(map(str, frames)), str(result), *hidden]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     with np.load(result) as arrays:
@@ -215,17 +218,29 @@ def test_stopped_anywhere_nothing_is_left(arm, tmp_path):
         assert properties.is_driven(obj)
 
 
+@contextmanager
+def disk(folder, options):
+    """A disk in memory, mounted at a new folder."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("may not mount a disk here")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
 @pytest.fixture
 def small_disk(tmp_path):
-    folder = tmp_path / "small"
-    folder.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)], capture_output=True, check=False
-    )
-    if mounted.returncode != 0:
-        pytest.skip("may not mount a small disk here")
-    yield folder
-    subprocess.run(["umount", "-l", str(folder)], check=True)
+    with disk(tmp_path / "small", "size=64k") as folder:
+        yield folder
+
+
+@pytest.fixture
+def locked_folder(tmp_path):
+    with disk(tmp_path / "locked", "ro") as folder:
+        yield folder
 
 
 @pytest.mark.parametrize("kind", ["mdd", "alembic", "usd", "gltf"])
@@ -253,7 +268,7 @@ def test_headers(tmp_path):
         cache.write(points)
         cache.write(points + 1)
         cache.close()
-        cache.publish()
+        core.publish(cache.unfinished, cache.path)
     mdd = (tmp_path / "a.mdd").read_bytes()
     assert struct.unpack(">iiff12f", mdd) == (2, 2, 0.5, np.float32(14 / 24), *range(6), *range(1, 7))
     pc2 = (tmp_path / "a.pc2").read_bytes()
@@ -315,6 +330,120 @@ def test_real_rigs(real_rig, tmp_path, name, kind):
             wanted = np.linalg.norm(expected[one][:, :, None] - expected[one][:, None, :1], axis=-1)
             scale = apart.max() / wanted.max()
             assert np.abs(apart / scale - wanted).max() <= 2 * TOLERANCE * size
+
+
+def test_names_of_objects_and_files(arm, tmp_path):
+    """Objects whose names are one once cleaned, in any alphabet, and a folder that has such files already."""
+    _obj, path = arm
+    names = ["a/b", "a\\b", "A_b", "имя", "名前", "..", " "]
+    for name in names:
+        scenes.make_arm(sides=6, rings=11, name=name)
+    expected = {}
+    for obj in [o for o in bpy.context.scene.objects if o.type == "MESH"]:
+        expected[obj.name] = shown(obj, [1, 11])
+        bpy.data.objects[obj.name].sinew.enabled = True
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    for name in names:
+        scenes.make_arm(sides=6, rings=11, name=name)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    out = tmp_path / "out"
+    options = ("--method", METHOD, "--to", "pc2", "--frames", "1,11", "--out", out)
+    run_sinew("bake", path, *options)
+    read = read_elsewhere(out / "arm.blend", [1, 11], tmp_path)
+    assert len(list((out / "arm_cache").iterdir())) == 1 + len(names)
+    for name in ("Arm", *names):
+        assert scenes.worst(read[name], expected[name]) <= 1e-5
+    (out / "arm.blend").unlink()
+    mine = (out / "arm_cache" / "Arm.pc2").read_bytes()
+    refused = run_sinew("bake", path, *options, status=1)
+    assert "Arm.pc2: is there already" in refused.stderr
+    assert (out / "arm_cache" / "Arm.pc2").read_bytes() == mine
+    assert not (out / "arm.blend").exists()
+
+
+def test_files_of_one_name_do_not_meet(arm, tmp_path):
+    """Two files' objects of one name, in caches of their own."""
+    _obj, path = arm
+    other = path.with_name("other.blend")
+    other.write_bytes(path.read_bytes())
+    run_sinew(
+        "bake", path.parent, "--method", METHOD, "--to", "mdd", "--frames", "1,2", "--out", tmp_path / "o"
+    )
+    caches = {p.relative_to(tmp_path / "o").as_posix() for p in (tmp_path / "o").rglob("*.mdd")}
+    assert caches == {"arm_cache/Arm.mdd", "other_cache/Arm.mdd"}
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "pc2", "usd", "alembic", "gltf"])
+def test_a_folder_that_can_not_be_written(arm, locked_folder, kind):
+    _obj, path = arm
+    refused = run_sinew(
+        "bake", path, "--method", METHOD, "--to", kind, "--frames", "1-3", "--out", locked_folder, status=1
+    )
+    assert "can not be written" in refused.stderr
+
+
+@pytest.mark.parametrize("kind", ["mdd", "usd"])
+def test_keyed_visibility(arm, tmp_path, kind):
+    """A modifier that keys switch off half-way: the bake has the rest shape from there on."""
+    obj, path = arm
+    modifier = obj.modifiers["Armature"]
+    for frame, on in ((1, True), (6, False)):
+        for flag in ("show_viewport", "show_render"):
+            setattr(modifier, flag, on)
+            obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=frame)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    rest = scenes.rest_points(obj)
+    expected = shown(obj, FRAMES)
+    assert scenes.worst(expected[-1], rest) <= TOLERANCE < scenes.worst(expected[4], rest)
+    out = tmp_path / "out"
+    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", out)
+    written = out / ("arm.blend" if kind == "mdd" else "arm.usdc")
+    read = read_elsewhere(written, FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("kind", ["mdd", "alembic"])
+def test_a_library_override(arm, tmp_path, kind):
+    _obj, path = arm
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    shot = path.with_name("shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    with bpy.data.libraries.load(str(path), link=True, relative=True) as (_, to):
+        to.objects = ["Arm", "Arm Rig"]
+    for linked in to.objects:
+        bpy.context.scene.collection.objects.link(linked)
+    for linked in list(to.objects):
+        linked.override_create(remap_local_usages=True)
+    obj = next(o for o in bpy.data.objects if o.override_library and o.type == "MESH")
+    armature = next(o for o in bpy.data.objects if o.override_library and o.type == "ARMATURE")
+    obj.modifiers["Armature"].object = armature
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    expected = shown(obj, FRAMES)
+    size = scenes.diagonal(obj)
+    assert scenes.worst(expected[0], expected[-1]) > 0.1
+    out = tmp_path / "out"
+    # The linked original that the override stands for is in the file as well.
+    run_sinew("bake", shot, "--method", METHOD, "--to", kind, "--out", out)
+    written = out / ("shot.blend" if kind == "mdd" else "shot.abc")
+    read = read_elsewhere(written, FRAMES, tmp_path)
+    assert scenes.worst(read["Arm"], expected) <= TOLERANCE * size
+    if kind == "mdd":
+        refused = run_sinew(
+            "bake", shot, "--method", METHOD, "--to", "shape-keys", "--out", tmp_path / "keys", status=1
+        )
+        assert "a library override can not have shape keys of its own" in refused.stderr
+
+
+def test_what_is_hidden_stays_hidden(arm, tmp_path):
+    obj, path = arm
+    obj.hide_viewport = obj.hide_render = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    out = tmp_path / "out"
+    run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--frames", "1,11", "--out", out)
+    bpy.ops.wm.open_mainfile(filepath=str(out / "arm.blend"))
+    baked = bpy.data.objects["Arm"]
+    assert baked.hide_viewport
+    assert baked.hide_render
 
 
 def test_wrong_use(arm, tmp_path):

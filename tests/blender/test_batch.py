@@ -24,6 +24,7 @@ import scenes
 import whole_file
 from program import COMMAND, ENVIRONMENT, run_sinew
 from sinew_addon.blender import files, properties
+from test_bake import read_elsewhere
 
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="long: runs with the newest Blender alone")
 FAST = ("--frames", "none", "--no-pictures")
@@ -182,6 +183,119 @@ def test_settings_for_files_and_objects(tmp_path):
     rows = report_of(tmp_path / "out")
     deviation = {mesh["object"]: mesh["deviation_part"] for mesh in rows["sub/hero.blend"]["meshes"]}
     assert deviation["Face"] <= scenes.TOLERANCE < 0.01 < deviation["Body"]
+
+
+BAKES = """
+inputs = ["in"]
+out = "out"
+method = "dq"
+scale = "none"
+bake = "usd"
+bake_frames = "1-11"
+
+[[files]]
+match = "hero.blend"
+
+[[files.objects]]
+match = "Body"
+bake = ["alembic", "mdd"]
+
+[[files.objects]]
+match = "Face"
+bake = "shape-keys"
+scale = "3.x"
+
+[[files]]
+match = "plain.blend"
+bake = []
+"""
+
+
+def make_heroes(folder: Path) -> None:
+    folder.mkdir()
+    for name in ("hero", "plain"):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        for part in ("Body", "Face", "Hair"):
+            scenes.make_arm(name=part)
+        bpy.data.objects["Face"].hide_viewport = True
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
+
+
+def test_bakes_of_a_job_file(tmp_path):
+    """Bakes by file and object, beside the copies; in the journal and the report like those."""
+    make_heroes(tmp_path / "in")
+    (tmp_path / "job.toml").write_text(BAKES)
+    out = tmp_path / "out"
+    arguments = ("reskin", "--job", tmp_path / "job.toml", "--no-pictures")
+    run_sinew(*arguments)
+    names = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    bakes = {"hero.usdc", "hero.abc", "hero.baked.blend", "hero.baked_cache/Body.mdd"}
+    assert names == {
+        "hero.blend", "plain.blend", "report.html", "report.json", "sinew-journal.jsonl", *bakes
+    }  # fmt: skip
+    rows = report_of(out)
+    assert {
+        bake["to"]: (bake["objects"], bake["frames"], bake["file"]) for bake in rows["hero.blend"]["bakes"]
+    } == {
+        "usd": (["Hair"], 11, "hero.usdc"),
+        "alembic": (["Body"], 11, "hero.abc"),
+        "mdd": (["Body"], 11, "hero.baked.blend"),
+        "shape-keys": (["Face"], 11, "hero.baked.blend"),
+    }
+    assert "bakes" not in rows["plain.blend"]
+    assert "hero.usdc: usd of Hair, 11 frames" in (out / "report.html").read_text(encoding="utf-8")
+
+    files.open_file(out / "hero.blend")
+    rules = {name: properties.of(bpy.data.objects[name]).scale_rule for name in ("Body", "Face", "Hair")}
+    assert rules == {"Body": "none", "Face": "3.x", "Hair": "none"}
+    bpy.data.objects["Face"].hide_viewport = False
+    frames = list(range(1, 12))
+    expected = {name: scenes.shapes(bpy.data.objects[name], frames) for name in rules}
+    baked = read_elsewhere(out / "hero.baked.blend", frames, tmp_path, ("Face",))
+    exported = read_elsewhere(out / "hero.usdc", frames, tmp_path)
+    for name, points in (("Body", baked), ("Face", baked), ("Hair", exported)):
+        assert scenes.worst(points[name], expected[name]) <= 1e-6 * scenes.diagonal(bpy.data.objects[name])
+    files.open_file(out / "hero.baked.blend")
+    assert bpy.data.objects["Face"].hide_viewport
+    assert [o.name for o in bpy.data.objects if properties.is_driven(o)] == ["Hair"]
+    assert bpy.data.objects["Body"].modifiers[0].filepath == "//hero.baked_cache/Body.mdd"
+
+    before = contents(out)
+    run_sinew(*arguments, "--resume")
+    assert {row["status"] for row in report_of(out).values()} == {"unchanged"}
+    (out / "hero.usdc").unlink()
+    (out / "hero.baked_cache" / "Body.mdd").unlink()
+    run_sinew(*arguments, "--resume")
+    assert [row["status"] for row in report_of(out).values()] == ["written", "unchanged"]
+    assert set(contents(out)) == set(before)
+    (out / "hero.usdc").write_bytes(b"an artist's own")
+    result = run_sinew(*arguments, "--resume", status=1)
+    assert "hero.usdc: is there already" in result.stderr
+    assert (out / "hero.usdc").read_bytes() == b"an artist's own"
+    assert unfinished_in(out) == []
+    run_sinew(*arguments, "--overwrite")
+    assert (out / "hero.usdc").read_bytes() != b"an artist's own"
+
+
+def test_a_bake_that_fails_leaves_nothing(tmp_path):
+    make_heroes(tmp_path / "in")
+    bpy.data.objects["Body"].modifiers.new("Mirror", "MIRROR")
+    bpy.data.objects["Body"].modifiers.move(1, 0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in" / "plain.blend"))
+    (tmp_path / "job.toml").write_text(
+        'inputs = ["in"]\nout = "out"\nmethod = "lbs"\nbake = ["usd", "shape-keys"]\nbake_frames = "1-3"\n'
+    )
+    result = run_sinew("reskin", "--job", tmp_path / "job.toml", *FAST, status=1)
+    assert "Mirror changes the mesh ahead of the armature" in result.stderr
+    assert "1 of 2 files re-skinned" in result.stdout
+    out = tmp_path / "out"
+    assert {path.name for path in out.iterdir() if path.suffix in (".blend", ".usdc")} == {
+        "hero.blend", "hero.baked.blend", "hero.usdc"
+    }  # fmt: skip
+    assert unfinished_in(out) == []
+    shutil.copy(tmp_path / "in" / "hero.blend", tmp_path / "in" / "hero.baked.blend")
+    refused = run_sinew("reskin", "--job", tmp_path / "job.toml", *FAST, status=2)
+    assert "hero.baked.blend: is for the bake of" in refused.stderr
 
 
 def test_report_has_pictures_of_the_worst_frame(tmp_path):
@@ -453,33 +567,89 @@ def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
 
 @newest_only
 def test_killed_at_random_20_times(tmp_path):
+    """The batch itself each time, and before that, half the time, one of its Blenders."""
     folder, out = tmp_path / "in", tmp_path / "out"
-    paths = make_rigs(folder, 60)
+    paths = make_rigs(folder, 150)
     before = contents(folder)
     choose = random.Random(8)
     arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
     for _ in range(20):
         process = start_sinew(*arguments, "--jobs", choose.randint(1, 2))
-        for _ in range(choose.randint(0, 3)):
-            line = process.stderr.readline()
-            while line and "unchanged" in line:
-                line = process.stderr.readline()
-        time.sleep(choose.uniform(0.0, 0.06))
+        read_some(process, choose)
+        if choose.random() < 0.5:
+            kill_one(blenders_of(process), choose)
+            time.sleep(choose.uniform(0.0, 0.1))
         blenders = blenders_of(process)
         process.kill()
         process.communicate()
         _gone, left = psutil.wait_procs(blenders, timeout=10)
         assert left == [], "a Blender outlived its batch"
-        # What has its name is whole: the very file that its record speaks of.
-        records = {r["file"]: r for r in journal_lines(out)}
-        for copy in out.glob("[!.]*.blend"):
-            status = copy.stat()
-            assert records[copy.name]["written"] == [status.st_size, status.st_mtime_ns]
+        check_whole(out)
     killed = len(list(out.glob("[!.]*.blend")))
-    assert 0 < killed < 60, "the kills came too late to mean anything"
+    assert 0 < killed < 150, "the kills came too late to mean anything"
     result = run_sinew(*arguments)
-    assert "60 of 60 files" in result.stdout
+    assert "150 of 150 files" in result.stdout
     assert contents(folder) == before
+    check_each_once(out, paths)
+
+
+@newest_only
+def test_killed_at_random_on_a_cluster(tmp_path):
+    """The batch, a worker with what it is at, or a Blender."""
+    folder, out = tmp_path / "in", tmp_path / "out"
+    paths = make_rigs(folder, 60)
+    choose = random.Random(9)
+    with Cluster(tmp_path) as cluster:
+        arguments = ("reskin", folder, "--method", "dq", "--out", out, *FAST, "--resume")
+        arguments = (*arguments, "--scheduler", cluster.address)
+        lost = Counter()
+        for _ in range(8):
+            process = start_sinew(*arguments)
+            read_some(process, choose)
+            for kind, victims in (("worker", cluster.workers), ("Blender", cluster.blenders)):
+                if choose.random() < 0.5:
+                    lost[kind] += kill_one(victims(), choose)
+                    read_some(process, choose)
+            process.kill()
+            process.communicate()
+            check_whole(out)
+        assert 0 < len(list(out.glob("[!.]*.blend"))) < 60
+        assert {kind for kind, times in lost.items() if times} == {"worker", "Blender"}
+        # Two at a time can be lost with a file: it is named, and done by the next run.
+        process = start_sinew(*arguments)
+        _output, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+    check_each_once(out, paths)
+
+
+def read_some(process: subprocess.Popen, choose: random.Random) -> None:
+    """Waits until a few files are done, and a little longer."""
+    for _ in range(choose.randint(0, 3)):
+        line = process.stderr.readline()
+        while line and "unchanged" in line:
+            line = process.stderr.readline()
+    time.sleep(choose.uniform(0.0, 0.06))
+
+
+def kill_one(processes: list[psutil.Process], choose: random.Random) -> bool:
+    if not processes:
+        return False
+    try:
+        choose.choice(processes).kill()
+    except psutil.NoSuchProcess:
+        return False
+    return True
+
+
+def check_whole(out: Path) -> None:
+    """What has its name is whole: the very file that its record speaks of."""
+    records = {r["file"]: r for r in journal_lines(out)}
+    for copy in out.glob("[!.]*.blend"):
+        status = copy.stat()
+        assert records[copy.name]["written"] == [status.st_size, status.st_mtime_ns]
+
+
+def check_each_once(out: Path, paths: list[Path]) -> None:
     assert unfinished_in(out) == []
     times = Counter(record["file"] for record in journal_of(out) if "error" not in record)
     assert times == {path.name: 1 for path in paths}, "lost, or done twice"
@@ -612,6 +782,22 @@ class Cluster:
         """Kills one with what it is at; its keeper starts another."""
         for process in psutil.Process(self._processes[-1].pid).children():
             process.kill()
+
+    def workers(self) -> list[psutil.Process]:
+        return [
+            child
+            for keeper in self._processes[1:]
+            for child in psutil.Process(keeper.pid).children()
+            if "spawn_main" in " ".join(child.cmdline())
+        ]
+
+    def blenders(self) -> list[psutil.Process]:
+        return [
+            child
+            for worker in self.workers()
+            for child in worker.children()
+            if any(part.endswith(".worker") for part in child.cmdline())
+        ]
 
     def _start(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "dask", *arguments]

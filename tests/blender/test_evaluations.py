@@ -8,11 +8,14 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import properties
+from sinew_addon.batch.job_file import Settings
+from sinew_addon.blender import files, handlers, mesh_io, properties, reskin
 
 
 @pytest.fixture
@@ -26,23 +29,23 @@ def counting() -> Iterator[None]:
 
 def evaluations(obj: bpy.types.Object, frame: int) -> int:
     """How often Blender evaluates the modifiers of `obj` on going to a frame."""
-    return evaluations_of(obj, lambda: bpy.context.scene.frame_set(frame))
+    return evaluations_in(lambda: bpy.context.scene.frame_set(frame), obj.name)
 
 
-def evaluations_of(obj: bpy.types.Object, change: Callable[[], None]) -> int:
-    """How often Blender evaluates the modifiers of `obj` in what `change` does."""
+def evaluations_in(action: Callable[[], object], name: str) -> int:
+    """How often Blender evaluates the modifiers of the object called `name` meanwhile."""
     with tempfile.TemporaryFile() as said:
         sys.stdout.flush()
         stdout = os.dup(1)
         os.dup2(said.fileno(), 1)
         try:
-            change()
+            action()
         finally:
             ctypes.CDLL(None).fflush(None)
             os.dup2(stdout, 1)
             os.close(stdout)
         said.seek(0)
-        return said.read().count(f"BKE_object_eval_uber_data on OB{obj.name} (".encode())
+        return said.read().count(f"BKE_object_eval_uber_data on OB{name} (".encode())
 
 
 def key(block: bpy.types.bpy_struct, path: str, first: object, last: object) -> None:
@@ -113,7 +116,7 @@ def test_posing_evaluates_the_mesh_once():
         armature.pose.bones[1].rotation_quaternion[1] += 0.25
         bpy.context.view_layer.update()
 
-    assert [evaluations_of(obj, pose) for _ in range(3)] == [1, 1, 1]
+    assert [evaluations_in(pose, obj.name) for _ in range(3)] == [1, 1, 1]
 
 
 def share_mesh(obj: bpy.types.Object) -> None:
@@ -147,3 +150,94 @@ def test_what_stands_behind_is_evaluated_once_where_the_frame_dirties_the_mesh(s
     assert obj.modifiers["Behind"].show_viewport
     assert obj.modifiers["Behind"].show_render
     assert not properties.of(obj).error
+
+
+def task(path: Path) -> dict:
+    return {
+        "command": "reskin",
+        "source": str(path),
+        "target": str(path.with_name("copy.blend")),
+        "unfinished": str(path.with_name("unfinished.blend")),
+        "settings": Settings(method="dq").as_task(),
+        "frames": "none",
+        "pictures": None,
+    }
+
+
+@pytest.mark.usefixtures("counting")
+def test_a_batch_evaluates_a_file_once_more_than_blender_opens_and_saves_it(tmp_path):
+    scenes.make_arm()
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+    def open_and_save() -> None:
+        files.open_file(path, load_ui=True)
+        files.save_beside(path, path, tmp_path / "plain.blend")
+
+    plain = evaluations_in(open_and_save, "Arm")
+    assert plain > 0
+    # Blender brings the scene up to date before it saves: bpy.ops does before any operator.
+    assert evaluations_in(lambda: reskin.reskin(task(path), lambda _doing: None), "Arm") <= plain + 1
+
+
+@pytest.fixture
+def weights_read(monkeypatch) -> list[str]:
+    """The names of the meshes whose weights are read, one by one."""
+    read, read_group_weights = [], mesh_io.read_group_weights
+
+    def count(mesh: bpy.types.Mesh) -> object:
+        read.append(mesh.name)
+        return read_group_weights(mesh)
+
+    monkeypatch.setattr(mesh_io, "read_group_weights", count)
+    return read
+
+
+def test_saving_reads_no_weights_again_and_a_batch_reads_them_once(tmp_path, weights_read):
+    obj, _armature = scenes.make_arm()
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.add_sinew(obj, "dq")
+    assert weights_read == ["Arm"]
+    live = str(path.with_name("live.blend"))
+    bpy.ops.wm.save_as_mainfile(filepath=live)
+    weights_read.clear()
+    bpy.ops.wm.save_as_mainfile(filepath=live)
+    bpy.context.scene.frame_set(5)
+    assert weights_read == []
+    obj.vertex_groups[0].add(range(30), 0.25, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=live)
+    assert weights_read == ["Arm"]
+    weights_read.clear()
+    reskin.reskin(task(path), lambda _doing: None)
+    assert weights_read == ["Arm"]
+
+
+def test_a_copy_holds_what_the_window_would_show(tmp_path):
+    """Of shape keys, something in front, a parent that deforms, and a file that has Sinew already."""
+    obj, _armature = scenes.make_arm()
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Fat").points[30].co.z += 0.2
+    obj.data.shape_keys.key_blocks["Fat"].value = 0.7
+    front, _ = scenes.make_arm(name="Front")
+    modifier_in_front(front, _)
+    child, armature = scenes.make_arm(name="Child")
+    child.modifiers.clear()
+    child.parent, child.parent_type = armature, "ARMATURE"
+    driven, _ = scenes.make_arm(name="Driven")
+    scenes.add_sinew(driven, "lbs")
+    bpy.context.scene.frame_set(7)
+    path = tmp_path / "all.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    names = ["Arm", "Front", "Child", "Driven"]
+    for name in names:
+        scenes.add_sinew(bpy.data.objects[name], "dq")
+    handlers.refresh(bpy.context)
+    expected = {name: scenes.final_points(bpy.data.objects[name]) for name in names}
+    reskin.reskin(task(path), lambda _doing: None)
+    # As the file has it, before Sinew looks at it.
+    with handlers.held():
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "unfinished.blend"))
+        for name in names:
+            assert np.array_equal(scenes.final_points(bpy.data.objects[name]), expected[name]), name
+    handlers.session.forget()

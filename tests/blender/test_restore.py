@@ -139,6 +139,29 @@ def test_everything_comes_back(tmp_path):
         assert whole_file.differences(before, content(tmp_path / "restored" / path.name)) == [], path.name
 
 
+def test_a_real_character_comes_back(real_rig, tmp_path):
+    """With something in front of its Armature modifier, and as a child that its armature deforms."""
+    files.open_file(real_rig("human.blend"), load_ui=True)
+    human = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature())
+    bare = human.copy()
+    bare.name = "Child"
+    bpy.context.scene.collection.objects.link(bare)
+    bare.modifiers.clear()
+    bare.parent, bare.parent_type = human.find_armature(), "ARMATURE"
+    front = human.copy()
+    front.name = "Front"
+    bpy.context.scene.collection.objects.link(front)
+    front.modifiers.new("Solid", "SOLIDIFY").thickness = 0.02
+    front.modifiers.move(len(front.modifiers) - 1, 0)
+    names = {human.name, "Child", "Front"}
+    path = save(tmp_path / "human.blend")
+    run_sinew("reskin", path, "--method", "qv", "--out", tmp_path / "reskinned", "--no-pictures")
+    run_sinew("restore", tmp_path / "reskinned", "--out", tmp_path / "restored")
+    files.open_file(tmp_path / "reskinned" / path.name)
+    assert {obj.name for obj in bpy.data.objects if properties.is_driven(obj)} >= names
+    assert whole_file.differences(content(path), content(tmp_path / "restored" / path.name)) == []
+
+
 def test_the_comparison_sees_a_difference():
     obj, _armature = scenes.make_arm()
     before = whole_file.of_open_file()

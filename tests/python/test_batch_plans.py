@@ -139,12 +139,14 @@ def test_settings_of_files(tmp_path):
     assert job.inputs == (str(tmp_path / "chars"),)
     assert job.out == str(tmp_path / "done")
     plain = job.settings_of(Path("/x/a.blend"), Settings())
-    assert plain.as_task() == {
-        "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [["Face", "dq"]]
+    none = {"scale": None, "bake": [], "bake_frames": None}
+    face = {"match": "Face", "method": "dq"}
+    assert plain.as_task() == none | {
+        "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [face]
     }  # fmt: skip
     hero = job.settings_of(Path("/x/hero 1.blend"), Settings())
-    assert hero.as_task() == {
-        "method": "dq", "include": [], "exclude": [], "objects": [["Face", "dq"], ["Face*", "lbs"]]
+    assert hero.as_task() == none | {
+        "method": "dq", "include": [], "exclude": [], "objects": [face, {"match": "Face*", "method": "lbs"}]
     }  # fmt: skip
     assert job.settings_of(Path("/x/old/a.blend"), Settings()).method == "dq"
     # The command line speaks for all files, a rule for its own.
@@ -176,6 +178,62 @@ def test_errors_have_a_line(tmp_path, old, new, line, sentence):
     assert JOB.count(old) == 1
     with pytest.raises(WrongUse, match=rf"job\.toml:{line}: .*{sentence}"):
         read(tmp_path, JOB.replace(old, new))
+
+
+BAKES = """\
+scale = "3.x"
+bake = ["usd", "mdd"]
+bake_frames = "1-48"
+
+[[objects]]
+match = "Cape"
+bake = []
+
+[[files]]
+match = "hero.blend"
+scale = "none"
+bake_frames = "2-5"
+
+[[files.objects]]
+match = "Face"
+bake = "shape-keys"
+scale = "4.0"
+"""
+
+
+def test_bakes_and_scale_of_files_and_objects(tmp_path):
+    job = read(tmp_path, BAKES)
+    plain = job.settings_of(Path("/x/a.blend"), Settings())
+    assert (plain.scale, plain.kinds, plain.bake_frames) == ("3.x", ("usd", "mdd"), "1-48")
+    hero = job.settings_of(Path("/x/hero.blend"), Settings())
+    assert (hero.scale, hero.kinds, hero.bake_frames) == ("none", ("usd", "mdd", "shape-keys"), "2-5")
+    assert hero.as_task()["objects"] == [
+        {"match": "Cape", "bake": []},
+        {"match": "Face", "scale": "4.0", "bake": ["shape-keys"]},
+    ]
+    # A rule's frames can be wrong for what the whole file bakes.
+    job = read(tmp_path, BAKES.replace('"2-5"', '"2,5"'))
+    with pytest.raises(WrongUse, match="usd: Blender exports every frame of a range"):
+        job.settings_of(Path("/x/hero.blend"), Settings()).check_bakes()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ('"3.x"', '"2.79"', 1, "scale: expected one of 4.0, 3.x, none, got '2.79'"),
+        ('"usd", "mdd"', '"fbx"', 2, "bake: expected some of shape-keys, .*, got 'fbx'"),
+        ('"usd", "mdd"', '"pc2", "mdd"', 2, "an object can have one of pc2, mdd"),
+        ('"1-48"', '"1-"', 3, "bake_frames: expected frames such as"),
+        ('"1-48"', '"1,5"', 3, "usd: Blender exports every frame"),
+        ("bake = []\n", "", 5, "nothing is said of these objects"),
+        ('bake = "shape-keys"', "bake = 3", 16, "bake: expected a list"),
+        ('"4.0"', "4.0", 17, "scale: expected text in quotes, got 4.0"),
+    ],
+)
+def test_errors_of_bakes_have_a_line(tmp_path, old, new, line, sentence):
+    assert BAKES.count(old) == 1
+    with pytest.raises(WrongUse, match=rf"job\.toml:{line}: .*{sentence}"):
+        read(tmp_path, BAKES.replace(old, new))
 
 
 def test_errors_of_the_format_have_a_line(tmp_path):
