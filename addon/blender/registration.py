@@ -20,9 +20,22 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from . import handlers, inbetween_handlers, operators, panels, properties
+    from . import (
+        comparison_labels,
+        comparison_operators,
+        comparison_panel,
+        comparison_state,
+        handlers,
+        inbetween_handlers,
+        operators,
+        panels,
+        properties,
+    )
 
     _register_classes((*properties.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes((*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES))
+    bpy.types.Scene.sinew_comparison = bpy.props.PointerProperty(type=comparison_state.SinewComparison)
+    comparison_labels.register()
     bpy.types.Object.sinew = bpy.props.PointerProperty(
         type=properties.SinewSettings, override=properties.OVERRIDABLE
     )
@@ -41,16 +54,17 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import drive, handlers, inbetween_handlers, properties
+        from . import comparison_labels, drive, handlers, inbetween_handlers, properties
 
         atexit.unregister(unregister)
+        comparison_labels.unregister()
         handlers.unregister()
         inbetween_handlers.unregister()
         # As in a saved file: the Armature modifiers point to their armatures again.
         for obj in bpy.data.objects:
             if properties.is_driven(obj):
                 drive.give_back(obj)
-        del bpy.types.Object.sinew, bpy.types.Action.sinew_holds
+        del bpy.types.Object.sinew, bpy.types.Action.sinew_holds, bpy.types.Scene.sinew_comparison
         for name in properties.INBETWEEN:
             delattr(bpy.types.Object, name)
     while _registered:
