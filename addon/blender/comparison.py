@@ -82,7 +82,7 @@ def start(
 
 
 def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Object], list[str]]:
-    """Those of which there can be copies, and a sentence for each of the others; SinewError where none can."""
+    """Those that can be copied, and a sentence for each of the others; SinewError where none can."""
     taken, problems = [], []
     for obj in meshes:
         try:
@@ -151,12 +151,13 @@ def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection)
 
 def _remove_left_over() -> None:
     """What belonged to copies that were deleted by hand."""
-    for helper in [obj for obj in bpy.data.objects if obj.users == 0 and properties.is_helper(obj)]:
-        if helper.library is None:
-            mesh = helper.data
-            bpy.data.objects.remove(helper)
-            if mesh.users == 0:
-                bpy.data.meshes.remove(mesh)
+    helpers = {obj for obj in bpy.data.objects if properties.is_helper(obj) and obj.library is None}
+    # Not by their counts of users, as Blender does not lower those when it deletes what has our settings.
+    for helper in [h for h, users in bpy.data.user_map(subset=helpers).items() if not users]:
+        mesh = helper.data
+        bpy.data.objects.remove(helper)
+        if mesh.users == 0:
+            bpy.data.meshes.remove(mesh)
     for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
         bpy.data.actions.remove(action)
     offset_nodes.remove_unused()

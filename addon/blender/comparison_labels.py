@@ -34,8 +34,8 @@ def unregister() -> None:
 
 
 def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, float], Vector]]:
-    """The text, the colour, and the place in the world of each label: in the middle above a method's copies that
-    are shown, or above the originals."""
+    """The text, the colour, and the place in the world of each label: in the middle above a method's copies
+    that are shown, or above the originals."""
     state = comparison_state.of_scene(context.scene)
     if state is None:
         return []

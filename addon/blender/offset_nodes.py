@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group "Sinew Offset": moves what an object shows, in the world's axes, and leaves the object
-where it is: the bones' motions are relative to that."""
+"""The Geometry Nodes group "Sinew Offset": moves what an object shows, in the world's axes, and leaves the
+object where it is: the bones' motions are relative to that."""
 
 from __future__ import annotations
 

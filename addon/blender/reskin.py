@@ -16,7 +16,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.views import seen_extent, whole_view
-from . import drive, evaluate, files, handlers, properties, render, stack
+from . import comparison, drive, evaluate, files, handlers, properties, render, stack
 
 PICTURE_SIZE = 360
 # Frames that a comparison looks at where none are named.
@@ -80,6 +80,7 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
         files.open_file(source, load_ui=True)
     notes = _notes_on_file()
     with clock.doing("restoring"):
+        comparison.end(bpy.context)
         driven = [obj for obj in bpy.data.objects if properties.is_driven(obj) and _is_meant(obj, settings)]
         meshes, left_out = [], []
         for obj in driven:
