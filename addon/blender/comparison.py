@@ -26,6 +26,7 @@ from . import (
     node_group,
     offset_nodes,
     properties,
+    stack,
 )
 
 # Of a colour-blind-safe set (Okabe and Ito, 2008), in the order of the methods.
@@ -207,6 +208,11 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
     settings = properties.of(copy)
     settings.carrier = settings.front = None
     settings.attribute = ""
+    # Blender 5.2 goes on counting them as used by a modifier that is removed.
+    nodes = stack.sinew_modifier(copy)
+    for name in ("Points", "Front") if nodes is not None else ():
+        if isinstance(node_group.get_input(nodes, name), bpy.types.Object):
+            node_group.set_inputs(nodes, {name: None})
     drive.remove(copy)
 
 

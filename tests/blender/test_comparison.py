@@ -13,7 +13,6 @@ import test_restore
 import whole_file
 from conftest import BLEND_FILES
 from sinew_addon.blender import (
-    comparison,
     comparison_labels,
     comparison_state,
     drive,
@@ -67,7 +66,10 @@ def assert_copies_show(obj: bpy.types.Object, frames: list[int], expected: dict[
 
 def shapes_of_methods(obj: bpy.types.Object, frames: list[int]) -> dict[str, np.ndarray]:
     """What Sinew makes of the object itself; afterwards it is as it was."""
-    driven, method = properties.is_driven(obj), properties.of(obj).method if obj.is_property_set("sinew") else ""
+    driven, method = (
+        properties.is_driven(obj),
+        properties.of(obj).method if obj.is_property_set("sinew") else "",
+    )
     found = {evaluate.BLENDER: scenes.shapes(obj, frames)} if not driven else {}
     for name in METHODS[:-1]:
         evaluate.use_method(obj, name)
@@ -209,7 +211,9 @@ def test_posing_by_hand():
     for degrees in (40.0, 130.0):
         scenes.bend(armature, degrees)
         bpy.context.view_layer.update()
-        got = {method: without_offset(copy, place) for place, (method, copy) in enumerate(copies(obj).items(), 1)}
+        got = {
+            method: without_offset(copy, place) for place, (method, copy) in enumerate(copies(obj).items(), 1)
+        }
         lbs = scenes.final_points(obj)
         assert scenes.worst(got["lbs"], lbs) <= scenes.TOLERANCE * scenes.diagonal(obj)
         assert scenes.worst(got[evaluate.BLENDER], lbs) <= TOLERANCE * scenes.diagonal(obj)
@@ -402,7 +406,7 @@ def test_the_original_is_deleted(driven):
 
 
 def test_keys_of_the_method_are_the_originals_own():
-    obj, armature = scenes.make_arm()
+    obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     obj.keyframe_insert("sinew.method", frame=1)
     properties.of(obj).method = "lbs"
@@ -541,7 +545,7 @@ def test_what_can_not_be_compared():
 
 def test_a_linked_character(tmp_path):
     """Without an override Sinew can not drive it; its copies are local."""
-    obj, armature = scenes.make_arm()
+    obj, _armature = scenes.make_arm()
     expected = shapes_of_methods(obj, [1, 11])
     test_restore.save(tmp_path / "library.blend")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
