@@ -15,7 +15,7 @@ from . import comparison, comparison_state, evaluate, properties
 
 FONT = 0
 # Points at scale 1.
-SIZE, PADDING, ABOVE = 13, 6, 12
+SIZE, PADDING, STRIPE, ABOVE = 13, 6, 3, 16
 BACKGROUND = (0.05, 0.05, 0.05, 0.75)
 
 _handle: object | None = None
@@ -78,7 +78,7 @@ def _draw() -> None:
         return
     scale = context.preferences.system.ui_scale
     blf.size(FONT, SIZE * scale)
-    line = (SIZE + 2.5 * PADDING) * scale
+    line = (0.75 * SIZE + 2 * PADDING + STRIPE + 2) * scale
     lowest: dict[tuple[int, int], int] = {}
     for text, colour, place in labels(context):
         point = location_3d_to_region_2d(context.region, context.region_data, place)
@@ -96,15 +96,23 @@ def _draw() -> None:
 def _draw_label(
     text: str, colour: tuple[float, float, float], x: float, y: float, width: float, scale: float
 ) -> None:
+    """White on dark, which is legible on any view, over a stripe of the colour."""
     padding = PADDING * scale
     left, right = x - padding, x + width + padding
     bottom, top = y - padding, y + SIZE * scale * 0.75 + padding
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
     gpu.state.blend_set("ALPHA")
-    shader.uniform_float("color", BACKGROUND)
-    batch_for_shader(shader, "TRIS", {"pos": corners}, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
+    _draw_rectangle(left, bottom, right, top, BACKGROUND)
+    _draw_rectangle(left, bottom - STRIPE * scale, right, bottom, (*colour, 1.0))
     gpu.state.blend_set("NONE")
-    blf.color(FONT, *colour, 1.0)
+    blf.color(FONT, 1.0, 1.0, 1.0, 1.0)
     blf.position(FONT, x, y, 0.0)
     blf.draw(FONT, text)
+
+
+def _draw_rectangle(
+    left: float, bottom: float, right: float, top: float, colour: tuple[float, float, float, float]
+) -> None:
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+    shader.uniform_float("color", colour)
+    batch_for_shader(shader, "TRIS", {"pos": corners}, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
