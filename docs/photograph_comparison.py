@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares the methods on human.blend in a Blender with a window, and photographs it.
 
-    blender --factory-startup human.blend --python docs/photograph_comparison.py -- sinew-0.1.0.zip comparison.png
+    blender --factory-startup human.blend --python docs/photograph_comparison.py -- sinew.zip comparison.png
 
 Prints as facts what became of it on playback, posing, flipping, undo, saving, reopening and at its end.
 """
@@ -123,7 +123,7 @@ def work(facts: dict[str, object]):
     facts["flipped"] = shown
     scene.sinew_comparison.arrangement = "OVERLAY"
     yield
-    facts["overlaid"] = worst()
+    facts["worst overlaid"] = worst()
     scene.sinew_comparison.arrangement = "SIDE"
     with window.in_view3d():
         bpy.ops.ed.undo_push(message="Arrangement")

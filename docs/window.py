@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the scripts that photograph Blender's window share: installing Sinew's zip, clicks, steps between redraws.
+"""What the scripts that photograph Blender's window share: installing Sinew, clicks, steps between redraws.
 
 They run under an X server of their own; the photograph is of the whole screen, by xwd and netpbm.
 """
