@@ -54,8 +54,10 @@ def start(
 
     Raises SinewError, with no comparison on, where no mesh can be compared.
     """
-    end(context)
     scene = context.scene
+    before = comparison_state.of_scene(scene)
+    arrangement = before.arrangement if before is not None else comparison_state.SIDE_BY_SIDE
+    end(context)
     taken, problems = _comparable(meshes)
     # Before there are copies: what the scene shows now needs no other evaluation.
     axis = side_by_side.row_axis(right)
@@ -73,13 +75,19 @@ def start(
                     collection.objects.link(_copy(obj, method))
             state.axis = axis
             state.spacing = side_by_side.spacing(points, axis)
-            state.first, state.second = methods[0], methods[-1]
-            comparison_state.arrange(state)
+            state.first, state.second = methods[0], _other_than(methods[0], methods)
+            state.arrangement = arrangement
     except BaseException:
         end(context)
         raise
     handlers.refresh(context)
     return [*problems, *(e for e in (properties.of(copy).error for copy in collection.objects) if e)]
+
+
+def _other_than(first: str, methods: Sequence[str]) -> str:
+    """What to flip to: the last of Sinew's own methods, if that is another."""
+    others = [method for method in methods if method != first]
+    return next((m for m in reversed(others) if m != evaluate.BLENDER), others[-1] if others else first)
 
 
 def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Object], list[str]]:

@@ -16,6 +16,8 @@ from . import comparison, comparison_state, evaluate, properties
 FONT = 0
 # Points at scale 1.
 SIZE, PADDING, STRIPE, ABOVE = 13, 6, 3, 16
+# Room for the headers and for some labels above each other.
+BELOW_TOP = 150
 BACKGROUND = (0.05, 0.05, 0.05, 0.75)
 
 _handle: object | None = None
@@ -84,6 +86,8 @@ def _draw() -> None:
         point = location_3d_to_region_2d(context.region, context.region_data, place)
         if point is None:
             continue
+        # Close up, the label stays in sight.
+        point.y = min(point.y, context.region.height - BELOW_TOP * scale)
         # Those of copies that lie over each other stand above each other.
         width = blf.dimensions(FONT, text)[0]
         spot = next((known for known in lowest if abs(known[0] - point.x) < 4 * line), None)

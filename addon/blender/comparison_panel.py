@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import comparison, comparison_state
+from . import comparison, comparison_state, evaluate
 from .sidebar import Sidebar, draw_text
 
 
@@ -44,9 +44,9 @@ def _draw_arrangement(
         column = layout.column(align=True)
         column.prop(state, "first", text="")
         column.prop(state, "second", text="")
-        shown = state.second if state.shows_second else state.first
+        (shown,) = comparison_state.shown_methods(state)
         layout.operator("sinew.flip_comparison", text="Flip", icon="UV_SYNC_SELECT")
-        draw_text(layout, context, f"Shown: {shown}")
+        draw_text(layout, context, f"Shown: {evaluate.method_label(shown)}")
 
 
 CLASSES = (SINEW_PT_comparison,)

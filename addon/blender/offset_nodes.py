@@ -5,6 +5,7 @@ object where it is: the bones' motions are relative to that."""
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from . import node_group
 
@@ -17,18 +18,30 @@ def find(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def add(obj: bpy.types.Object) -> None:
-    """Behind all modifiers of the object, those that are pinned to the end too."""
+    """Behind all modifiers of the object but Subdivision at the very end: that gives the same shape when it
+    comes after, and Blender does it on the graphics card only there."""
+    last = _last_place(obj)
+    behind = list(obj.modifiers)[last:]
     modifier = obj.modifiers.new("Offset", "NODES")
     modifier.node_group = next((g for g in bpy.data.node_groups if _is_ours(g)), None) or _make()
     modifier.show_expanded = False
-    modifier.use_pin_to_last = True
-    obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
+    # Modifiers that are pinned stand behind all that are not.
+    modifier.use_pin_to_last = all(m.use_pin_to_last for m in behind)
+    obj.modifiers.move(list(obj.modifiers).index(modifier), last)
+
+
+def _last_place(obj: bpy.types.Object) -> int:
+    modifiers = list(obj.modifiers)
+    while modifiers and modifiers[-1].type == "SUBSURF":
+        modifiers.pop()
+    return len(modifiers)
 
 
 def set_offset(obj: bpy.types.Object, offset: tuple[float, float, float]) -> None:
     """Of an object that add() was called for; `offset` in world space."""
     modifier = find(obj)
-    if modifier is None:
+    if modifier is None or np.allclose(node_group.get_input(modifier, "Offset"), offset, 1e-6, 0.0):
+        # Nothing would move, and Blender would evaluate it again.
         return
     node_group.set_inputs(modifier, {"Offset": offset})
     obj.update_tag(refresh={"DATA"})
