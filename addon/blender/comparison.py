@@ -47,8 +47,9 @@ ACTION_MARK = "sinew_comparison"
 def start(
     context: bpy.types.Context, meshes: Sequence[bpy.types.Object], methods: Sequence[str], right: np.ndarray
 ) -> list[str]:
-    """Compares `meshes` under `methods` of evaluate.method_names() in the context's scene, instead of what is
-    compared now; a sentence for each mesh that can not be, and for each method that fails on one.
+    """Compares what is to be seen of a character under `methods` of evaluate.method_names(), in the context's
+    scene and instead of what is compared now; a sentence for each mesh that can not be, and for each method
+    that fails on one.
 
     right  [3], the direction of the screen's right in the world; the copies stand along the nearest axis
 
@@ -97,7 +98,8 @@ def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Obje
         try:
             if obj.data.is_editmode:
                 raise SinewError(f"{obj.name} is in edit mode; leave it first")
-            front.check(obj)
+            if drive.armature_of(obj) is not None:
+                front.check(obj)
             taken.append(obj)
         except SinewError as error:
             problems.append(str(error))
@@ -180,7 +182,7 @@ def corners(evaluated: bpy.types.Object) -> np.ndarray:
 
 
 def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
-    """A copy that `method` deforms, in no collection yet."""
+    """A copy that `method` deforms where an armature does, in no collection yet."""
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
@@ -199,7 +201,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     copy.color = (*COLOURS[evaluate.method_names().index(method) % len(COLOURS)], 1.0)
     settings = properties.of(copy)
     settings.copied, settings.copied_for = obj, method
-    if method != evaluate.BLENDER:
+    if method != evaluate.BLENDER and drive.armature_of(copy) is not None:
         drive.add(copy, method)
         if scale_rule is not None:
             settings.scale_rule = scale_rule

@@ -11,15 +11,29 @@ from . import comparison, comparison_state, drive, evaluate, operators, properti
 
 
 def character(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The visible meshes that the armatures meant deform: clothes belong to the body that is selected."""
-    armatures = operators.armatures(context)
-    space = context.space_data
-    viewport = space if space is not None and space.type == "VIEW_3D" else None
-    return [
+    """The visible meshes that the armatures meant deform, and those that hang on their bones: clothes and
+    eyes belong to the body that is selected. None where nothing is deformed."""
+    armatures, viewport = operators.armatures(context), _viewport(context)
+    visible = [
         obj
-        for obj in drive.deformed_meshes(list(context.scene.objects))
-        if drive.armature_of(obj) in armatures and obj.visible_get(viewport=viewport)
+        for obj in context.scene.objects
+        if obj.type == "MESH" and not properties.is_copy(obj) and obj.visible_get(viewport=viewport)
     ]
+    deformed = [obj for obj in drive.deformed_meshes(visible) if drive.armature_of(obj) in armatures]
+    attached = [obj for obj in visible if drive.armature_of(obj) is None and _hangs_on(obj, armatures)]
+    return [*deformed, *attached] if deformed else []
+
+
+def _hangs_on(obj: bpy.types.Object, armatures: list[bpy.types.Object]) -> bool:
+    parent = obj.parent
+    while parent is not None and parent not in armatures:
+        parent = parent.parent
+    return parent is not None
+
+
+def _viewport(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
+    space = context.space_data
+    return space if space is not None and space.type == "VIEW_3D" else None
 
 
 def _compared(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -81,6 +95,10 @@ class SINEW_OT_compare(bpy.types.Operator):
         except SinewError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        viewport = _viewport(context)
+        if viewport is not None and viewport.local_view is not None:
+            for copy in comparison_state.copies_of(comparison_state.of_scene(context.scene)):
+                copy.local_view_set(viewport, True)
         for problem in problems:
             self.report({"WARNING"}, problem)
         return {"FINISHED"}

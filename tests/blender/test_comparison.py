@@ -471,6 +471,31 @@ def test_clothes_stand_with_their_body():
     assert set(operators.targets(bpy.context)) == {body, shirt, hidden}
 
 
+def test_eyes_on_a_bone_stand_with_their_body():
+    body, armature = scenes.make_arm()
+    eye = bpy.data.objects.new("Eye", body.data.copy())
+    holder = bpy.data.objects.new("Holder", None)
+    for obj in (eye, holder):
+        bpy.context.scene.collection.objects.link(obj)
+    eye.parent = holder
+    holder.parent, holder.parent_type, holder.parent_bone = armature, "BONE", "bone.1"
+    before = content()
+    compare(body, {"lbs", "dq"})
+    for frame in (1, 11):
+        bpy.context.scene.frame_set(frame)
+        assert set(copies(eye)) == {"lbs", "dq"}
+        for place, copy in enumerate(copies(eye).values(), 1):
+            moved = evaluate.world_points([copy]) - evaluate.world_points([eye])
+            assert np.allclose(moved, (place * state().spacing, 0.0, 0.0), atol=1e-5)
+    bpy.context.scene.frame_set(1)
+    assert_ends_without_trace(before)
+    # An armature that deforms nothing has no character.
+    delete(body)
+    bpy.context.view_layer.objects.active = armature
+    with pytest.raises(RuntimeError, match="deforms no mesh"):
+        bpy.ops.sinew.compare()
+
+
 def test_overlay_and_flip():
     obj, _armature = scenes.make_arm()
     compare(obj, {"lbs", "qv", "dq"})
