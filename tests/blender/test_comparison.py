@@ -425,7 +425,9 @@ def test_the_original_is_deleted(driven):
     assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
     changed = whole_file.differences(before, content())
     # Deleting what Sinew drives leaves its node group, unused; ending the comparison takes that away, too.
-    assert [line for line in changed if not line.startswith("gone: node_groups[Sinew]")] == []
+    # What is selected of a mesh made by a script is chance (5.0).
+    others = [line for line in changed if ".select:" not in line]
+    assert [line for line in others if not line.startswith("gone: node_groups[Sinew]")] == []
 
 
 def test_keys_of_the_method_are_the_originals_own():
