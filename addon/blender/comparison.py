@@ -109,8 +109,9 @@ def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Obje
 
 
 def is_on() -> bool:
-    """Whether any scene shows a comparison."""
-    return any(comparison_state.of_scene(scene) is not None for scene in bpy.data.scenes)
+    """Whether any scene of the file itself shows a comparison."""
+    scenes = [scene for scene in bpy.data.scenes if scene.library is None]
+    return any(comparison_state.of_scene(scene) is not None for scene in scenes)
 
 
 def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]:
@@ -121,15 +122,15 @@ def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]
 
 def end(context: bpy.types.Context) -> None:
     """Takes away all that any comparison made in the open file, whatever became of it since."""
+    copies = [obj for obj in bpy.data.objects if properties.is_copy(obj) and obj.library is None]
+    if not is_on() and not copies:
+        return
     collections = []
     for scene in bpy.data.scenes:
         state = comparison_state.of_scene(scene)
         if state is not None and scene.library is None:
             collections += [(scene, state.collection)] if state.collection is not None else []
             scene.property_unset("sinew_comparison")
-    copies = [obj for obj in bpy.data.objects if properties.is_copy(obj) and obj.library is None]
-    if not collections and not copies:
-        return
     compared = {properties.of(copy).copied for copy in copies} - {None}
     _remove_copies(copies)
     for scene, collection in collections:

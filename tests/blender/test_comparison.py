@@ -385,10 +385,15 @@ def test_copies_that_the_artist_deletes_renames_and_moves(set_up):
     assert_ends_without_trace(before)
 
 
-def test_the_comparison_after_its_collection_was_deleted():
-    obj, _armature = scenes.make_arm()
+@pytest.mark.parametrize("copies_too", [False, True], ids=["collection", "copies"])
+def test_the_comparison_after_its_collection_was_deleted(copies_too):
+    obj, armature = scenes.make_arm()
+    mirrored_in_front(obj, armature)
+    bpy.context.scene.frame_set(1)
     before = content()
     compare(obj)
+    if copies_too:
+        delete(*copies(obj).values())
     bpy.data.collections.remove(state().collection)
     bpy.context.scene.frame_set(5)
     bpy.context.scene.frame_set(1)
