@@ -54,4 +54,4 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
 def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
     """Whether keys or drivers decide when a modifier is on."""
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
-    return any(path.startswith(start) for path in animated_paths(obj))
+    return not animated_paths(obj).isdisjoint((f"{start}viewport", f"{start}render"))

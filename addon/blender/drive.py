@@ -27,12 +27,14 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of `objects` that are meshes deformed by an armature, or driven by Sinew."""
+    """Those of `objects` that are meshes deformed by an armature, or driven by Sinew; a comparison's copies
+    are none."""
     return [
         o
         for o in objects
         if o.type == "MESH"
         and not properties.is_helper(o)
+        and not properties.is_copy(o)
         and (properties.is_driven(o) or armature_of(o) is not None)
     ]
 
@@ -76,7 +78,9 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
     nodes = obj.modifiers.new("Sinew", "NODES")
     nodes.show_expanded = False
     nodes.show_in_editmode = False
-    obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(run[0]))
+    # Not the last one where the artist pinned others to the end.
+    modifiers = list(obj.modifiers)
+    obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[0]))
     if active is not None:
         obj.modifiers.active = active
     settings.had_animation = obj.animation_data is not None
@@ -97,7 +101,7 @@ def _method_of(modifier: bpy.types.ArmatureModifier) -> str:
 def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
     """Turns what the parent type Armature does, which no modifier in the stack shows, into a modifier."""
     modifier = obj.modifiers.new("Armature", "ARMATURE")
-    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
     modifier.object = obj.parent
     modifier.use_bone_envelopes = True
     properties.of(obj).parent_type = obj.parent_type

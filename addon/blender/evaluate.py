@@ -58,6 +58,9 @@ def show(meshes: list[bpy.types.Object]) -> None:
         obj.hide_render = False
         if obj.name in bpy.context.view_layer.objects:
             obj.hide_set(False)
+    # Their collection is shown with all others.
+    for copy in filter(properties.is_copy, bpy.context.scene.objects):
+        copy.hide_viewport = copy.hide_render = True
 
 
 @contextmanager

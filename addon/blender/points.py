@@ -19,7 +19,9 @@ def arrange(obj: bpy.types.Object) -> None:
     """
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
     made = front.ensure(obj)
-    if made is not None or not obj.data.is_editable:
+    # Points in an attribute of the mesh would make Blender evaluate again all that share it, and a comparison
+    # is to leave nothing in it.
+    if made is not None or not obj.data.is_editable or properties.is_copy(obj):
         if settings.attribute:
             remove_attributes(obj)
             settings.attribute = ""

@@ -70,9 +70,11 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     if curve is not None:
         if curve.data_path == path and _reads(curve.driver, variables):
             return
-        obj.animation_data.drivers.remove(curve)
+        _take_off(obj, curve)
     driver = obj.driver_add(path).driver
     driver.type = "SUM"
+    # Else it is what the property was just now, and differs from one time to the next.
+    driver.expression = ""
     for number, variable in enumerate(variables):
         variable.add_to(driver, f"{_PREFIX}{number}")
 
@@ -87,8 +89,14 @@ def remove(obj: bpy.types.Object) -> None:
     """Takes the driver off, and the animation data where it was all of it."""
     curve = _find(obj)
     if curve is not None:
-        obj.animation_data.drivers.remove(curve)
+        _take_off(obj, curve)
         remove_empty_animation(obj)
+
+
+def _take_off(obj: bpy.types.Object, curve: bpy.types.FCurve) -> None:
+    obj.animation_data.drivers.remove(curve)
+    # Blender has written its value there.
+    properties.of(obj).property_unset("pose")
 
 
 def remove_empty_animation(obj: bpy.types.Object) -> None:

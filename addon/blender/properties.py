@@ -134,6 +134,14 @@ class SinewSettings(bpy.types.PropertyGroup):
     helper: bpy.props.BoolProperty(
         description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
     )
+    copied: bpy.props.PointerProperty(
+        description="The object that this one is a comparison's copy of",
+        type=bpy.types.Object,
+        options={"HIDDEN"},
+    )
+    copied_for: bpy.props.StringProperty(
+        description="The method that this copy is there to show; empty for all but copies", options={"HIDDEN"}
+    )
     had_animation: bpy.props.BoolProperty(
         description="The object had animation data, be it empty, before Sinew",
         options={"HIDDEN"},
@@ -172,6 +180,11 @@ def is_driven(obj: bpy.types.Object) -> bool:
 def is_helper(obj: bpy.types.Object) -> bool:
     """Whether Sinew made this object for another one."""
     return obj.is_property_set("sinew") and obj.sinew.helper
+
+
+def is_copy(obj: bpy.types.Object) -> bool:
+    """Whether a comparison made this object, to show a method beside the original."""
+    return obj.is_property_set("sinew") and bool(obj.sinew.copied_for)
 
 
 def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:

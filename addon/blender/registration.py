@@ -20,9 +20,22 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from . import handlers, inbetween_handlers, operators, panels, properties
+    from . import (
+        comparison_labels,
+        comparison_operators,
+        comparison_panel,
+        comparison_state,
+        handlers,
+        inbetween_handlers,
+        operators,
+        panels,
+        properties,
+    )
 
     _register_classes((*properties.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes((*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES))
+    bpy.types.Scene.sinew_comparison = bpy.props.PointerProperty(type=comparison_state.SinewComparison)
+    comparison_labels.register()
     bpy.types.Object.sinew = bpy.props.PointerProperty(
         type=properties.SinewSettings, override=properties.OVERRIDABLE
     )
@@ -42,9 +55,10 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import drive, handlers, inbetween_handlers, properties
+        from . import comparison_labels, drive, handlers, inbetween_handlers, properties
 
         atexit.unregister(unregister)
+        comparison_labels.unregister()
         # As in a saved file: the last shape stays, and the Armature modifiers point to their armatures again.
         for obj in bpy.data.objects:
             if properties.is_driven(obj):
@@ -53,6 +67,7 @@ def unregister() -> None:
         handlers.unregister()
         inbetween_handlers.unregister()
         del bpy.types.Object.sinew, bpy.types.Mesh.sinew_asked, bpy.types.Action.sinew_holds
+        del bpy.types.Scene.sinew_comparison
         for name in properties.INBETWEEN:
             delattr(bpy.types.Object, name)
     while _registered:

@@ -17,7 +17,7 @@ from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.output import remove
 from ..core.views import seen_extent, whole_view
-from . import bake_copy, drive, evaluate, files, handlers, properties, render, stack
+from . import bake_copy, comparison, drive, evaluate, files, handlers, properties, render, stack
 
 PICTURE_SIZE = 360
 # Frames that a comparison looks at where none are named.
@@ -94,6 +94,7 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
         files.open_file(source, load_ui=True)
     notes = _notes_on_file()
     with clock.doing("restoring"):
+        comparison.end(bpy.context)
         driven = [obj for obj in bpy.data.objects if properties.is_driven(obj) and _is_meant(obj, settings)]
         meshes, left_out = [], []
         for obj in driven:

@@ -139,40 +139,55 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
     assert not bpy.data.objects["Arm"].sinew.error
 
 
-def test_a_whole_blender_with_its_window(package, tmp_path, real_rig):
-    """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
+@pytest.fixture
+def photographed(package, tmp_path, real_rig):
+    """photographed(script): the facts that a script of docs/ prints from a Blender with a window that has
+    Sinew's zip and human.blend; its picture is tmp_path / "picture.png"."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     if not program:
         pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
     if bpy.app.version < (5, 2):
         pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
-    # The whole Blender sees the temporary folder, not this checkout's neighbours.
-    shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
-    shutil.copy(package, tmp_path / "sinew.zip")
-    shutil.copy(REPOSITORY / "docs" / "photograph_panel.py", tmp_path / "photograph_panel.py")
-    result = subprocess.run(
-        [
-            program,
-            "run",
-            "--factory-startup",
-            "--python-exit-code",
-            "3",
-            "human.blend",
-            "--python",
-            "photograph_panel.py",
-            "--",
-            "sinew.zip",
-            "panel.png",
-        ],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=400,
-        check=False,
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
-    )
-    assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
-    facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
+
+    def run(script: str) -> dict[str, object]:
+        # The whole Blender sees the temporary folder, not this checkout's neighbours.
+        shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
+        shutil.copy(package, tmp_path / "sinew.zip")
+        for name in (script, "window.py"):
+            shutil.copy(REPOSITORY / "docs" / name, tmp_path / name)
+        start = [program, "run", "--factory-startup", "--python-exit-code", "3", "human.blend"]
+        result = subprocess.run(
+            [*start, "--python", script, "--", "sinew.zip", "picture.png"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=400,
+            check=False,
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+        )
+        assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
+        assert (tmp_path / "picture.png").stat().st_size > 20_000
+        lines = [line for line in result.stdout.splitlines() if line.startswith("FACTS ")]
+        assert lines, result.stdout + result.stderr
+        return json.loads(lines[0][6:])
+
+    return run
+
+
+def test_the_panel_in_a_window(photographed):
+    """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
+    facts = photographed("photograph_panel.py")
     assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
     assert facts["error"] == ""
-    assert (tmp_path / "panel.png").stat().st_size > 20_000
+
+
+def test_a_comparison_in_a_window(photographed):
+    """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
+    facts = photographed("photograph_comparison.py")
+    assert facts["played"]
+    assert facts["posed"] > 0.01
+    for when in ("played", "posed", "overlaid", "after undo", "reopened"):
+        assert facts[f"worst {when}"] <= 1e-6 * facts["diagonal"], when
+    assert facts["flipped"] == [["lbs"], ["dq"], ["lbs"]]
+    assert facts["after undo"] == ["dq", "lbs", "qv"]
+    assert facts["left"] == []

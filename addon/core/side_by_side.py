@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where copies of a character stand beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Room between two characters, as a part of a character's width.
+GAP = 0.12
+
+
+def row_axis(right: np.ndarray) -> np.ndarray:
+    """float64 [3]: of the world's horizontal axes, in both directions, the one nearest to `right` [3], which
+    points to the right of the screen; +X where that is vertical."""
+    axis = np.zeros(3)
+    nearest = int(np.abs(right[:2]).argmax())
+    axis[nearest] = -1.0 if right[nearest] < 0.0 else 1.0
+    return axis
+
+
+def spacing(points: np.ndarray, axis: np.ndarray) -> float:
+    """From one character to the next along `axis` [3]; 1 where they have no width there.
+
+    points  [n, 3], n > 0, that bound the character
+    """
+    width = float(np.ptp(points @ axis))
+    return (1.0 + GAP) * width if width > 0.0 else 1.0

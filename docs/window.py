@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the scripts that photograph Blender's window share: installing Sinew, clicks, steps between redraws.
+
+They run under an X server of their own; the photograph is of the whole screen, by xwd and netpbm.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+import addon_utils
+import bpy
+import numpy as np
+
+
+def arguments() -> list[Path]:
+    """Those behind --."""
+    return [Path(argument).resolve() for argument in sys.argv[sys.argv.index("--") + 1 :]]
+
+
+def install(package: Path) -> None:
+    addon_utils.enable("bl_pkg")
+    bpy.ops.extensions.package_install_files(
+        filepath=str(package), repo="user_default", enable_on_install=True
+    )
+
+
+def final_points(obj: bpy.types.Object) -> np.ndarray:
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    return points
+
+
+def in_view3d(region_type: str = "UI"):
+    """The context of a click in a region of the 3D view; the sidebar's by default."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == region_type)
+    return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def select_only(obj: bpy.types.Object) -> None:
+    with in_view3d():
+        bpy.ops.object.select_all(action="DESELECT")
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
+def open_sidebar() -> None:
+    with in_view3d():
+        bpy.context.space_data.show_region_ui = True
+        bpy.context.space_data.overlay.show_bones = False
+
+
+def choose_tab() -> None:
+    """Only once the sidebar was drawn: before, it has no tabs."""
+    with in_view3d():
+        bpy.context.region.active_panel_category = "Sinew"
+
+
+def photograph(picture: Path) -> None:
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
+    subprocess.run(f"xwd -root -silent | xwdtopnm | pnmtopng > '{picture}'", shell=True, check=True)
+    print("PHOTOGRAPHED", flush=True)
+
+
+def run(steps: Iterator[None]) -> None:
+    """One step a timer's tick, so that the window redraws and plays between them; then Blender ends."""
+
+    def tick() -> float | None:
+        try:
+            next(steps)
+        except StopIteration:
+            bpy.ops.wm.quit_blender()
+            return None
+        except BaseException:
+            traceback.print_exc()
+            sys.stderr.flush()
+            bpy.ops.wm.quit_blender()
+            return None
+        return 1.0
+
+    bpy.context.preferences.view.show_splash = False
+    bpy.app.timers.register(tick, first_interval=2.0, persistent=True)

@@ -1,0 +1,691 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compare in the viewport: copies show what each method makes of the original, and nothing of them stays."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import sinew_addon
+import test_restore
+import whole_file
+from conftest import BLEND_FILES
+from program import run_sinew
+from sinew_addon.blender import (
+    comparison_labels,
+    comparison_state,
+    drive,
+    evaluate,
+    files,
+    handlers,
+    operators,
+    properties,
+)
+
+METHODS = evaluate.method_names()
+# The copies' coordinates are larger than the original's by the offset.
+TOLERANCE = 1e-6
+
+
+def compare(obj: bpy.types.Object, methods: set[str] | None = None) -> comparison_state.SinewComparison:
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other == obj)
+    bpy.context.view_layer.objects.active = obj
+    assert bpy.ops.sinew.compare(methods=methods or set(METHODS)) == {"FINISHED"}
+    return state()
+
+
+def state() -> comparison_state.SinewComparison:
+    return comparison_state.of_scene(bpy.context.scene)
+
+
+def copies(obj: bpy.types.Object) -> dict[str, bpy.types.Object]:
+    """By method, those of one object."""
+    return {
+        properties.of(copy).copied_for: copy
+        for copy in comparison_state.copies_of(state())
+        if properties.of(copy).copied == obj
+    }
+
+
+def without_offset(copy: bpy.types.Object, place: int) -> np.ndarray:
+    """A copy's final points as if it stood where the original does, object space."""
+    matrix = np.array(copy.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    offset = place * state().spacing * np.array(state().axis)
+    return scenes.final_points(copy) - np.linalg.solve(matrix[:3, :3], offset)
+
+
+def assert_copies_show(obj: bpy.types.Object, frames: list[int], expected: dict[str, np.ndarray]) -> None:
+    for number, frame in enumerate(frames):
+        bpy.context.scene.frame_set(frame)
+        for place, (method, copy) in enumerate(copies(obj).items(), start=1):
+            assert properties.of(copy).error == ""
+            got = without_offset(copy, place)
+            size = scenes.diagonal(obj)
+            if copy.modifiers[-1].type == "SUBSURF":
+                # It rounds at the copy's place.
+                size += place * state().spacing
+            assert scenes.worst(got, expected[method][number]) <= TOLERANCE * size, method
+
+
+def shapes_of_methods(obj: bpy.types.Object, frames: list[int]) -> dict[str, np.ndarray]:
+    """What Sinew makes of the object itself; afterwards it is as it was."""
+    driven, method = (
+        properties.is_driven(obj),
+        properties.of(obj).method if obj.is_property_set("sinew") else "",
+    )
+    found = {evaluate.BLENDER: scenes.shapes(obj, frames)} if not driven else {}
+    for name in METHODS[:-1]:
+        evaluate.use_method(obj, name)
+        found[name] = scenes.shapes(obj, frames)
+    if driven:
+        evaluate.use_method(obj, evaluate.BLENDER)
+        found[evaluate.BLENDER] = scenes.shapes(obj, frames)
+        evaluate.use_method(obj, method)
+    else:
+        drive.remove(obj)
+    return found
+
+
+def assert_compared(obj: bpy.types.Object, frames: list[int]) -> None:
+    expected = shapes_of_methods(obj, frames)
+    before = scenes.shapes(obj, frames)
+    compare(obj)
+    assert list(copies(obj)) == METHODS
+    assert_copies_show(obj, frames, expected)
+    assert np.array_equal(scenes.shapes(obj, frames), before)
+
+
+def content() -> dict[str, object]:
+    # Evaluating fills in bounds and caches, and Blender 5.2 unfolds attributes of one value as they are read.
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+    for obj in bpy.data.objects:
+        # The mesh itself has the points that it is saved with.
+        handlers.keep_shown(obj)
+    whole_file.of_open_file()
+    return whole_file.of_open_file()
+
+
+def assert_ends_without_trace(before: dict[str, object]) -> None:
+    assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
+    assert whole_file.differences(before, content()) == []
+
+
+@pytest.mark.parametrize("path", BLEND_FILES, ids=lambda path: path.stem)
+def test_samples(path):
+    files.open_file(path)
+    (obj,) = (o for o in bpy.data.objects if drive.armature_of(o) is not None)
+    assert_compared(obj, [1, 12, 24])
+
+
+def test_a_real_character(real_rig):
+    files.open_file(real_rig("human.blend"))
+    obj = bpy.data.objects["Human"]
+    bpy.context.scene.frame_set(1)
+    assert_compared(obj, [1, 16, 30])
+
+
+def plain(_obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    pass
+
+
+def turned_and_scaled(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    obj.rotation_euler, obj.scale, obj.location = (0.3, 0.5, 1.0), (1.0, 2.0, 0.5), (3.0, 1.0, 2.0)
+    armature.rotation_euler, armature.scale = (1.0, 0.2, 0.0), (0.7, 0.7, 0.7)
+
+
+def moving(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    obj.parent = armature
+    for frame, turn in ((1, 0.0), (11, 2.0)):
+        armature.rotation_euler = (0.0, turn, turn)
+        armature.location = (turn, 0.0, 0.0)
+        armature.keyframe_insert("rotation_euler", frame=frame)
+        armature.keyframe_insert("location", frame=frame)
+
+
+def subdivided_behind(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.modifiers.new("Behind", "SUBSURF")
+    cast = obj.modifiers.new("Pinned", "CAST")
+    cast.factor, cast.use_pin_to_last = 0.2, True
+
+
+def subdivided_last(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.modifiers.new("Cast", "CAST").factor = 0.2
+    obj.modifiers.new("Last", "SUBSURF")
+
+
+def subdivided_last_and_pinned(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.modifiers.new("Cast", "CAST").factor = 0.2
+    obj.modifiers.new("Last", "SUBSURF").use_pin_to_last = True
+
+
+def mirrored_in_front(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.modifiers.new("Front", "MIRROR").use_axis = (False, False, True)
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def with_shape_keys(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    obj.shape_key_add(name="Basis")
+    block = obj.shape_key_add(name="Fat")
+    for point in block.data:
+        point.co *= 1.3
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        block.value = value
+        block.keyframe_insert("value", frame=frame)
+
+
+def parent_deforms(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    obj.modifiers.clear()
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+
+
+def two_modifiers(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+    second = obj.modifiers.new("Multi", "ARMATURE")
+    second.object, second.use_multi_modifier, second.vertex_group = armature, True, "bone.1"
+
+
+def shared_mesh(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
+    twin = obj.copy()
+    bpy.context.scene.collection.objects.link(twin)
+
+
+SETUPS = [
+    plain,
+    turned_and_scaled,
+    moving,
+    subdivided_behind,
+    subdivided_last,
+    subdivided_last_and_pinned,
+    mirrored_in_front,
+    with_shape_keys,
+    parent_deforms,
+    two_modifiers,
+    shared_mesh,
+]
+
+
+@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("set_up", SETUPS, ids=lambda f: f.__name__)
+def test_rigs(set_up, driven):
+    obj, armature = scenes.make_arm(sides=8, rings=11)
+    set_up(obj, armature)
+    if driven:
+        scenes.add_sinew(obj, "dq")
+        properties.of(obj).scale_rule = "3.x"
+        bpy.context.scene.frame_set(1)
+    bpy.context.scene.frame_set(2)
+    expected = shapes_of_methods(obj, [1, 6, 11])
+    bpy.context.scene.frame_set(2)
+    before = content()
+    compare(obj)
+    assert_copies_show(obj, [1, 6, 11], expected)
+    bpy.context.scene.frame_set(2)
+    assert_ends_without_trace(before)
+
+
+def test_posing_by_hand():
+    obj, armature = scenes.make_arm()
+    scenes.forget_keys(armature)
+    compare(obj)
+    for degrees in (40.0, 130.0):
+        scenes.bend(armature, degrees)
+        bpy.context.view_layer.update()
+        got = {
+            method: without_offset(copy, place) for place, (method, copy) in enumerate(copies(obj).items(), 1)
+        }
+        lbs = scenes.final_points(obj)
+        assert scenes.worst(got["lbs"], lbs) <= scenes.TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(got[evaluate.BLENDER], lbs) <= TOLERANCE * scenes.diagonal(obj)
+        obj.modifiers["Armature"].use_deform_preserve_volume = True
+        dq = scenes.final_points(obj)
+        obj.modifiers["Armature"].use_deform_preserve_volume = False
+        assert scenes.worst(got["dq"], dq) <= scenes.TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(lbs, dq) > 0.01
+
+
+def test_a_full_scene_is_as_it_was(tmp_path):
+    """One comparison after the other, each of another kind of rig, then the end of the last."""
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+    files.open_file(test_restore.full_scene(tmp_path), load_ui=True)
+    scene = bpy.context.scene
+    characters = [
+        obj
+        for obj in bpy.context.view_layer.objects
+        if obj.type == "MESH" and drive.armature_of(obj) is not None and obj.visible_get()
+    ]
+    assert len(characters) >= 7
+    scene.frame_set(3)
+    chosen = (list(bpy.context.selected_objects), bpy.context.view_layer.objects.active)
+    before = content()
+    for obj in characters:
+        compare(obj)
+        scene.frame_set(8)
+        assert list(copies(obj)) == METHODS
+        assert not any(properties.of(copy).error for copy in copies(obj).values())
+    scene.frame_set(3)
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in chosen[0])
+    bpy.context.view_layer.objects.active = chosen[1]
+    assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
+    changed = whole_file.differences(before, content())
+    # A copy of an override that is made local leaves a count of users, of this session, to the reference.
+    assert [line for line in changed if not line.startswith("objects[Bare [props.blend]]")] == []
+
+
+@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("set_up", [plain, mirrored_in_front], ids=lambda f: f.__name__)
+def test_save_and_reopen(tmp_path, set_up, driven):
+    obj, armature = scenes.make_arm()
+    set_up(obj, armature)
+    if driven:
+        scenes.add_sinew(obj, "qv")
+    expected = shapes_of_methods(obj, [1, 6, 11])
+    bpy.context.scene.frame_set(4)
+    original = test_restore.save(tmp_path / "before.blend")
+    compare(obj)
+    bpy.ops.sinew.flip_comparison()
+    compared = test_restore.save(tmp_path / "compared.blend")
+    assert properties.of(copies(obj)["dq"]).error == ""
+    files.open_file(original)
+    before = content()
+    files.open_file(compared)
+    assert state().arrangement == comparison_state.ONE_OF_TWO
+    state().arrangement = comparison_state.SIDE_BY_SIDE
+    assert_copies_show(bpy.data.objects["Arm"], [1, 6, 11], expected)
+    bpy.context.scene.frame_set(4)
+    bpy.ops.sinew.end_comparison()
+    test_restore.save(tmp_path / "ended.blend")
+    files.open_file(tmp_path / "ended.blend")
+    assert whole_file.differences(before, content()) == []
+
+
+def test_undo_and_redo():
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+    obj, _armature = scenes.make_arm()
+    expected = shapes_of_methods(obj, [6])
+    bpy.context.scene.frame_set(6)
+    bpy.ops.ed.undo_push(message="start")
+    bpy.ops.ed.undo_push(message="nothing")
+    # What undo does by itself.
+    bpy.ops.ed.undo()
+    obj = bpy.data.objects["Arm"]
+    before = content()
+    compare(obj, {"lbs", "dq"})
+    bpy.ops.ed.undo_push(message="compare")
+    compare(obj, {"qv"})
+    bpy.ops.ed.undo_push(message="other methods")
+    bpy.ops.sinew.end_comparison()
+    bpy.ops.ed.undo_push(message="end")
+    bpy.ops.ed.undo()
+    assert list(copies(bpy.data.objects["Arm"])) == ["qv"]
+    bpy.ops.ed.undo()
+    obj = bpy.data.objects["Arm"]
+    assert list(copies(obj)) == ["lbs", "dq"]
+    assert_copies_show(obj, [6], expected)
+    bpy.ops.ed.undo()
+    assert state() is None
+    assert whole_file.differences(before, content()) == []
+    bpy.ops.ed.redo()
+    obj = bpy.data.objects["Arm"]
+    assert_copies_show(obj, [6], expected)
+    assert_ends_without_trace(before)
+
+
+def test_other_methods_replace_the_copies():
+    obj, _armature = scenes.make_arm()
+    before = content()
+    compare(obj, {"dq"})
+    assert bpy.ops.sinew.compare(methods={"lbs", "qv"}) == {"FINISHED"}
+    assert list(copies(obj)) == ["lbs", "qv"]
+    assert (state().first, state().second) == ("lbs", "qv")
+    state().arrangement = comparison_state.OVERLAID
+    # Nothing is selected: what is compared already.
+    obj.select_set(False)
+    bpy.context.view_layer.objects.active = None
+    assert bpy.ops.sinew.compare(methods={"blender"}) == {"FINISHED"}
+    assert list(copies(obj)) == ["blender"]
+    assert (state().first, state().second) == ("blender", "blender")
+    assert state().arrangement == comparison_state.OVERLAID
+    assert scenes.worst(without_offset(copies(obj)["blender"], 1), scenes.final_points(obj)) <= 1e-6
+    compare(obj)
+    assert (state().first, state().second) == ("lbs", "dq")
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    assert_ends_without_trace(before)
+
+
+def test_a_comparison_replaces_that_of_another_character():
+    obj, _armature = scenes.make_arm()
+    other, _armature = scenes.make_arm(name="Other")
+    compare(obj, {"dq"})
+    compare(other, {"dq"})
+    assert not copies(obj)
+    assert list(copies(other)) == ["dq"]
+
+
+def delete(*objects: bpy.types.Object) -> None:
+    """As the artist does."""
+    with bpy.context.temp_override(selected_objects=list(objects)):
+        assert bpy.ops.object.delete() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("set_up", [plain, mirrored_in_front], ids=lambda f: f.__name__)
+def test_copies_that_the_artist_deletes_renames_and_moves(set_up):
+    obj, armature = scenes.make_arm()
+    set_up(obj, armature)
+    bpy.context.scene.frame_set(1)
+    before = content()
+    compare(obj)
+    lbs, qv, dq = (copies(obj)[name] for name in ("lbs", "qv", "dq"))
+    delete(lbs)
+    qv.name = "My favourite"
+    bpy.context.scene.collection.objects.link(dq)
+    state().collection.objects.unlink(dq)
+    state().collection.name = "Mine"
+    bpy.context.scene.frame_set(11)
+    assert comparison_state.methods_of(state()) == ["qv", "blender"]
+    bpy.context.scene.frame_set(1)
+    assert_ends_without_trace(before)
+
+
+@pytest.mark.parametrize("copies_too", [False, True], ids=["collection", "copies"])
+def test_the_comparison_after_its_collection_was_deleted(copies_too):
+    obj, armature = scenes.make_arm()
+    mirrored_in_front(obj, armature)
+    bpy.context.scene.frame_set(1)
+    before = content()
+    compare(obj)
+    if copies_too:
+        delete(*copies(obj).values())
+    bpy.data.collections.remove(state().collection)
+    bpy.context.scene.frame_set(5)
+    bpy.context.scene.frame_set(1)
+    assert comparison_labels.labels(bpy.context) == []
+    assert_ends_without_trace(before)
+
+
+def test_what_the_artist_put_into_the_collection_stays():
+    obj, _armature = scenes.make_arm()
+    compare(obj)
+    lamp = bpy.data.objects.new("Lamp", None)
+    state().collection.objects.link(lamp)
+    bpy.ops.sinew.end_comparison()
+    assert list(lamp.users_collection) == [bpy.context.scene.collection]
+
+
+@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+def test_the_original_is_deleted(tmp_path, driven):
+    obj, _armature = scenes.make_arm()
+    if driven:
+        scenes.add_sinew(obj, "dq")
+    path = test_restore.save(tmp_path / "arm.blend")
+
+    def opened() -> bpy.types.Object:
+        files.open_file(path)
+        return bpy.data.objects["Arm"]
+
+    delete(opened())
+    before = content()
+    obj = opened()
+    compare(obj)
+    delete(obj)
+    bpy.context.scene.frame_set(5)
+    bpy.context.scene.frame_set(1)
+    assert len(comparison_state.copies_of(state())) == len(METHODS)
+    assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
+    changed = whole_file.differences(before, content())
+    # Deleting what Sinew drives leaves its node group, unused; ending the comparison takes that away, too.
+    assert [line for line in changed if not line.startswith("gone: node_groups[Sinew]")] == []
+
+
+def test_keys_of_the_method_are_the_originals_own():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    obj.keyframe_insert("sinew.method", frame=1)
+    properties.of(obj).method = "lbs"
+    obj.keyframe_insert("sinew.method", frame=5)
+    obj.keyframe_insert('modifiers["Armature"].show_expanded', frame=5)
+    bpy.context.scene.frame_set(1)
+    before = content()
+    compare(obj, {"qv", "dq"})
+    bpy.context.scene.frame_set(11)
+    got = without_offset(copies(obj)["dq"], 2)
+    bpy.context.scene.frame_set(1)
+    assert_ends_without_trace(before)
+    drive.remove(obj)
+    dq = scenes.modifier_shapes(obj, [11], preserve_volume=True)[0]
+    assert scenes.worst(got, dq) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_clothes_stand_with_their_body():
+    body, armature = scenes.make_arm()
+    shirt = body.copy()
+    shirt.data, shirt.name = body.data.copy(), "Shirt"
+    bpy.context.scene.collection.objects.link(shirt)
+    hidden = body.copy()
+    bpy.context.scene.collection.objects.link(hidden)
+    hidden.hide_set(True)
+    other, _other_armature = scenes.make_arm(name="Other")
+    shirt.location.x = 3.0
+    compare(shirt, {"lbs", "dq"})
+    assert set(copies(body)) == set(copies(shirt)) == {"lbs", "dq"}
+    assert not copies(hidden)
+    assert not copies(other)
+    assert state().spacing > 5.0
+    for place, method in enumerate(("lbs", "dq"), 1):
+        for obj in (body, shirt):
+            moved = scenes.final_points(copies(obj)[method]) - scenes.final_points(obj)
+            assert np.allclose(moved, (place * state().spacing, 0.0, 0.0), atol=1e-5)
+    # Under an armature too, copies are nobody's characters.
+    compare(armature, {"dq"})
+    assert set(operators.targets(bpy.context)) == {body, shirt, hidden}
+
+
+def test_eyes_on_a_bone_stand_with_their_body():
+    body, armature = scenes.make_arm()
+    eye = bpy.data.objects.new("Eye", body.data.copy())
+    holder = bpy.data.objects.new("Holder", None)
+    for obj in (eye, holder):
+        bpy.context.scene.collection.objects.link(obj)
+    eye.parent = holder
+    holder.parent, holder.parent_type, holder.parent_bone = armature, "BONE", "bone.1"
+    before = content()
+    compare(body, {"lbs", "dq"})
+    for frame in (1, 11):
+        bpy.context.scene.frame_set(frame)
+        assert set(copies(eye)) == {"lbs", "dq"}
+        for place, copy in enumerate(copies(eye).values(), 1):
+            moved = evaluate.world_points([copy]) - evaluate.world_points([eye])
+            assert np.allclose(moved, (place * state().spacing, 0.0, 0.0), atol=1e-5)
+    bpy.context.scene.frame_set(1)
+    assert_ends_without_trace(before)
+    # An armature that deforms nothing has no character.
+    delete(body)
+    bpy.context.view_layer.objects.active = armature
+    with pytest.raises(RuntimeError, match="deforms no mesh"):
+        bpy.ops.sinew.compare()
+
+
+def test_overlay_and_flip():
+    obj, _armature = scenes.make_arm()
+    compare(obj, {"lbs", "qv", "dq"})
+    lbs, qv, dq = copies(obj).values()
+    state().arrangement = comparison_state.OVERLAID
+    assert all(copy.visible_get() for copy in (lbs, qv, dq))
+    for copy in (lbs, qv, dq):
+        assert scenes.worst(without_offset(copy, 1), scenes.final_points(obj)) <= scenes.TOLERANCE * 2
+    bpy.ops.sinew.flip_comparison()
+    assert [copy.visible_get() for copy in (lbs, qv, dq)] == [True, False, False]
+    bpy.ops.sinew.flip_comparison()
+    assert [copy.visible_get() for copy in (lbs, qv, dq)] == [False, False, True]
+    bpy.context.scene.frame_set(11)
+    turned = without_offset(dq, 1)
+    state().second = "qv"
+    assert [copy.visible_get() for copy in (lbs, qv, dq)] == [False, True, False]
+    assert scenes.worst(without_offset(qv, 1), turned) > 0.01
+    # One that was hidden while the frame changed.
+    bpy.ops.sinew.flip_comparison()
+    assert [copy.visible_get() for copy in (lbs, qv, dq)] == [True, False, False]
+    assert scenes.worst(without_offset(lbs, 1), scenes.final_points(obj)) <= scenes.TOLERANCE * 2
+    state().arrangement = comparison_state.SIDE_BY_SIDE
+    assert all(copy.visible_get() for copy in (lbs, qv, dq))
+    state().spacing = 7.0
+    assert scenes.worst(without_offset(dq, 3), turned) <= 1e-5
+    assert obj.visible_get()
+
+
+def test_labels_stand_over_the_characters():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "qv")
+    compare(obj, {"lbs", "dq"})
+    bpy.context.scene.frame_set(11)
+    with bpy.context.temp_override(scene=bpy.context.scene):
+        found = comparison_labels.labels(bpy.context)
+    names = [text for text, _colour, _place in found]
+    assert names == ["Original: Quaternion-Vector", "Linear Blend", "Dual Quaternion"]
+    for (_text, _colour, place), shown in zip(found, (obj, *copies(obj).values()), strict=True):
+        points = evaluate.world_points([shown])
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        assert np.allclose(place, (*middle[:2], points[:, 2].max()), atol=1e-4)
+
+
+def evaluations_of_compare(methods: set[str]) -> int:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj, _armature = scenes.make_arm()
+    mirrored_in_front(obj, _armature)
+    bpy.context.view_layer.update()
+    count = []
+
+    def counting(*_args: object) -> None:
+        count.append(1)
+
+    bpy.app.handlers.depsgraph_update_pre.append(counting)
+    try:
+        compare(obj, methods)
+    finally:
+        bpy.app.handlers.depsgraph_update_pre.remove(counting)
+    return len(count)
+
+
+def test_methods_cost_no_evaluation_each():
+    assert evaluations_of_compare(set(METHODS)) == evaluations_of_compare({"dq"})
+
+
+def test_the_copies_are_not_rendered_unless_asked_for():
+    obj, _armature = scenes.make_arm()
+    compare(obj, {"dq"})
+    assert state().collection.hide_render
+    assert all(copy.hide_select for copy in copies(obj).values())
+
+
+def test_simulations_stay_with_the_original():
+    obj, _armature = scenes.make_arm()
+    for kind in ("CLOTH", "COLLISION"):
+        obj.modifiers.new(kind, kind)
+    obj.modifiers.new("Behind", "SUBSURF")
+    compare(obj, {"dq", "blender"})
+    for copy in copies(obj).values():
+        assert {m.type for m in copy.modifiers} == {"ARMATURE", "SUBSURF", "NODES"}
+
+
+def test_subdivision_stays_last():
+    for set_up, behind in ((subdivided_last, ["Last"]), (subdivided_behind, [])):
+        obj, armature = scenes.make_arm(name=set_up.__name__)
+        set_up(obj, armature)
+        compare(obj, {"dq"})
+        names = [m.name for m in copies(obj)["dq"].modifiers]
+        assert names[names.index("Offset") + 1 :] == behind
+
+
+def test_what_can_not_be_compared():
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Cloth", "CLOTH")
+    obj.modifiers.move(1, 0)
+    before = content()
+    with pytest.raises(RuntimeError, match="simulation"):
+        compare(obj)
+    with pytest.raises(RuntimeError, match="at least one method"):
+        bpy.ops.sinew.compare(methods=set())
+    assert whole_file.differences(before, content()) == []
+    fine, armature = scenes.make_arm(name="Fine")
+    obj.modifiers["Armature"].object = armature
+    compare(armature, {"dq"})
+    assert list(copies(fine)) == ["dq"]
+    assert not copies(obj)
+
+
+def test_a_linked_character(tmp_path):
+    """Without an override Sinew can not drive it; its copies are local."""
+    obj, _armature = scenes.make_arm()
+    expected = shapes_of_methods(obj, [1, 11])
+    test_restore.save(tmp_path / "library.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_source, target):
+        target.objects = ["Arm", "Arm Rig"]
+    for linked in target.objects:
+        bpy.context.scene.collection.objects.link(linked)
+    before = content()
+    obj = target.objects[0]
+    compare(obj)
+    assert_copies_show(obj, [1, 11], expected)
+    bpy.context.scene.frame_set(1)
+    assert bpy.ops.sinew.end_comparison() == {"FINISHED"}
+    changed = whole_file.differences(before, content())
+    # Blender's note that something local used the linked mesh.
+    assert [line for line in changed if "is_library_indirect" not in line] == []
+
+
+def test_without_sinew_the_file_opens(tmp_path):
+    """The copies of a saved comparison keep their last shape and their places."""
+    obj, _armature = scenes.make_arm()
+    bpy.context.scene.frame_set(11)
+    compare(obj, {"qv", "dq"})
+    shown = {copy.name: scenes.final_points(copy) for copy in copies(obj).values()}
+    path = test_restore.save(tmp_path / "compared.blend")
+    sinew_addon.unregister()
+    try:
+        files.open_file(path)
+        for name, points in shown.items():
+            assert np.array_equal(scenes.final_points(bpy.data.objects[name]), points)
+            assert bpy.data.objects[name].modifiers["Armature"].object is not None
+    finally:
+        sinew_addon.register()
+    bpy.ops.sinew.end_comparison()
+    assert [o.name for o in bpy.data.objects if o.type == "MESH"] == ["Arm"]
+
+
+def test_pinned_modifiers_stay_behind_sinew():
+    obj, _armature = scenes.make_arm()
+    subdivided_behind(obj, _armature)
+    expected = scenes.modifier_shapes(obj, [11], preserve_volume=True)
+    scenes.add_sinew(obj, "dq")
+    assert [m.name for m in obj.modifiers] == ["Sinew", "Armature", "Behind", "Pinned"]
+    assert scenes.worst(scenes.shapes(obj, [11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_commands_leave_copies_out(tmp_path):
+    """Also where they show every collection to take pictures."""
+    obj, _armature = scenes.make_arm()
+    compare(obj, {"qv", "dq"})
+    path = test_restore.save(tmp_path / "compared.blend")
+    files.open_file(path)
+    assert [o.name for o in evaluate.deformed_meshes(bpy.context.scene)] == ["Arm"]
+    assert not state().collection.hide_render
+    assert all(
+        copy.hide_render and not copy.visible_get() for copy in copies(bpy.data.objects["Arm"]).values()
+    )
+    run_sinew("points", path, "--method", "dq", "--frames", "11", "--out", tmp_path / "points.npz")
+    with np.load(tmp_path / "points.npz") as found:
+        assert not [name for name in found.files if "Quaternion" in name]
+
+
+def test_restore_ends_a_comparison(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    compare(obj, {"qv"})
+    path = test_restore.save(tmp_path / "input" / "compared.blend")
+    run_sinew("restore", path, "--out", tmp_path / "restored")
+    files.open_file(tmp_path / "restored" / "compared.blend")
+    assert [o.name for o in bpy.data.objects if o.type == "MESH"] == ["Arm"]
+    assert not bpy.data.node_groups
