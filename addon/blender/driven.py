@@ -33,6 +33,7 @@ class Driven:
     frames             what decided the last frame
     rest_points        of the last frame
     dirtied_by_frames  the last change of frame moved the object or its rest points
+    shapes             how many have been written
     """
 
     mode: str
@@ -47,6 +48,7 @@ class Driven:
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
     milliseconds: float = 0.0
+    shapes: int = 0
 
     def is_untouched_by(self, changes: Changes) -> bool:
         """Whether nothing that the shape depends on is among the changes."""
@@ -102,6 +104,7 @@ def update(
     driven.rest_points = rest_points
     if driven.chain.deform(rest_points, frames):
         points.write(obj, driven.chain.points)
+        driven.shapes += 1
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
     elif touched and not points.are_written(obj, len(driven.chain.points)):
         points.write(obj, driven.chain.points)

@@ -12,17 +12,11 @@ import numpy as np
 from ..core.errors import SinewError, WrongUse
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
-
-# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
-BLENDER = "blender"
+from .properties import BLENDER, method_label  # noqa: F401
 
 
 def method_names() -> list[str]:
     return [*properties.METHODS, BLENDER]
-
-
-def method_label(name: str) -> str:
-    return "Armature modifier" if name == BLENDER else properties.METHODS[name].label
 
 
 def check_methods(names: Iterable[str]) -> None:

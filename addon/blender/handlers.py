@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, overrides, points, properties
+from . import drive, driven, heat_map, heat_view, measures, overrides, points, properties
 from .changes import Changes
 from .driven import Driven
 from .gate import Gate, is_allowed
@@ -49,6 +49,12 @@ session = Session()
 def state_of(obj: bpy.types.Object) -> Driven | None:
     """What the panel shows of a driven object; None before its first frame."""
     return session.driven.get(obj.session_uid)
+
+
+def states_of(objects: Iterable[bpy.types.Object] | None) -> list[tuple[bpy.types.Object, Driven]]:
+    """Those of driven objects that Sinew deforms now."""
+    pairs = [(obj, state_of(obj)) for obj in objects or () if properties.of(obj).enabled]
+    return [(obj, state) for obj, state in pairs if state is not None and state.frames is not None]
 
 
 def refresh(context: bpy.types.Context) -> None:
@@ -88,6 +94,16 @@ def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     refresh(context)
 
 
+def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    if not properties.is_driven(obj):
+        return
+    if not properties.of(obj).heat:
+        heat_view.take_off(obj)
+    points.arrange(obj)
+    refresh(context)
+    heat_view.tidy()
+
+
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Reads everything of the object anew: mesh, weights, bones. Switches it on again after an error."""
     session.driven.pop(obj.session_uid, None)
@@ -104,6 +120,7 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     try:
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
+        heat_map.update(states_of(session.objects), depsgraph)
     finally:
         session.updating = False
 
@@ -127,6 +144,7 @@ def _driven_objects(changes: Changes) -> list[bpy.types.Object]:
     if session.objects is None or changes.structure or len(bpy.data.objects) != session.object_count:
         session.objects = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
         session.object_count = len(bpy.data.objects)
+        heat_view.sync(session.objects)
         points.separate(session.objects)
         known = {obj.session_uid for obj in session.objects}
         session.driven = {uid: state for uid, state in session.driven.items() if uid in known}
@@ -229,6 +247,8 @@ def register() -> None:
     session.forget()
     properties.listeners.method_changed = _method_changed
     properties.listeners.enabled_changed = _enabled_changed
+    properties.listeners.heat_changed = _heat_changed
+    measures.Listener.changed = refresh
     for event, functions in _HANDLERS.items():
         getattr(bpy.app.handlers, event).extend(functions)
 

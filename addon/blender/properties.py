@@ -14,6 +14,12 @@ from ..core import inbetween
 from ..core.scale_rule import SCALE_RULES
 
 METHODS = {method.name: method for method in sinew.methods()}
+# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
+BLENDER = "blender"
+
+
+def method_label(name: str) -> str:
+    return "Armature modifier" if name == BLENDER else METHODS[name].label
 
 
 @dataclass
@@ -23,6 +29,7 @@ class Listeners:
     method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     inbetween_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
 
 
 listeners = Listeners()
@@ -36,6 +43,11 @@ def _method_changed(settings: SinewSettings | SinewStandIn, context: bpy.types.C
 def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
     if listeners.enabled_changed is not None:
         listeners.enabled_changed(settings.id_data, context)
+
+
+def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+    if listeners.heat_changed is not None:
+        listeners.heat_changed(settings.id_data, context)
 
 
 # On a library override, only what is marked so is kept with the file.
@@ -93,6 +105,13 @@ class SinewSettings(bpy.types.PropertyGroup):
         default=True,
         options=set(),
         update=_enabled_changed,
+        override=OVERRIDABLE,
+    )
+    heat: bpy.props.BoolProperty(
+        name="Heat Map",
+        description="Show a measure of the deformation as colours of the mesh",
+        options=set(),
+        update=_heat_changed,
         override=OVERRIDABLE,
     )
     stand_ins: bpy.props.CollectionProperty(

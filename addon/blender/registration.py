@@ -20,9 +20,20 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from . import handlers, inbetween_handlers, operators, panels, properties
+    from . import (
+        diagnostics_panel,
+        handlers,
+        heat_panel,
+        inbetween_handlers,
+        measures,
+        operators,
+        panels,
+        properties,
+    )
 
-    _register_classes((*properties.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes((*properties.CLASSES, *measures.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes((*heat_panel.CLASSES, *diagnostics_panel.CLASSES))
+    measures.register()
     bpy.types.Object.sinew = bpy.props.PointerProperty(
         type=properties.SinewSettings, override=properties.OVERRIDABLE
     )
@@ -33,6 +44,7 @@ def register() -> None:
     inbetween_handlers.register()
     inbetween_handlers.adopt_open_file()
     handlers.register()
+    diagnostics_panel.register()
     handlers.adopt_open_file()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
     # handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5.
@@ -41,15 +53,26 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import drive, handlers, inbetween_handlers, properties
+        from . import (
+            diagnostics_panel,
+            drive,
+            handlers,
+            heat_legend,
+            inbetween_handlers,
+            measures,
+            properties,
+        )
 
         atexit.unregister(unregister)
         handlers.unregister()
         inbetween_handlers.unregister()
+        diagnostics_panel.unregister()
+        heat_legend.show(False)
         # As in a saved file: the Armature modifiers point to their armatures again.
         for obj in bpy.data.objects:
             if properties.is_driven(obj):
                 drive.give_back(obj)
+        measures.unregister()
         del bpy.types.Object.sinew, bpy.types.Action.sinew_holds
         for name in properties.INBETWEEN:
             delattr(bpy.types.Object, name)

@@ -57,9 +57,10 @@ def _run(obj: bpy.types.Object, start: int) -> list[bpy.types.ArmatureModifier]:
 
 def in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """The modifiers ahead of those that Sinew stands in for, without Sinew's own."""
-    return [
-        m for m in list(obj.modifiers)[: _index(obj, armature_modifier(obj))] if not node_group.is_sinew(m)
-    ]
+    # Known by its name while it has no group yet.
+    own = sinew_modifier(obj)
+    ahead = list(obj.modifiers)[: _index(obj, armature_modifier(obj))]
+    return [m for m in ahead if m != own and not node_group.is_sinew(m)]
 
 
 def changes_in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:

@@ -8,6 +8,7 @@ import io
 import json
 import math
 import statistics
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 
 from .diagnostics import Finding
@@ -175,6 +176,19 @@ class Comparison:
             ensure_ascii=False,
             allow_nan=False,
         )
+
+
+def peaks(values: Sequence[float], count: int) -> list[int]:
+    """At most `count` places of the largest of `values`, largest first: those of no neighbour that is larger,
+    the first of equal neighbours. Frames next to the worst one are as good as the same."""
+    ahead = [-math.inf, *values[:-1]]
+    behind = [*values[1:], -math.inf]
+    places = [
+        place
+        for place, (before, value, after) in enumerate(zip(ahead, values, behind, strict=True))
+        if value > before and value >= after
+    ]
+    return sorted(places, key=lambda place: -values[place])[:count]
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:

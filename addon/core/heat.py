@@ -65,15 +65,17 @@ class HeatScale:
         return cls._up_to(metric, [_magnitude(metric, [least, most])], diagonal)
 
     @classmethod
-    def fixed(cls, metric: Metric, end: float, most: float | None = None) -> HeatScale:
-        """That ends at a length, or at a ratio above 1.
+    def fixed(cls, metric: Metric, end: float, least: float, most: float) -> HeatScale:
+        """That ends at a length, or at a ratio above 1, for values from `least` to `most`."""
+        beyond = _magnitude(metric, [least, most])
+        return cls._to(metric, end, beyond > (np.log2(end) if metric.scale == "log" else end))
 
-        most  the largest value by magnitude, where it is known
-        """
+    @classmethod
+    def _to(cls, metric: Metric, end: float, clipped: bool) -> HeatScale:
         if metric.unit == "share":
             return cls(metric, 0.0, 1.0)
         low = {"linear": 0.0, "signed": -end, "log": 1.0 / end}[metric.scale]
-        return cls(metric, low, end, most is not None and most > end)
+        return cls(metric, low, end, bool(clipped))
 
     @classmethod
     def _up_to(cls, metric: Metric, largest: Sequence[float], diagonal: float) -> HeatScale:
@@ -82,12 +84,13 @@ class HeatScale:
         beyond = max(largest, default=0.0)
         if metric.scale == "log":
             factor = 2.0 ** float(np.clip(beyond, LEAST_DOUBLINGS, MOST_DOUBLINGS))
-            return cls.fixed(metric, factor, 2.0**beyond if beyond > MOST_DOUBLINGS else None)
+            return cls._to(metric, factor, beyond > MOST_DOUBLINGS)
         least = max(1e-4 * diagonal, 1e-12)
         most = beyond
         if len(largest) > 1 and largest[1] > least:
             most = min(most, BEYOND_OTHERS * largest[1])
-        return cls.fixed(metric, max(most, least), beyond)
+        end = max(most, least)
+        return cls._to(metric, end, beyond > end)
 
     def colours(self, values: np.ndarray) -> np.ndarray:
         """float64 [n, 3], sRGB in 0..1."""

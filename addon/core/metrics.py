@@ -11,8 +11,10 @@ Bind a Gauge to a mesh, tell it each frame's rest shape and bones, measure any n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -333,26 +335,32 @@ class Measured:
         """float64 [triangles]"""
         return _ratios(self.shape.areas, self.rest.areas)
 
+    def entry(self, name: str) -> float:
+        """One entry of the summary, or `bulge_worst`, without working out the others."""
+        return self._ENTRIES[name](self)
+
     def summary(self) -> Summary:
-        rest, shape = self.rest, self.shape
-        return Summary(
-            distance_max=float(self.distance.max(initial=0.0)),
-            distance_rms=_rms(self.distance),
-            volume=shape.volume,
-            volume_change=_change(shape.volume, rest.volume),
-            area=shape.area,
-            area_change=_change(shape.area, rest.area),
-            area_min=float(self.area_ratios.min(initial=1.0)),
-            area_max=float(self.area_ratios.max(initial=1.0)),
-            area_rms=_rms(self.area_ratios - 1.0, rest.areas),
-            stretch_min=float(self.stretch.min(initial=1.0)),
-            stretch_max=float(self.stretch.max(initial=1.0)),
-            stretch_rms=_rms(self.stretch - 1.0, rest.lengths),
-            bulge_min=float(self.bulge.min(initial=0.0)),
-            bulge_max=float(self.bulge.max(initial=0.0)),
-            flipped_faces=int(self.flipped.sum()),
-            flipped_area=_share(float(rest.areas[self.flipped].sum()), rest.area),
-        )
+        return Summary(**{field.name: self.entry(field.name) for field in fields(Summary)})
+
+    _ENTRIES: ClassVar[dict[str, Callable[[Measured], float]]] = {
+        "distance_max": lambda m: float(m.distance.max(initial=0.0)),
+        "distance_rms": lambda m: _rms(m.distance),
+        "volume": lambda m: m.shape.volume,
+        "volume_change": lambda m: _change(m.shape.volume, m.rest.volume),
+        "area": lambda m: m.shape.area,
+        "area_change": lambda m: _change(m.shape.area, m.rest.area),
+        "area_min": lambda m: float(m.area_ratios.min(initial=1.0)),
+        "area_max": lambda m: float(m.area_ratios.max(initial=1.0)),
+        "area_rms": lambda m: _rms(m.area_ratios - 1.0, m.rest.areas),
+        "stretch_min": lambda m: float(m.stretch.min(initial=1.0)),
+        "stretch_max": lambda m: float(m.stretch.max(initial=1.0)),
+        "stretch_rms": lambda m: _rms(m.stretch - 1.0, m.rest.lengths),
+        "bulge_min": lambda m: float(m.bulge.min(initial=0.0)),
+        "bulge_max": lambda m: float(m.bulge.max(initial=0.0)),
+        "bulge_worst": lambda m: float(np.abs(m.bulge).max(initial=0.0)),
+        "flipped_faces": lambda m: int(m.flipped.sum()),
+        "flipped_area": lambda m: _share(float(m.rest.areas[m.flipped].sum()), m.rest.area),
+    }
 
     def field(self, name: str) -> np.ndarray:
         """float64 [vertices]: one of METRICS at each vertex."""
