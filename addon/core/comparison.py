@@ -181,12 +181,9 @@ class Comparison:
 def peaks(values: Sequence[float], count: int) -> list[int]:
     """At most `count` places of the largest of `values`, largest first: those of no neighbour that is larger,
     the first of equal neighbours. Frames next to the worst one are as good as the same."""
-    ahead = [-math.inf, *values[:-1]]
-    behind = [*values[1:], -math.inf]
+    padded = [-math.inf, *values, -math.inf]
     places = [
-        place
-        for place, (before, value, after) in enumerate(zip(ahead, values, behind, strict=True))
-        if value > before and value >= after
+        place for place, value in enumerate(values) if padded[place] < value and value >= padded[place + 2]
     ]
     return sorted(places, key=lambda place: -values[place])[:count]
 
