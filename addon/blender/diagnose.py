@@ -69,7 +69,7 @@ def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_infl
     readings = [_read(obj, depsgraph) for obj in objects]
     for reading in readings:
         reading.look(scene.frame_current, depsgraph)
-        _keep(reading, most_influences, f"this pose, frame {scene.frame_current}")
+        _keep(reading, most_influences, f"pose of frame {scene.frame_current}")
 
 
 def check_frames(
@@ -88,7 +88,7 @@ def check_frames(
                 reading.look(frame, depsgraph)
             yield (number + 1) / len(frames)
     for reading in readings:
-        _keep(reading, most_influences, f"the poses of frames {frames[0]} to {frames[-1]}")
+        _keep(reading, most_influences, f"poses of frames {frames[0]} to {frames[-1]}")
 
 
 def of(obj: bpy.types.Object) -> Check | None:
@@ -109,7 +109,9 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     """
     found = of(obj)
     finding = next((f for f in found.findings if f.name == name), None) if found is not None else None
-    if finding is None or len(found.weights.counts) != _vertex_count(obj):
+    if finding is None:
+        raise SinewError(f"{obj.name}: no such fault is known; press Check again")
+    if len(found.weights.counts) != _vertex_count(obj):
         raise SinewError(f"{obj.name}: its vertices are others than those checked; press Check again")
     if not obj.data.is_editable:
         raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")

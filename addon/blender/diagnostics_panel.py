@@ -125,7 +125,7 @@ def _draw_check(
         _draw_finding(column, context, obj, finding)
     if not found.findings:
         column.label(text="Nothing found", icon="CHECKMARK")
-    draw_text(column, context, f"Checked: weights, and {found.frames}")
+    draw_text(column, context, f"Checked: weights, {found.frames}")
     front = [modifier.name for modifier in stack.changes_in_front(obj)]
     if front:
         text = (
@@ -144,9 +144,10 @@ def _draw_finding(
         draw_text(layout, context, names)
     draw_text(layout, context, finding.advice)
     if len(finding.vertices):
-        text = f"Select {_vertices(len(finding.vertices))}"
+        text = f"Select {_vertices(len(finding.vertices)).title()}"
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
         button.object, button.finding = obj.name, finding.name
+    layout.separator(factor=0.5)
 
 
 def _vertices(count: int) -> str:

@@ -43,9 +43,9 @@ def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str
     """The values at even distances along the legend, with their unit."""
     texts = [units.text(scene, scale.metric.unit, value) for value in scale.ticks(count)]
     if scale.clipped:
-        texts[-1] += " and more"
+        texts[-1] = f"\u2265 {texts[-1]}"
         if scale.low != 0.0:
-            texts[0] += " and less"
+            texts[0] = f"\u2264 {texts[0]}"
     return texts
 
 
@@ -67,7 +67,7 @@ def _draw() -> None:
     pad = 1.5 * GAP * size
     _rectangle(x - 2 * pad, y - pad, width + 4 * pad, 2 * line + BAR * size + 2 * pad)
     texts = labels(content.scale, context.scene)
-    if sum(blf.dimensions(0, text)[0] + GAP * size for text in texts) > width:
+    if len(texts) * max(blf.dimensions(0, text)[0] + GAP * size for text in texts) > width:
         texts = [texts[0], *[""] * (len(texts) - 2), texts[-1]]
     for number, text in enumerate(texts):
         share, wide = number / (len(texts) - 1), blf.dimensions(0, text)[0]

@@ -9,6 +9,9 @@ from ..core.metrics import Measured
 from . import handlers, heat_operators, live, measures, properties, units, worst_frames
 from .sidebar import Sidebar, draw_text
 
+# What the number is that a frame is bad by.
+_WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of the area"}
+
 
 class SINEW_PT_measures(Sidebar, bpy.types.Panel):
     bl_label = "Heat Map"
@@ -92,7 +95,8 @@ class SINEW_PT_worst_frames(Sidebar, bpy.types.Panel):
         column = layout.column(align=True)
         unit = "length" if scan.metric.unit == "length" else "share"
         for frame, value in scan.worst():
-            text = f"Frame {frame:g}:  {units.text(context.scene, unit, value)}"
+            number = _WORST.get(scan.metric.worst, "{}").format(units.text(context.scene, unit, value))
+            text = f"Frame {frame:g}:  {number}"
             is_here = frame == context.scene.frame_current
             column.operator("sinew.go_to_frame", text=text, depress=is_here).frame = frame
         if not scan.worst():

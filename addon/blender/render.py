@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.heat import linear
 from ..core.views import View, camera_axes
 
@@ -46,7 +46,7 @@ def has_opengl() -> bool:
 
 def check_size(size: int) -> None:
     if not 64 <= size <= 4096:
-        raise SinewError(f"size: expected 64 to 4096 pixels, got {size}")
+        raise WrongUse(f"size: expected 64 to 4096 pixels, got {size}")
 
 
 def chosen_engine(wanted: str) -> str:

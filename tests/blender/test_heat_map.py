@@ -350,7 +350,7 @@ def test_the_legend_says_range_unit_and_methods():
     content = heat_legend.content
     assert content.title == "Distance, Dual Quaternion against Armature modifier"
     assert heat_legend.labels(content.scale, scene)[0] == "0 m"
-    assert heat_legend.labels(content.scale, scene)[-1] == "2 cm and more"
+    assert heat_legend.labels(content.scale, scene)[-1] == "\u2265 2 cm"
     choose("stretch", ratio=4.0)
     assert heat_legend.labels(heat_legend.content.scale, scene)[::2] == [
         "0.25\u00d7",
