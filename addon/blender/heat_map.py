@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..core.heat import HeatScale, linear
+from ..core.heat import HeatScale
 from ..core.metrics import Measured
 from . import heat_legend, live, measures, points, properties
 from .measures import SinewMeasures
@@ -33,7 +33,7 @@ def update(pairs: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
         return
     values = subject.measured.field(settings.quantity)
     scale = scale_of(settings, subject.measured, values)
-    colours = linear(scale.colours(values)).astype(np.float32)
+    colours = scale.linear_colours(values)
     for (obj, _driven), own in zip(shown, subject.split(colours), strict=True):
         points.write_colours(obj, own)
     _last = inputs

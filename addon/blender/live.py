@@ -23,6 +23,7 @@ from .driven import Driven
 # Sets of objects that are kept ready to be measured: those of the heat map and those of the panel.
 MOST_SUBJECTS = 2
 
+IDENTITY = np.identity(4)
 Pairs = Sequence[tuple[bpy.types.Object, Driven]]
 
 
@@ -42,11 +43,14 @@ class Subject:
     """Objects that are measured as one, their vertices one after the other.
 
     stamp  what `measured` was worked out from
+    rest   world points at rest, and what they were made from
     """
 
     parts: list[Part]
     gauge: Gauge
     stamp: tuple | None = None
+    rest: np.ndarray | None = None
+    rest_made_from: tuple = ()
     measured: Measured | None = None
 
     def split(self, values: np.ndarray) -> list[np.ndarray]:
@@ -85,9 +89,14 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
         *(matrix.tobytes() for matrix in (*worlds, *armatures)),
     )
     if stamp != subject.stamp:
-        subject.gauge.set_frame(_frame_of_rig(pairs, worlds, armatures))
+        _bring_rest(subject, worlds)
+        subject.gauge.set_frame(_frame_of_rig(subject, armatures))
         shape = _in_world([driven.chain.points for _obj, driven in pairs], worlds)
-        reference = _in_world([_shape_under(part, other) for part in subject.parts], worlds)
+        others = [_Other.of(part, other) for part in subject.parts]
+
+        def reference() -> np.ndarray:
+            return _in_world([each.points() for each in others], worlds)
+
         subject.measured, subject.stamp = subject.gauge.measure(shape, reference), stamp
     return subject
 
@@ -148,32 +157,54 @@ def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
     )
 
 
-def _shape_under(part: Part, other: str) -> np.ndarray:
-    """float32 [vertices, 3], object space: the shape of now under another method."""
-    driven, methods = part.driven, _modifiers_methods(part.obj, other)
-    frames: list[LinkFrame | None] = []
-    for number, frame in enumerate(driven.frames):
-        if frame is not None:
-            frame = replace(frame, method=methods[number] if methods else other)
-            if methods:
-                frame.scale_rule = BLENDER_4.name
-        frames.append(frame)
-    part.chain.deform(driven.rest_points, frames)
-    return part.chain.points
+@dataclass
+class _Other:
+    """An object's shape of now under another method, deformed only where it is asked for."""
+
+    chain: Chain
+    rest_points: np.ndarray
+    frames: list[LinkFrame | None]
+
+    @classmethod
+    def of(cls, part: Part, other: str) -> _Other:
+        driven, methods = part.driven, _modifiers_methods(part.obj, other)
+        frames: list[LinkFrame | None] = []
+        for number, frame in enumerate(driven.frames):
+            if frame is not None:
+                frame = replace(frame, method=methods[number] if methods else other)
+                if methods:
+                    frame.scale_rule = BLENDER_4.name
+            frames.append(frame)
+        return cls(part.chain, driven.rest_points, frames)
+
+    def points(self) -> np.ndarray:
+        """float32 [vertices, 3], object space."""
+        self.chain.deform(self.rest_points, self.frames)
+        return self.chain.points
 
 
-def _frame_of_rig(pairs: Pairs, worlds: list[np.ndarray], armatures: list[np.ndarray]) -> FrameOfRig:
+def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
+    """Brings the world points at rest up to date; the same array where nothing moved them."""
+    shapes = [part.driven.rest_points for part in subject.parts]
+    if subject.rest_made_from:
+        known_shapes, known_worlds = subject.rest_made_from
+        same_shapes = all(a is b for a, b in zip(shapes, known_shapes, strict=True))
+        if same_shapes and all(map(np.array_equal, worlds, known_worlds)):
+            return
+    subject.rest, subject.rest_made_from = _in_world(shapes, worlds), (shapes, worlds)
+
+
+def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
     rest_axes, posed_axes, motions = [], [], []
-    for (_obj, driven), armature in zip(pairs, armatures, strict=True):
-        bones, frame = driven.binding.bones, driven.frames[0]
+    for part, armature in zip(subject.parts, armatures, strict=True):
+        bones, frame = part.driven.binding.bones, part.driven.frames[0]
         at_rest = armature @ bones.rest
         posed = at_rest if frame is None else armature @ frame.pose
         rest_axes.append(bone_axes(bones, at_rest))
         posed_axes.append(bone_axes(bones, posed))
         # An armature of no size moves nothing that could be measured.
         motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
-    rest = _in_world([driven.rest_points for _obj, driven in pairs], worlds)
-    return FrameOfRig(rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
+    return FrameOfRig(subject.rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
 
 def _world(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
@@ -181,7 +212,13 @@ def _world(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
 
 
 def _in_world(shapes: Sequence[np.ndarray], worlds: Sequence[np.ndarray]) -> np.ndarray:
-    """float64 [vertices of all, 3]"""
+    """float64 [vertices of all, 3], in memory axis by axis, as measuring wants it."""
     return np.concatenate(
-        [shape @ world[:3, :3].T + world[:3, 3] for shape, world in zip(shapes, worlds, strict=True)]
-    )
+        [
+            np.ascontiguousarray(shape.T, dtype=np.float64)
+            if np.array_equal(world, IDENTITY)
+            else world[:3, :3] @ shape.T.astype(np.float64) + world[:3, 3:]
+            for shape, world in zip(shapes, worlds, strict=True)
+        ],
+        axis=1,
+    ).T

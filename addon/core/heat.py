@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -31,6 +32,15 @@ def viridis(shares: np.ndarray) -> np.ndarray:
     first = np.minimum(places.astype(np.intp), len(stops) - 2)
     steps = np.diff(stops, axis=0)
     return stops.take(first, axis=0) + (places - first)[..., None] * steps.take(first, axis=0)
+
+
+# Finer than 8 bits show.
+_STEPS = 1024
+
+
+@cache
+def _linear_viridis() -> np.ndarray:
+    return linear(viridis(np.linspace(0.0, 1.0, _STEPS))).astype(np.float32)
 
 
 def linear(colours: np.ndarray) -> np.ndarray:
@@ -94,11 +104,23 @@ class HeatScale:
 
     def colours(self, values: np.ndarray) -> np.ndarray:
         """float64 [n, 3], sRGB in 0..1."""
+        return viridis(self._shares(values))
+
+    def linear_colours(self, values: np.ndarray) -> np.ndarray:
+        """float32 [n, 3], the same scene-linear, to 0.002: from a table, for it is asked for every frame."""
+        shares = self._shares(values)
+        shares *= _STEPS - 1
+        shares += 0.5
+        places = np.clip(shares, 0, _STEPS - 1, out=shares).astype(np.intp)
+        return _linear_viridis().take(places, axis=0)
+
+    def _shares(self, values: np.ndarray) -> np.ndarray:
+        """How far along the scale values lie: 0 to 1, or beyond."""
         if self.metric.scale == "log":
             values, low, high = np.log(np.maximum(values, 1e-12)), np.log(self.low), np.log(self.high)
         else:
             low, high = self.low, self.high
-        return viridis((values - low) / (high - low))
+        return (values - low) / (high - low)
 
     def severity(self, values: np.ndarray) -> np.ndarray:
         """How far each value is from that of an undeformed mesh; largest where it is worst."""

@@ -170,18 +170,21 @@ class Gauge:
 
     def set_frame(self, frame: FrameOfRig) -> None:
         """What the shapes measured from now on are measured against."""
-        rest = _by_axis(frame.rest)
         # Unless shape keys move it, or the object moves, it is that of the last frame.
-        if self.rest is None or not np.array_equal(rest, self.rest.points):
+        same = self._pose is not None and frame.rest is self._pose.frame.rest
+        if not same and (self.rest is None or not np.array_equal(frame.rest.T, self.rest.points)):
             self.rest = Shape(self.surface, frame.rest)
         self._pose = Pose(self._hold, self.rest, frame)
 
-    def measure(self, points: np.ndarray, other: np.ndarray | None = None) -> Measured:
-        """A shape [vertices, 3] in the frame set last, and how far it is from the shape `other`.
+    def measure(
+        self, points: np.ndarray, other: np.ndarray | Callable[[], np.ndarray] | None = None
+    ) -> Measured:
+        """A shape [vertices, 3] in the frame set last, and how far it is from the shape `other`, or from what
+        that returns.
 
         What is asked of the result is worked out then.
         """
-        return Measured(self._pose, Shape(self.surface, points), None if other is None else _by_axis(other))
+        return Measured(self._pose, Shape(self.surface, points), other)
 
 
 class Hold:
@@ -298,8 +301,8 @@ class Shape:
 class Measured:
     """One shape beside its rest shape: numbers, and the fields of METRICS."""
 
-    def __init__(self, pose: Pose, shape: Shape, other: np.ndarray | None) -> None:
-        """other  float64 [3, vertices], what distances are measured to"""
+    def __init__(self, pose: Pose, shape: Shape, other: np.ndarray | Callable[[], np.ndarray] | None) -> None:
+        """other  [vertices, 3], or what returns it: where distances are measured to"""
         self.rest, self.shape = pose.rest, shape
         self._pose, self._other = pose, other
 
@@ -308,7 +311,8 @@ class Measured:
         """float64 [vertices]: from the other shape, 0 where there is none."""
         if self._other is None:
             return np.zeros(self.shape.surface.vertex_count)
-        apart = self.shape.points - self._other
+        other = self._other() if callable(self._other) else self._other
+        apart = self.shape.points - _by_axis(other)
         return np.sqrt(dots(apart, apart))
 
     @cached_property
