@@ -149,12 +149,13 @@ def final_points(obj: bpy.types.Object) -> np.ndarray:
 
 
 def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
-    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]."""
+    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]; in memory
+    axis by axis, as measuring wants them."""
     parts = []
     for obj in objects:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-        parts.append(final_points(obj) @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.concatenate(parts)
+        parts.append(matrix[:3, :3] @ final_points(obj).T.astype(np.float64) + matrix[:3, 3:])
+    return np.concatenate(parts, axis=1).T
 
 
 def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:

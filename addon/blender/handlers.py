@@ -31,6 +31,7 @@ class Session:
     depsgraph: int = 0  # the address of the one last seen
     gate: Gate = field(default_factory=Gate)
     updating: bool = False
+    settling: bool = False  # what Sinew itself changed is evaluated, and nothing else has come in between
 
     @property
     def idle(self) -> bool:
@@ -63,19 +64,28 @@ def refresh(context: bpy.types.Context) -> None:
         # Held, or a handler turned an object off: another evaluation now could be from a render's thread.
         return
     session.objects = None
-    depsgraph = context.evaluated_depsgraph_get()
-    _update(depsgraph, Changes())
-    # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
-    if bpy.app.background:
-        context.view_layer.update()
+    try:
+        depsgraph = context.evaluated_depsgraph_get()
+        _update(depsgraph, Changes())
+        # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
+        if bpy.app.background:
+            session.settling = True
+            context.view_layer.update()
+    finally:
+        session.settling = False
 
 
 @contextmanager
 def held() -> Iterator[None]:
-    """What is changed inside is not looked at before the refresh() that has to follow."""
-    session.updating = True
+    """What is changed inside is not looked at before the refresh() that has to follow; no weights are."""
+    # What others changed before is seen apart from it.
+    bpy.context.evaluated_depsgraph_get()
+    session.updating = session.settling = True
     try:
         yield
+    except BaseException:
+        session.settling = False
+        raise
     finally:
         session.updating = False
 
@@ -192,7 +202,11 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not session.idle:
-        _update(depsgraph, _read_changes(depsgraph, frame=False))
+        changes = _read_changes(depsgraph, frame=False)
+        if session.settling:
+            # Settings and writing touch the meshes. Nobody changed weights, and they take long to read.
+            changes.meshes.clear()
+        _update(depsgraph, changes)
 
 
 @persistent

@@ -213,24 +213,27 @@ class Hold:
         return np.sqrt(dots(offset, offset))
 
     def carried_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """float64 [3, triangles]: normals, of any length, turned with the bones of their corners.
+        """float32 [3, triangles]: normals, of any length, turned with the bones of their corners.
 
         rotations  unit quaternions [4, bones]
         """
-        turns = np.zeros((4, self.surface.vertex_count))
+        # Single precision tells on which side a face looks.
+        rotations = rotations.astype(np.float32)
+        turns = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
         turns[0] = 1.0
         if len(self.held):
-            bones, weights = self._influences.bones, self._influences.weights.astype(np.float64)
+            bones, weights = self._influences.bones, self._influences.weights
             heaviest = np.repeat(self.heaviest, self._influences.counts[self.held])
             terms = rotations.take(bones, axis=1)
             # All on the side of the heaviest: a sum of two then never cancels.
             terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
             sums = np.add.reduceat(terms, self.starts, axis=1)
-            turns[:, self.held] = sums / np.maximum(np.sqrt(dots(sums, sums)), 1e-12)
+            turns[:, self.held] = sums / np.maximum(np.sqrt(dots(sums, sums)), np.float32(1e-12))
         first, second, third = (turns.take(corner, axis=1) for corner in self.surface.corners)
-        total = first + np.where(dots(first, second) < 0.0, -1.0, 1.0) * second
-        total += np.where(dots(first, third) < 0.0, -1.0, 1.0) * third
-        return rotated(total, normals)
+        one = np.float32(1.0)
+        total = first + np.where(dots(first, second) < 0.0, -one, one) * second
+        total += np.where(dots(first, third) < 0.0, -one, one) * third
+        return rotated(total, normals.astype(np.float32))
 
 
 class Pose:
@@ -246,7 +249,7 @@ class Pose:
 
     @cached_property
     def carried_normals(self) -> np.ndarray:
-        """float64 [3, triangles]: rest normals as the bones turn them."""
+        """float32 [3, triangles]: rest normals as the bones turn them."""
         return self.hold.carried_normals(self.rest.normals, self.frame.rotations)
 
 
