@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, heat_map, heat_view, measures, overrides, points, properties
+from . import drive, driven, heat_map, heat_view, measures, overrides, points, properties, redraw
 from .changes import Changes
 from .driven import Driven
 from .gate import Gate, is_allowed
@@ -131,6 +131,7 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
         heat_map.update(states_of(session.objects), depsgraph)
+        redraw.tell()
     finally:
         session.updating = False
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.metrics import Measured
-from . import handlers, heat_operators, live, measures, properties, units, worst_frames
+from . import handlers, heat_operators, live, measures, properties, redraw, units, worst_frames
 from .sidebar import Sidebar, draw_text
 
 # What the number is that a frame is bad by.
@@ -45,9 +45,12 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         # Blender asks only what is open and visible to draw itself: elsewhere nothing is measured.
+        redraw.wanted = True
         settings = measures.of(context.scene)
         pairs = handlers.states_of(heat_operators.driven_targets(context))
-        subject = live.measure(pairs, settings.other, context.evaluated_depsgraph_get())
+        # As it was evaluated last: while drawing nothing may be evaluated, for that can write.
+        depsgraph = context.view_layer.depsgraph
+        subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
         if subject is None:
             draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")
             return

@@ -139,40 +139,45 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
     assert not bpy.data.objects["Arm"].sinew.error
 
 
-def test_a_whole_blender_with_its_window(package, tmp_path, real_rig):
-    """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
+@pytest.fixture
+def photograph(package, tmp_path, real_rig):
+    """photograph(script, *pictures): runs a script of docs/ in a whole Blender with human.blend; its facts."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     if not program:
         pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
     if bpy.app.version < (5, 2):
         pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
-    # The whole Blender sees the temporary folder, not this checkout's neighbours.
-    shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
-    shutil.copy(package, tmp_path / "sinew.zip")
-    shutil.copy(REPOSITORY / "docs" / "photograph_panel.py", tmp_path / "photograph_panel.py")
-    result = subprocess.run(
-        [
-            program,
-            "run",
-            "--factory-startup",
-            "--python-exit-code",
-            "3",
-            "human.blend",
-            "--python",
-            "photograph_panel.py",
-            "--",
-            "sinew.zip",
-            "panel.png",
-        ],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=400,
-        check=False,
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
-    )
-    assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
-    facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
+
+    def run(script: str, *pictures: str) -> dict[str, object]:
+        # The whole Blender sees the temporary folder, not this checkout's neighbours.
+        shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
+        shutil.copy(package, tmp_path / "sinew.zip")
+        shutil.copy(REPOSITORY / "docs" / script, tmp_path / script)
+        command = [program, "run", "--factory-startup", "--python-exit-code", "3", "human.blend"]
+        result = subprocess.run(
+            [*command, "--python", script, "--", "sinew.zip", *pictures],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=400,
+            check=False,
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+        )
+        assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
+        assert all((tmp_path / picture).stat().st_size > 20_000 for picture in pictures)
+        return json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
+
+    return run
+
+
+def test_a_whole_blender_with_its_window(photograph):
+    """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
+    facts = photograph("photograph_panel.py", "panel.png")
     assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
     assert facts["error"] == ""
-    assert (tmp_path / "panel.png").stat().st_size > 20_000
+
+
+def test_heat_map_and_diagnostics_in_the_window(photograph):
+    """Frames are gone through in steps, the window drawing in between; then the scene is where it was."""
+    facts = photograph("photograph_heat.py", "heat-map.png", "diagnostics.png")
+    assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}
