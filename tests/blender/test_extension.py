@@ -141,7 +141,7 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
 
 @pytest.fixture
 def photograph(package, tmp_path, real_rig):
-    """photograph(script, *pictures): runs a script of docs/ in a whole Blender with human.blend; its facts."""
+    """photograph(script, *pictures): the facts that a script of docs/ prints in a whole Blender."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     if not program:
         pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")

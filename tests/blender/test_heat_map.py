@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 import scenes
 import snapshot
+import test_linked_data
 import whole_file
 from sinew_addon.blender import (
+    drive,
     evaluate,
     handlers,
     heat_legend,
@@ -399,3 +401,29 @@ def test_numbers_are_those_that_compare_writes(tmp_path):
     assert len(entries) == 16
     for name, value in entries.items():
         assert value == pytest.approx(float(expected[name]), rel=2e-4, abs=2e-5), name
+
+
+@pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])
+@pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
+def test_linked_meshes_show_it_too(tmp_path, override, front):
+    """By their material: a linked mesh keeps the active colour attribute that it has."""
+    test_linked_data.save_library(tmp_path, driven=False, front=front)
+    test_linked_data.link(tmp_path, override)
+    obj = test_linked_data.character()
+    scenes.add_sinew(obj, "dq")
+    types = color_types()
+    choose("stretch", range=measures.FIXED, ratio=2.0)
+    properties.of(obj).heat = True
+    bpy.context.scene.frame_set(11)
+    colours = shown_colours(obj)
+    assert np.ptp(colours, axis=0).max() > 0.05
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
+    path = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
+    np.testing.assert_allclose(shown_colours(test_linked_data.character()), colours, atol=1e-6)
+    drive.remove(test_linked_data.character())
+    assert color_types() == types
+    assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
+    assert not [g for g in bpy.data.node_groups if g.get("sinew_node_group") and g.library is None]
