@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from . import animation, front, node_group, points, pose_driver, properties, stack
+from . import animation, front, heat_view, points, pose_driver, properties, stack
 from .stack import armature_modifier, sinew_modifier
 
 
@@ -121,6 +121,8 @@ def remove(obj: bpy.types.Object) -> None:
     """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
     switch(obj, on=False)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
+    if settings.heat:
+        heat_view.take_off(obj)
     if nodes is not None:
         active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
         obj.modifiers.remove(nodes)
@@ -134,7 +136,7 @@ def remove(obj: bpy.types.Object) -> None:
     points.remove(obj)
     animation.remove(obj)
     properties.clear(obj)
-    node_group.remove_unused()
+    heat_view.tidy()
 
 
 def switch(obj: bpy.types.Object, on: bool) -> None:

@@ -39,6 +39,7 @@ class Driven:
     answered           the address of the evaluated mesh that was given points in the last evaluation, or 0
     is_kept            the mesh itself holds the last points too, not only the evaluated one
     lock               held while the chain works: a render may ask from a thread of its own
+    shapes             how many have been written
     """
 
     mode: str
@@ -58,6 +59,7 @@ class Driven:
     is_kept: bool = True
     lock: threading.Lock = field(default_factory=threading.Lock)
     milliseconds: float = 0.0
+    shapes: int = 0
 
     def is_untouched_by(self, changes: Changes) -> bool:
         """Whether nothing that the shape depends on is among the changes."""
@@ -159,6 +161,7 @@ def _deform(
     driven.rest_points = rest_points
     if driven.chain.deform(rest_points, frames):
         points.write(obj, driven.chain.points)
+        driven.shapes += 1
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
     elif _are_lost(obj, driven, changes, touched):
         points.write(obj, driven.chain.points)
@@ -194,9 +197,11 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
         frames = _frames(evaluated, armatures, driven, "VIEWPORT")
         if frames is None:
             return
-        driven.chain.deform(source.keyed_points(obj, mesh.shape_keys, driven.source), frames)
+        driven.rest_points = source.keyed_points(obj, mesh.shape_keys, driven.source)
+        driven.chain.deform(driven.rest_points, frames)
         attribute.data.foreach_set("vector", driven.chain.points.ravel())
         driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
+        driven.shapes += 1
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
 
 
@@ -211,6 +216,8 @@ def hold_pose(obj: bpy.types.Object, driven: Driven) -> None:
     settings, pairs = properties.of(obj), drive.stand_ins(obj)
     driven.asking = (
         bool(settings.attribute)
+        # Its colours are written into the mesh itself, which is evaluated once more for them.
+        and not settings.heat
         and _is_own(obj)
         and not any(driven.keyed)
         and all(stand_in.show_viewport == stand_in.show_render for _modifier, stand_in in pairs)

@@ -14,17 +14,11 @@ import numpy as np
 from ..core.errors import SinewError, WrongUse
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
-
-# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
-BLENDER = "blender"
+from .properties import BLENDER, method_label  # noqa: F401
 
 
 def method_names() -> list[str]:
     return [*properties.METHODS, BLENDER]
-
-
-def method_label(name: str) -> str:
-    return "Armature modifier" if name == BLENDER else properties.METHODS[name].label
 
 
 def check_methods(names: Iterable[str]) -> None:
@@ -204,12 +198,13 @@ def final_points(obj: bpy.types.Object) -> np.ndarray:
 
 
 def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
-    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]."""
+    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]; in memory
+    axis by axis, as measuring wants them."""
     parts = []
     for obj in objects:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-        parts.append(final_points(obj) @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.concatenate(parts)
+        parts.append(matrix[:3, :3] @ final_points(obj).T.astype(np.float64) + matrix[:3, 3:])
+    return np.concatenate(parts, axis=1).T
 
 
 def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, overrides, points, properties
+from . import drive, driven, heat_map, heat_view, measures, overrides, points, properties, redraw
 from .changes import Changes
 from .driven import Driven
 from .gate import Gate, is_allowed
@@ -53,6 +53,12 @@ def state_of(obj: bpy.types.Object) -> Driven | None:
 
 
 answers = Answers(state_of)
+
+
+def states_of(objects: Iterable[bpy.types.Object] | None) -> list[tuple[bpy.types.Object, Driven]]:
+    """Those of driven objects that Sinew deforms now."""
+    pairs = [(obj, state_of(obj)) for obj in objects or () if properties.of(obj).enabled]
+    return [(obj, state) for obj, state in pairs if state is not None and state.frames is not None]
 
 
 def refresh(context: bpy.types.Context) -> None:
@@ -146,6 +152,16 @@ def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     refresh(context)
 
 
+def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    if not properties.is_driven(obj):
+        return
+    if not properties.of(obj).heat:
+        heat_view.take_off(obj)
+    points.arrange(obj)
+    refresh(context)
+    heat_view.tidy()
+
+
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Reads everything of the object anew: mesh, weights, bones. Switches it on again after an error."""
     session.driven.pop(obj.session_uid, None)
@@ -161,6 +177,8 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     with held():
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
+        heat_map.update(states_of(session.objects), depsgraph)
+        redraw.tell()
 
 
 def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
@@ -182,6 +200,7 @@ def _driven_objects(changes: Changes) -> list[bpy.types.Object]:
     if session.objects is None or changes.structure or len(bpy.data.objects) != session.object_count:
         session.objects = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
         session.object_count = len(bpy.data.objects)
+        heat_view.sync(session.objects)
         points.separate(session.objects)
         known = {obj.session_uid for obj in session.objects}
         session.driven = {uid: state for uid, state in session.driven.items() if uid in known}
@@ -293,6 +312,8 @@ def register() -> None:
     properties.listeners.enabled_changed = _enabled_changed
     properties.listeners.object_asked = answers.object_asked
     properties.listeners.mesh_asked = answers.mesh_asked
+    properties.listeners.heat_changed = _heat_changed
+    measures.Listener.changed = refresh
     for event, functions in _HANDLERS.items():
         getattr(bpy.app.handlers, event).extend(functions)
 

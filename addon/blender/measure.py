@@ -18,9 +18,10 @@ import numpy as np
 from ..core.diagnostics import Finding, PoseCheck, check_weights
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights, Influences, entries_of_bones
+from ..core.influences import joined as influences_of_all
 from ..core.metrics import FrameOfRig, Gauge, Summary, bone_axes
 from ..core.rig import Bones, Weighting
-from ..core.surface import Surface, joined, same_places
+from ..core.surface import joined
 from . import armature_io, drive, evaluate, handlers, mesh_io, stack
 from .modifier_options import ModifierOptions
 
@@ -98,18 +99,10 @@ def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subjec
         with _at_rest(meshes):
             depsgraph = bpy.context.evaluated_depsgraph_get()
             parts = [_read_part(obj, depsgraph) for obj in meshes]
-            surface = joined([read_surface(obj.evaluated_get(depsgraph).data) for obj in meshes])
-    return Subject(scene, parts, Gauge(surface, _joined_influences(parts)))
-
-
-def read_surface(mesh: bpy.types.Mesh) -> Surface:
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    edges = np.empty((len(mesh.edges), 2), dtype=np.int32)
-    mesh.edges.foreach_get("vertices", edges.ravel())
-    points = mesh_io.read_points(mesh.vertices)
-    return Surface(len(mesh.vertices), triangles, edges, same_places(points))
+            surface = joined([mesh_io.read_surface(obj.evaluated_get(depsgraph).data) for obj in meshes])
+    bone_counts = [len(part.weighting.bones.rest) for part in parts]
+    influences = influences_of_all([part.influences for part in parts], bone_counts)
+    return Subject(scene, parts, Gauge(surface, influences))
 
 
 def batches(subject: Subject, frames: Sequence[float], methods: int) -> list[Sequence[float]]:
@@ -270,12 +263,21 @@ def _show(armature: bpy.types.Object) -> None:
         armature.hide_set(False)
 
 
-def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
+def read_edited(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Weighting, GroupWeights, np.ndarray]:
+    """Of the mesh as it is edited: how bones hold it, its groups as stored, its points in armature space."""
     armature = drive.armature_of(obj)
     bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
     weights = mesh_io.read_group_weights(obj.data)
-    weighting = _weighting(obj, weights, bones)
     points = _in_armature_space(obj, armature, obj.data, depsgraph)
+    return _weighting(obj, weights, bones), weights, points
+
+
+def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
+    armature = drive.armature_of(obj)
+    weighting, weights, points = read_edited(obj, depsgraph)
+    bones = weighting.bones
     edited = influences = weighting.influences_over_joints(points)
     evaluated = obj.evaluated_get(depsgraph).data
     if stack.changes_in_front(obj):
@@ -300,14 +302,3 @@ def _in_armature_space(
     points = mesh_io.read_points(mesh.vertices)
     space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     return points if space is None else points @ space[:3, :3].T + space[:3, 3]
-
-
-def _joined_influences(parts: Sequence[Part]) -> Influences:
-    offsets, bones, first_influence, first_bone = [np.zeros(1, np.int32)], [], 0, 0
-    for part in parts:
-        offsets.append(part.influences.offsets[1:] + first_influence)
-        bones.append(part.influences.bones + first_bone)
-        first_influence += len(part.influences.bones)
-        first_bone += len(part.weighting.bones.rest)
-    weights = [part.influences.weights for part in parts]
-    return Influences(np.concatenate(offsets), np.concatenate(bones), np.concatenate(weights))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rest points, shape keys and weights from a mesh; deformed points into an attribute of it."""
+"""Rest points, surface, shape keys and weights from a mesh; deformed points into an attribute of it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
+from ..core.surface import Surface, same_places
 
 
 def read_points(vertices: bpy.types.bpy_prop_collection) -> np.ndarray:
@@ -16,6 +17,16 @@ def read_points(vertices: bpy.types.bpy_prop_collection) -> np.ndarray:
     points = np.empty((len(vertices), 3), dtype=np.float32)
     vertices.foreach_get("co", points.ravel())
     return points
+
+
+def read_surface(mesh: bpy.types.Mesh) -> Surface:
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    edges = np.empty((len(mesh.edges), 2), dtype=np.int32)
+    mesh.edges.foreach_get("vertices", edges.ravel())
+    points = read_points(mesh.vertices)
+    return Surface(len(mesh.vertices), triangles, edges, same_places(points))
 
 
 def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:

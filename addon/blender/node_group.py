@@ -13,12 +13,14 @@ ATTRIBUTE, CARRIER = 3, 2
 POSE = "Pose"
 
 
+def find(kind: int) -> bpy.types.NodeTree | None:
+    return next((g for g in bpy.data.node_groups if g.get(MARK) == kind and g.library is None), None)
+
+
 def get_or_make(kind: int) -> bpy.types.NodeTree:
     """The group that takes points from an ATTRIBUTE or from a CARRIER."""
-    for group in bpy.data.node_groups:
-        if group.get(MARK) == kind and group.library is None:
-            return group
-    return _make_for_attribute() if kind == ATTRIBUTE else _make_for_carrier()
+    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
+    return find(kind) or make()
 
 
 def is_sinew(modifier: bpy.types.Modifier) -> bool:
@@ -28,8 +30,13 @@ def is_sinew(modifier: bpy.types.Modifier) -> bool:
 
 
 def remove_unused() -> None:
-    for group in [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and g.users == 0]:
-        bpy.data.node_groups.remove(group)
+    def unused() -> list[bpy.types.NodeTree]:
+        return [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and g.users == 0]
+
+    # One group can be all that uses another.
+    while groups := unused():
+        for group in groups:
+            bpy.data.node_groups.remove(group)
 
 
 def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
@@ -77,7 +84,7 @@ def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
     )
 
 
-def _new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
+def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[MARK] = kind
     group.is_modifier = True
@@ -89,7 +96,7 @@ def _new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.
     return group
 
 
-def _nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
+def add_nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
     nodes = [group.nodes.new(kind) for kind in kinds]
     for column, node in enumerate(nodes):
         node.location = (220 * column, 0)
@@ -97,7 +104,7 @@ def _nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
 
 
 def _make_for_attribute() -> bpy.types.NodeTree:
-    group = _new_group(
+    group = new_group(
         "Sinew",
         ATTRIBUTE,
         {
@@ -105,7 +112,7 @@ def _make_for_attribute() -> bpy.types.NodeTree:
             POSE: ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points"),
         },
     )
-    source, named, place, result = _nodes(
+    source, named, place, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeInputNamedAttribute",
@@ -123,7 +130,7 @@ def _make_for_attribute() -> bpy.types.NodeTree:
 
 
 def _make_for_carrier() -> bpy.types.NodeTree:
-    group = _new_group(
+    group = new_group(
         "Sinew Carrier",
         CARRIER,
         {
@@ -134,7 +141,7 @@ def _make_for_carrier() -> bpy.types.NodeTree:
             ),
         },
     )
-    source, info, index, position, sample, place, result = _nodes(
+    source, info, index, position, sample, place, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeObjectInfo",
@@ -148,14 +155,14 @@ def _make_for_carrier() -> bpy.types.NodeTree:
     link = group.links.new
     link(source.outputs["Points"], info.inputs["Object"])
     link(info.outputs["Geometry"], sample.inputs["Geometry"])
-    link(position.outputs["Position"], _enabled(sample.inputs, "Value"))
+    link(position.outputs["Position"], enabled_socket(sample.inputs, "Value"))
     link(index.outputs["Index"], sample.inputs["Index"])
-    link(_enabled(sample.outputs, "Value"), place.inputs["Position"])
+    link(enabled_socket(sample.outputs, "Value"), place.inputs["Position"])
     link(source.outputs["Geometry"], place.inputs["Geometry"])
     # Where the numbers of vertices differ, as before the first points are written, the shape is left alone.
-    link(_same_count(group, source.outputs["Geometry"], info.outputs["Geometry"]), place.inputs["Selection"])
+    link(same_count(group, source.outputs["Geometry"], info.outputs["Geometry"]), place.inputs["Selection"])
     # Never taken: naming the object in a node is what makes Blender evaluate it.
-    front, choice = _nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
+    front, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
     choice.input_type = "GEOMETRY"
     link(source.outputs["Front"], front.inputs["Object"])
     link(place.outputs["Geometry"], choice.inputs["False"])
@@ -164,21 +171,21 @@ def _make_for_carrier() -> bpy.types.NodeTree:
     return group
 
 
-def _same_count(
+def same_count(
     group: bpy.types.NodeTree, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
     """Whether two meshes have the same number of vertices."""
-    first, second, equal = _nodes(
+    first, second, equal = add_nodes(
         group, "GeometryNodeAttributeDomainSize", "GeometryNodeAttributeDomainSize", "FunctionNodeCompare"
     )
     equal.data_type, equal.operation = "INT", "EQUAL"
     for size, geometry, term in ((first, a, "A"), (second, b, "B")):
         size.component = "MESH"
         group.links.new(geometry, size.inputs["Geometry"])
-        group.links.new(size.outputs["Point Count"], _enabled(equal.inputs, term))
+        group.links.new(size.outputs["Point Count"], enabled_socket(equal.inputs, term))
     return equal.outputs["Result"]
 
 
-def _enabled(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
+def enabled_socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
     """A socket of a node that has one of that name for each type of data."""
     return next(socket for socket in sockets if socket.name == name and socket.enabled)

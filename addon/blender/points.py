@@ -7,9 +7,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import carrier, front, mesh_io, node_group, properties, stack
+from . import carrier, front, heat_nodes, mesh_io, node_group, properties, stack
 
 ATTRIBUTE = "sinew_points"
+# Beside them, while a heat map is shown: the colour of each vertex.
+COLOURS = "sinew_colours"
 
 
 def arrange(obj: bpy.types.Object) -> None:
@@ -25,14 +27,19 @@ def arrange(obj: bpy.types.Object) -> None:
         if settings.attribute:
             remove_attributes(obj)
             settings.attribute = ""
-        group = node_group.get_or_make(node_group.CARRIER)
+        kind = node_group.CARRIER
         inputs = {"Points": carrier.ensure(obj), "Front": made}
     else:
         carrier.remove(obj)
         if not settings.attribute:
             settings.attribute = _free_attribute_name(obj)
-        group = node_group.get_or_make(node_group.ATTRIBUTE)
+        kind = node_group.ATTRIBUTE
         inputs = {"Points": settings.attribute}
+    if settings.heat:
+        group = heat_nodes.get_or_make(kind)
+        inputs["Colours"] = _colours_name(settings)
+    else:
+        group = node_group.get_or_make(kind)
     if nodes.node_group != group:
         nodes.node_group = group
     node_group.set_inputs(nodes, inputs)
@@ -55,6 +62,29 @@ def keep_shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         points = np.empty((len(shown.data), 3), dtype=np.float32)
         shown.data.foreach_get("vector", points.ravel())
         mesh_io.store_points(obj.data, name, points)
+
+
+def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
+    """Stores float32 [vertices, 3], linear."""
+    settings = properties.of(obj)
+    mesh_io.write_points(_holding_mesh(obj), _colours_name(settings), colours)
+
+
+def has_colours(obj: bpy.types.Object) -> bool:
+    return _colours_name(properties.of(obj)) in _holding_mesh(obj).attributes
+
+
+def remove_colours(obj: bpy.types.Object) -> None:
+    mesh_io.remove_points(_holding_mesh(obj), _colours_name(properties.of(obj)))
+
+
+def _holding_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    carrier = properties.of(obj).carrier
+    return obj.data if carrier is None else carrier.data
+
+
+def _colours_name(settings: properties.SinewSettings) -> str:
+    return settings.attribute.replace(ATTRIBUTE, COLOURS) or COLOURS
 
 
 def are_written(obj: bpy.types.Object, count: int) -> bool:
@@ -102,12 +132,13 @@ def _free_attribute_name(obj: bpy.types.Object) -> str:
 
 
 def _attributes_of_others(obj: bpy.types.Object) -> set[str]:
-    """The attributes that the mesh's other driven users hold their points in."""
-    return {
-        properties.of(other).attribute
+    """The attributes that the mesh's other driven users hold their points and colours in."""
+    others = [
+        properties.of(other)
         for other in bpy.data.objects
         if other != obj and properties.is_driven(other) and other.data == obj.data
-    }
+    ]
+    return {name for settings in others for name in (settings.attribute, _colours_name(settings))}
 
 
 def remove_attributes(obj: bpy.types.Object) -> None:
@@ -117,5 +148,5 @@ def remove_attributes(obj: bpy.types.Object) -> None:
         return
     used = _attributes_of_others(obj)
     for name in [attribute.name for attribute in obj.data.attributes]:
-        if name.startswith(ATTRIBUTE) and name not in used:
+        if name.startswith((ATTRIBUTE, COLOURS)) and name not in used:
             mesh_io.remove_points(obj.data, name)

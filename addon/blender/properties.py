@@ -14,6 +14,12 @@ from ..core import inbetween
 from ..core.scale_rule import SCALE_RULES
 
 METHODS = {method.name: method for method in sinew.methods()}
+# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
+BLENDER = "blender"
+
+
+def method_label(name: str) -> str:
+    return "Armature modifier" if name == BLENDER else METHODS[name].label
 
 
 @dataclass
@@ -25,6 +31,7 @@ class Listeners:
     inbetween_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     object_asked: Callable[[bpy.types.Object], None] | None = None
     mesh_asked: Callable[[bpy.types.Mesh], None] | None = None
+    heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
 
 
 listeners = Listeners()
@@ -50,6 +57,11 @@ def _mesh_asked(mesh: bpy.types.Mesh) -> float:
     if listeners.mesh_asked is not None:
         listeners.mesh_asked(mesh)
     return 0.0
+
+
+def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+    if listeners.heat_changed is not None:
+        listeners.heat_changed(settings.id_data, context)
 
 
 # On a library override, only what is marked so is kept with the file.
@@ -107,6 +119,13 @@ class SinewSettings(bpy.types.PropertyGroup):
         default=True,
         options=set(),
         update=_enabled_changed,
+        override=OVERRIDABLE,
+    )
+    heat: bpy.props.BoolProperty(
+        name="Heat Map",
+        description="Show a measure of the deformation as colours of the mesh",
+        options=set(),
+        update=_heat_changed,
         override=OVERRIDABLE,
     )
     stand_ins: bpy.props.CollectionProperty(

@@ -25,15 +25,20 @@ def register() -> None:
         comparison_operators,
         comparison_panel,
         comparison_state,
+        diagnostics_panel,
         handlers,
+        heat_panel,
         inbetween_handlers,
+        measures,
         operators,
         panels,
         properties,
     )
 
-    _register_classes((*properties.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes((*properties.CLASSES, *measures.CLASSES, *operators.CLASSES, *panels.CLASSES))
     _register_classes((*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES))
+    _register_classes((*heat_panel.CLASSES, *diagnostics_panel.CLASSES))
+    measures.register()
     bpy.types.Scene.sinew_comparison = bpy.props.PointerProperty(type=comparison_state.SinewComparison)
     comparison_labels.register()
     bpy.types.Object.sinew = bpy.props.PointerProperty(
@@ -47,6 +52,7 @@ def register() -> None:
     inbetween_handlers.register()
     inbetween_handlers.adopt_open_file()
     handlers.register()
+    diagnostics_panel.register()
     handlers.adopt_open_file()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
     # handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5.
@@ -55,10 +61,21 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import comparison_labels, drive, handlers, inbetween_handlers, properties
+        from . import (
+            comparison_labels,
+            diagnostics_panel,
+            drive,
+            handlers,
+            heat_legend,
+            inbetween_handlers,
+            measures,
+            properties,
+        )
 
         atexit.unregister(unregister)
         comparison_labels.unregister()
+        diagnostics_panel.unregister()
+        heat_legend.show(False)
         # As in a saved file: the last shape stays, and the Armature modifiers point to their armatures again.
         for obj in bpy.data.objects:
             if properties.is_driven(obj):
@@ -66,6 +83,7 @@ def unregister() -> None:
                 drive.give_back(obj)
         handlers.unregister()
         inbetween_handlers.unregister()
+        measures.unregister()
         del bpy.types.Object.sinew, bpy.types.Mesh.sinew_asked, bpy.types.Action.sinew_holds
         del bpy.types.Scene.sinew_comparison
         for name in properties.INBETWEEN:

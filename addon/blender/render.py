@@ -17,7 +17,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
+from ..core.heat import linear
 from ..core.views import View, camera_axes
 
 CLAY = (0.72, 0.66, 0.6)
@@ -45,7 +46,7 @@ def has_opengl() -> bool:
 
 def check_size(size: int) -> None:
     if not 64 <= size <= 4096:
-        raise SinewError(f"size: expected 64 to 4096 pixels, got {size}")
+        raise WrongUse(f"size: expected 64 to 4096 pixels, got {size}")
 
 
 def chosen_engine(wanted: str) -> str:
@@ -173,8 +174,7 @@ def _painted_copy(obj: bpy.types.Object, colours: np.ndarray) -> bpy.types.Objec
     mesh = bpy.data.meshes.new_from_object(evaluated)
     attribute = mesh.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
     values = np.ones((len(colours), 4), dtype=np.float32)
-    # Stored linear.
-    values[:, :3] = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    values[:, :3] = linear(colours)
     attribute.data.foreach_set("color", values.ravel())
     index = mesh.color_attributes.find(HEAT)
     mesh.color_attributes.active_color_index = mesh.color_attributes.render_color_index = index

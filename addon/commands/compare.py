@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..core.comparison import Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.output import write_text
 from ..core.page import page
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     frames = parse_frames(args.frames) if args.frames else None
     for option in ("pictures", "influences"):
         if getattr(args, option) < 0:
-            raise SinewError(f"{option}: expected 0 or more, got {getattr(args, option)}")
+            raise WrongUse(f"{option}: expected 0 or more, got {getattr(args, option)}")
     _check_names(args.files)
     if args.video:
         require_pillow()
@@ -108,7 +108,7 @@ def _check_names(files: list[Path]) -> None:
     for path in files:
         other = known.setdefault(path.stem, path)
         if other is not path:
-            raise SinewError(f"{other} and {path} would both be written to {path.stem}.html")
+            raise WrongUse(f"{other} and {path} would both be written to {path.stem}.html")
 
 
 def _compare(

@@ -7,7 +7,7 @@ import argparse
 from functools import partial
 from pathlib import Path
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.golden import (
     SETTINGS,
@@ -64,16 +64,16 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..blender import evaluate
 
     if not args.tolerance >= 0.0:
-        raise SinewError(f"tolerance: expected a percentage of 0 or more, got {args.tolerance}")
+        raise WrongUse(f"tolerance: expected a percentage of 0 or more, got {args.tolerance}")
     golden = None
     if args.against is not None:
         if args.against.resolve() == args.out.resolve():
-            raise SinewError(f"{args.out}: would replace the golden pictures; choose another --out")
+            raise WrongUse(f"{args.out}: would replace the golden pictures; choose another --out")
         golden = RenderSettings.read(args.against)
     method = args.method or (golden and golden.method)
     frames = parse_frames(args.frames) if args.frames else golden and golden.frames
     if method is None or frames is None:
-        raise SinewError("render: --method and --frames are needed where there is no --against")
+        raise WrongUse("render: --method and --frames are needed where there is no --against")
     evaluate.check_methods([method])
     if golden is not None:
         _check_fits(args, golden, frames)
@@ -86,12 +86,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _check_fits(args: argparse.Namespace, golden: RenderSettings, frames: list[float]) -> None:
     missing = [frame for frame in frames if frame not in golden.frames]
     if missing:
-        raise SinewError(f"{args.against}: has no picture of frame {missing[0]}; make the golden ones anew")
+        raise WrongUse(f"{args.against}: has no picture of frame {missing[0]}; make the golden ones anew")
     for name, wanted in (("size", golden.size), ("engine", golden.engine)):
         if getattr(args, name) not in (None, "auto", wanted):
-            raise SinewError(f"{name}: the golden pictures have {wanted}, got {getattr(args, name)}")
+            raise WrongUse(f"{name}: the golden pictures have {wanted}, got {getattr(args, name)}")
     if args.own_look != golden.own_look:
-        raise SinewError(
+        raise WrongUse(
             f"{args.against}: was made with{'' if golden.own_look else 'out'} --own-look; do the same here"
         )
 

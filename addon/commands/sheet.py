@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.errors import SinewError
+from ..core.errors import WrongUse
 from ..core.frames import parse_frames
 from ..core.sheet import Column, require_pillow, write_sheet
 from ..core.views import close_view, place_of_difference
@@ -28,14 +28,12 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
 
     require_pillow()
     if args.out.suffix.lower() != ".png":
-        raise SinewError(f"{args.out}: a sheet is a PNG; give a name ending in .png, or a folder for pages")
+        raise WrongUse(f"{args.out}: a sheet is a PNG; give a name ending in .png, or a folder for pages")
     if len(args.files) != 1:
-        raise SinewError(
-            f"{args.out}: a sheet shows one file, got {len(args.files)}; give a folder for pages"
-        )
+        raise WrongUse(f"{args.out}: a sheet shows one file, got {len(args.files)}; give a folder for pages")
     frames = parse_frames(args.frames or "")
     if len(frames) != 1:
-        raise SinewError(f"frame: expected one frame, got {args.frames!r}")
+        raise WrongUse(f"frame: expected one frame, got {args.frames!r}")
     (path,), (frame,) = args.files, frames
     files.open_file(path)
     scene = bpy.context.scene

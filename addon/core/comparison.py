@@ -8,6 +8,7 @@ import io
 import json
 import math
 import statistics
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 
 from .diagnostics import Finding
@@ -175,6 +176,16 @@ class Comparison:
             ensure_ascii=False,
             allow_nan=False,
         )
+
+
+def peaks(values: Sequence[float], count: int) -> list[int]:
+    """At most `count` places of the largest of `values`, largest first: those of no neighbour that is larger,
+    the first of equal neighbours. Frames next to the worst one are as good as the same."""
+    padded = [-math.inf, *values, -math.inf]
+    places = [
+        place for place, value in enumerate(values) if padded[place] < value and value >= padded[place + 2]
+    ]
+    return sorted(places, key=lambda place: -values[place])[:count]
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +87,21 @@ class Influences:
     def counts(self) -> np.ndarray:
         """int [vertices]: influences of each vertex."""
         return np.diff(self.offsets)
+
+
+def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influences:
+    """Of several meshes as one, their vertices and their bones one after the other.
+
+    bone_counts  of the bones (and joints) that each part's influences number
+    """
+    offsets, bones, first_influence, first_bone = [np.zeros(1, np.int32)], [], 0, 0
+    for part, count in zip(parts, bone_counts, strict=True):
+        offsets.append(part.offsets[1:] + first_influence)
+        bones.append(part.bones + first_bone)
+        first_influence += len(part.bones)
+        first_bone += count
+    weights = [part.weights for part in parts]
+    return Influences(np.concatenate(offsets), np.concatenate(bones), np.concatenate(weights))
 
 
 def entries_of_bones(groups: GroupWeights, bone_of_group: np.ndarray) -> Entries:

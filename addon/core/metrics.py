@@ -11,8 +11,10 @@ Bind a Gauge to a mesh, tell it each frame's rest shape and bones, measure any n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -163,84 +165,122 @@ class Gauge:
         """influences  of every vertex of the surface, over the bones of FrameOfRig's arrays"""
         self.surface = surface
         self.rest: Shape | None = None
-        self._influences = influences
-        # Vertices that bones hold, and where the influences of each begin.
-        self._held = np.flatnonzero(influences.counts)
-        self._starts = influences.offsets[self._held].astype(np.int64)
-        self._heaviest = _heaviest_bones(influences, self._held, self._starts)
+        self._hold = Hold(surface, influences)
+        self._pose: Pose | None = None
 
     def set_frame(self, frame: FrameOfRig) -> None:
         """What the shapes measured from now on are measured against."""
-        rest = _by_axis(frame.rest)
         # Unless shape keys move it, or the object moves, it is that of the last frame.
-        if self.rest is None or not np.array_equal(rest, self.rest.points):
+        same = self._pose is not None and frame.rest is self._pose.frame.rest
+        if not same and (self.rest is None or not np.array_equal(frame.rest.T, self.rest.points)):
             self.rest = Shape(self.surface, frame.rest)
-        self._posed_axes = frame.posed_axes
-        self._rest_distances = self._distances_from_axes(rest, frame.rest_axes)
-        self._carried = self._carried_normals(frame.rotations)
+        self._pose = Pose(self._hold, self.rest, frame)
 
-    def measure(self, points: np.ndarray, other: np.ndarray | None = None) -> Measured:
-        """A shape [vertices, 3] in the frame set last, and how far it is from the shape `other`."""
-        shape = Shape(self.surface, points)
-        distance, bulge = np.zeros((2, self.surface.vertex_count))
-        if other is not None:
-            apart = shape.points - _by_axis(other)
-            distance = np.sqrt(dots(apart, apart))
-        bulge[self._held] = self._distances_from_axes(shape.points, self._posed_axes) - self._rest_distances
-        flipped = dots(shape.normals, self._carried) < 0.0
-        return Measured(self.rest, shape, distance, bulge, flipped)
+    def measure(
+        self, points: np.ndarray, other: np.ndarray | Callable[[], np.ndarray] | None = None
+    ) -> Measured:
+        """A shape [vertices, 3] in the frame set last, and how far it is from the shape `other`, or from what
+        that returns.
 
-    def _distances_from_axes(self, points: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        """float64 [held vertices]: from the segment of the bone that holds each most."""
+        What is asked of the result is worked out then.
+        """
+        return Measured(self._pose, Shape(self.surface, points), other)
+
+
+class Hold:
+    """Which bones hold which vertices.
+
+    held      int [held], the vertices that bones hold
+    starts    int64 [held], where the influences of each begin
+    heaviest  int [held], the bone of the largest weight of each, the first of equals
+    """
+
+    def __init__(self, surface: Surface, influences: Influences) -> None:
+        self.surface, self._influences = surface, influences
+        self.held = np.flatnonzero(influences.counts)
+        self.starts = influences.offsets[self.held].astype(np.int64)
+        self.heaviest = _heaviest_bones(influences, self.held, self.starts)
+
+    def distances_from_axes(self, points: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """float64 [held]: from the segment of the bone that holds each most, for points [3, vertices]."""
         heads = np.ascontiguousarray(axes[:, 0].T, dtype=np.float64)
         bones = np.ascontiguousarray((axes[:, 1] - axes[:, 0]).T, dtype=np.float64)
-        along = bones.take(self._heaviest, axis=1)
-        from_head = points.take(self._held, axis=1) - heads.take(self._heaviest, axis=1)
+        along = bones.take(self.heaviest, axis=1)
+        from_head = points.take(self.held, axis=1) - heads.take(self.heaviest, axis=1)
         squared = dots(along, along)
         share = np.divide(dots(from_head, along), squared, out=np.zeros_like(squared), where=squared > 0.0)
         offset = from_head - share.clip(0.0, 1.0) * along
         return np.sqrt(dots(offset, offset))
 
-    def _carried_normals(self, rotations: np.ndarray) -> np.ndarray:
-        """float64 [3, triangles]: rest normals, of any length, turned with the bones of their corners.
+    def carried_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """float32 [3, triangles]: normals, of any length, turned with the bones of their corners.
 
         rotations  unit quaternions [4, bones]
         """
-        turns = np.zeros((4, self.surface.vertex_count))
+        # Single precision tells on which side a face looks.
+        rotations = rotations.astype(np.float32)
+        turns = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
         turns[0] = 1.0
-        if len(self._held):
-            bones, weights = self._influences.bones, self._influences.weights.astype(np.float64)
-            heaviest = np.repeat(self._heaviest, self._influences.counts[self._held])
+        if len(self.held):
+            bones, weights = self._influences.bones, self._influences.weights
+            heaviest = np.repeat(self.heaviest, self._influences.counts[self.held])
             terms = rotations.take(bones, axis=1)
             # All on the side of the heaviest: a sum of two then never cancels.
             terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
-            sums = np.add.reduceat(terms, self._starts, axis=1)
-            turns[:, self._held] = sums / np.maximum(np.sqrt(dots(sums, sums)), 1e-12)
+            sums = np.add.reduceat(terms, self.starts, axis=1)
+            turns[:, self.held] = sums / np.maximum(np.sqrt(dots(sums, sums)), np.float32(1e-12))
         first, second, third = (turns.take(corner, axis=1) for corner in self.surface.corners)
-        total = first + np.where(dots(first, second) < 0.0, -1.0, 1.0) * second
-        total += np.where(dots(first, third) < 0.0, -1.0, 1.0) * third
-        return rotated(total, self.rest.normals)
+        one = np.float32(1.0)
+        total = first + np.where(dots(first, second) < 0.0, -one, one) * second
+        total += np.where(dots(first, third) < 0.0, -one, one) * third
+        return rotated(total, normals.astype(np.float32))
+
+
+class Pose:
+    """What all shapes of one frame are measured against; worked out once, and only where it is asked for."""
+
+    def __init__(self, hold: Hold, rest: Shape, frame: FrameOfRig) -> None:
+        self.hold, self.rest, self.frame = hold, rest, frame
+
+    @cached_property
+    def rest_distances(self) -> np.ndarray:
+        """float64 [held]: from the axes at rest."""
+        return self.hold.distances_from_axes(self.rest.points, self.frame.rest_axes)
+
+    @cached_property
+    def carried_normals(self) -> np.ndarray:
+        """float32 [3, triangles]: rest normals as the bones turn them."""
+        return self.hold.carried_normals(self.rest.normals, self.frame.rotations)
 
 
 class Shape:
-    """A surface at given points.
+    """A surface at given points; the rest is worked out where it is asked for.
 
-    points   float64 [3, vertices]
-    normals  float64 [3, triangles], outwards, twice the triangle's area long
-    areas    float64 [triangles]
-    lengths  float64 [edges]
+    points  float64 [3, vertices]
     """
 
     def __init__(self, surface: Surface, points: np.ndarray) -> None:
         """points  [vertices, 3]"""
         self.surface = surface
         self.points = _by_axis(points)
-        a, b, c = (self.points.take(corner, axis=1) for corner in surface.corners)
-        self.normals = cross(b - a, c - a)
-        self.areas = 0.5 * np.sqrt(dots(self.normals, self.normals))
-        first, second = (self.points.take(end, axis=1) for end in surface.ends)
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """float64 [3, triangles], outwards, twice the triangle's area long."""
+        a, b, c = (self.points.take(corner, axis=1) for corner in self.surface.corners)
+        return cross(b - a, c - a)
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """float64 [triangles]"""
+        return 0.5 * np.sqrt(dots(self.normals, self.normals))
+
+    @cached_property
+    def lengths(self) -> np.ndarray:
+        """float64 [edges]"""
+        first, second = (self.points.take(end, axis=1) for end in self.surface.ends)
         along = second - first
-        self.lengths = np.sqrt(dots(along, along))
+        return np.sqrt(dots(along, along))
 
     @cached_property
     def volume(self) -> float:
@@ -264,35 +304,70 @@ class Shape:
 class Measured:
     """One shape beside its rest shape: numbers, and the fields of METRICS."""
 
-    def __init__(
-        self, rest: Shape, shape: Shape, distance: np.ndarray, bulge: np.ndarray, flipped: np.ndarray
-    ) -> None:
-        """distance, bulge [vertices]; flipped [triangles]"""
-        self.rest, self.shape = rest, shape
-        self.distance, self.bulge, self.flipped = distance, bulge, flipped
-        self.stretch = _ratios(shape.lengths, rest.lengths)
-        self.area_ratios = _ratios(shape.areas, rest.areas)
+    def __init__(self, pose: Pose, shape: Shape, other: np.ndarray | Callable[[], np.ndarray] | None) -> None:
+        """other  [vertices, 3], or what returns it: where distances are measured to"""
+        self.rest, self.shape = pose.rest, shape
+        self._pose, self._other = pose, other
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        """float64 [vertices]: from the other shape, 0 where there is none."""
+        if self._other is None:
+            return np.zeros(self.shape.surface.vertex_count)
+        other = self._other() if callable(self._other) else self._other
+        apart = self.shape.points - _by_axis(other)
+        return np.sqrt(dots(apart, apart))
+
+    @cached_property
+    def bulge(self) -> np.ndarray:
+        """float64 [vertices]"""
+        bulge, pose = np.zeros(self.shape.surface.vertex_count), self._pose
+        hold = pose.hold
+        bulge[hold.held] = hold.distances_from_axes(self.shape.points, pose.frame.posed_axes)
+        bulge[hold.held] -= pose.rest_distances
+        return bulge
+
+    @cached_property
+    def flipped(self) -> np.ndarray:
+        """bool [triangles]"""
+        return dots(self.shape.normals, self._pose.carried_normals) < 0.0
+
+    @cached_property
+    def stretch(self) -> np.ndarray:
+        """float64 [edges]"""
+        return _ratios(self.shape.lengths, self.rest.lengths)
+
+    @cached_property
+    def area_ratios(self) -> np.ndarray:
+        """float64 [triangles]"""
+        return _ratios(self.shape.areas, self.rest.areas)
+
+    def entry(self, name: str) -> float:
+        """One entry of the summary, or `bulge_worst`, without working out the others."""
+        return self._ENTRIES[name](self)
 
     def summary(self) -> Summary:
-        rest, shape = self.rest, self.shape
-        return Summary(
-            distance_max=float(self.distance.max(initial=0.0)),
-            distance_rms=_rms(self.distance),
-            volume=shape.volume,
-            volume_change=_change(shape.volume, rest.volume),
-            area=shape.area,
-            area_change=_change(shape.area, rest.area),
-            area_min=float(self.area_ratios.min(initial=1.0)),
-            area_max=float(self.area_ratios.max(initial=1.0)),
-            area_rms=_rms(self.area_ratios - 1.0, rest.areas),
-            stretch_min=float(self.stretch.min(initial=1.0)),
-            stretch_max=float(self.stretch.max(initial=1.0)),
-            stretch_rms=_rms(self.stretch - 1.0, rest.lengths),
-            bulge_min=float(self.bulge.min(initial=0.0)),
-            bulge_max=float(self.bulge.max(initial=0.0)),
-            flipped_faces=int(self.flipped.sum()),
-            flipped_area=_share(float(rest.areas[self.flipped].sum()), rest.area),
-        )
+        return Summary(**{field.name: self.entry(field.name) for field in fields(Summary)})
+
+    _ENTRIES: ClassVar[dict[str, Callable[[Measured], float]]] = {
+        "distance_max": lambda m: float(m.distance.max(initial=0.0)),
+        "distance_rms": lambda m: _rms(m.distance),
+        "volume": lambda m: m.shape.volume,
+        "volume_change": lambda m: _change(m.shape.volume, m.rest.volume),
+        "area": lambda m: m.shape.area,
+        "area_change": lambda m: _change(m.shape.area, m.rest.area),
+        "area_min": lambda m: float(m.area_ratios.min(initial=1.0)),
+        "area_max": lambda m: float(m.area_ratios.max(initial=1.0)),
+        "area_rms": lambda m: _rms(m.area_ratios - 1.0, m.rest.areas),
+        "stretch_min": lambda m: float(m.stretch.min(initial=1.0)),
+        "stretch_max": lambda m: float(m.stretch.max(initial=1.0)),
+        "stretch_rms": lambda m: _rms(m.stretch - 1.0, m.rest.lengths),
+        "bulge_min": lambda m: float(m.bulge.min(initial=0.0)),
+        "bulge_max": lambda m: float(m.bulge.max(initial=0.0)),
+        "bulge_worst": lambda m: float(np.abs(m.bulge).max(initial=0.0)),
+        "flipped_faces": lambda m: int(m.flipped.sum()),
+        "flipped_area": lambda m: _share(float(m.rest.areas[m.flipped].sum()), m.rest.area),
+    }
 
     def field(self, name: str) -> np.ndarray:
         """float64 [vertices]: one of METRICS at each vertex."""
@@ -315,11 +390,13 @@ class Measured:
         raise ValueError(f"field: expected one of {', '.join(METRICS)}, got {name!r}")
 
     def _most_changed_edges(self) -> np.ndarray:
-        ends = self.shape.surface.ends
+        around = self.shape.surface.edges_around
         longest, shortest = np.ones((2, self.shape.surface.vertex_count))
-        for end in ends:
-            np.maximum.at(longest, end, self.stretch)
-            np.minimum.at(shortest, end, self.stretch)
+        stretch = self.stretch.take(around.edges)
+        if len(stretch):
+            longest[around.vertices] = np.maximum.reduceat(stretch, around.starts)
+            shortest[around.vertices] = np.minimum.reduceat(stretch, around.starts)
+        longest, shortest = np.maximum(longest, 1.0), np.minimum(shortest, 1.0)
         return np.where(longest * shortest >= 1.0, longest, shortest)
 
 

@@ -39,6 +39,13 @@ class Surface:
         return np.ascontiguousarray(self.edges.T, dtype=np.int64)
 
     @cached_property
+    def edges_around(self) -> EdgesAround:
+        ends = self.ends.ravel()
+        order = np.argsort(ends, kind="stable")
+        vertices, starts = np.unique(ends[order], return_index=True)
+        return EdgesAround(vertices, starts, order % max(len(self.edges), 1))
+
+    @cached_property
     def _sides(self) -> tuple[np.ndarray, np.ndarray]:
         """Sides of triangles from vertex to vertex, int64 [n]: those that lack a neighbour running the other
         way, as often as they lack it, and those that occur more than once."""
@@ -64,6 +71,20 @@ class Surface:
         """What closes the holes."""
         borders = self._sides[0]
         return Caps.over(borders // self.vertex_count, borders % self.vertex_count)
+
+
+@dataclass(frozen=True)
+class EdgesAround:
+    """The edges at each vertex, vertex by vertex.
+
+    vertices  int64 [n], those that have edges
+    starts    int64 [n], where in `edges` those of each begin
+    edges     int64 [2 edges]
+    """
+
+    vertices: np.ndarray
+    starts: np.ndarray
+    edges: np.ndarray
 
 
 @dataclass(frozen=True)

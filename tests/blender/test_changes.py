@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from sinew_addon.blender import drive, properties
+from sinew_addon.blender import drive, evaluate, mesh_io, properties
 from test_editing import assert_follows
 
 
@@ -252,3 +252,27 @@ def test_registered_with_a_driven_file_open():
     bpy.context.scene.frame_set(3)
     bpy.context.scene.frame_set(11)
     assert scenes.worst(shown, scenes.final_points(obj)) <= 1e-6
+
+
+def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    evaluate.use_method(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    reads, read = [], mesh_io.read_group_weights
+    monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: reads.append(mesh) or read(mesh))
+    for method in ("lbs", "blender", "qv", "dq"):
+        evaluate.use_method(obj, method)
+        bpy.context.scene.frame_set(10)
+        bpy.context.scene.frame_set(11)
+    assert reads == []
+    before = scenes.final_points(obj)
+    obj.vertex_groups["bone.1"].remove(range(len(obj.data.vertices)))
+    obj.data.update()
+    evaluate.use_method(obj, "lbs")
+    assert len(reads) == 1
+    expected = scenes.rest_points(obj)
+    assert scenes.worst(before, expected) > 0.1
+    evaluate.use_method(obj, "blender")
+    expected = scenes.final_points(obj)
+    evaluate.use_method(obj, "lbs")
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)

@@ -187,11 +187,21 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         ),
         (["compare", path, "--frame", "1,2", "--out", tmp_path / "a.png"], "expected one frame"),
         (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
+        (["compare", path, path, "--frame", "1", "--out", tmp_path / "a.png"], "a sheet shows one file"),
+        (["compare", path, "--frames", "9-3", "--out", tmp_path], "backwards"),
+        (["compare", path, "--reference", "best", "--out", tmp_path], "expected one of"),
+        (["compare", path, "--pictures", "-1", "--out", tmp_path], "expected 0 or more"),
+        (["compare", path, "--influences", "-1", "--out", tmp_path], "expected 0 or more"),
+        (["compare", path, "--size", "10", "--out", tmp_path], "expected 64 to 4096"),
+        (["compare", path, tmp_path / path.name, "--out", tmp_path], "would both be written"),
+        (["compare", tmp_path / "no.blend", "--out", tmp_path], "no such file"),
+        (["render", path, "--out", tmp_path], "are needed"),
+        (["render", path, "--tolerance", "-1", "--out", tmp_path], "a percentage"),
         (["info", tmp_path / "no.blend"], "no such file"),
     ]
-    wrong_use = {"expected one of", "backwards", "expected frames"}
+    of_files = {"no such file", "is empty", "is a folder", "no mesh is deformed", "no mesh called 'Leg'"}
     for arguments, sentence in cases:
-        result = run_sinew(*arguments, status=2 if sentence in wrong_use else 1)
+        result = run_sinew(*arguments, status=1 if sentence in of_files else 2)
         complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
         assert len(complaints) == 1, result.stderr
         assert sentence in complaints[0]

@@ -141,15 +141,15 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
 
 @pytest.fixture
 def photographed(package, tmp_path, real_rig):
-    """photographed(script): the facts that a script of docs/ prints from a Blender with a window that has
-    Sinew's zip and human.blend; its picture is tmp_path / "picture.png"."""
+    """photographed(script, *pictures): the facts that a script of docs/ prints from a Blender with a window
+    that has Sinew's zip and human.blend."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     if not program:
         pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
     if bpy.app.version < (5, 2):
         pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
 
-    def run(script: str) -> dict[str, object]:
+    def run(script: str, *pictures: str) -> dict[str, object]:
         # The whole Blender sees the temporary folder, not this checkout's neighbours.
         shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
         shutil.copy(package, tmp_path / "sinew.zip")
@@ -157,7 +157,7 @@ def photographed(package, tmp_path, real_rig):
             shutil.copy(REPOSITORY / "docs" / name, tmp_path / name)
         start = [program, "run", "--factory-startup", "--python-exit-code", "3", "human.blend"]
         result = subprocess.run(
-            [*start, "--python", script, "--", "sinew.zip", "picture.png"],
+            [*start, "--python", script, "--", "sinew.zip", *pictures],
             cwd=tmp_path,
             capture_output=True,
             text=True,
@@ -166,7 +166,7 @@ def photographed(package, tmp_path, real_rig):
             env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
         )
         assert "PHOTOGRAPHED" in result.stdout, result.stdout + result.stderr
-        assert (tmp_path / "picture.png").stat().st_size > 20_000
+        assert all((tmp_path / picture).stat().st_size > 20_000 for picture in pictures)
         lines = [line for line in result.stdout.splitlines() if line.startswith("FACTS ")]
         assert lines, result.stdout + result.stderr
         return json.loads(lines[0][6:])
@@ -176,14 +176,14 @@ def photographed(package, tmp_path, real_rig):
 
 def test_the_panel_in_a_window(photographed):
     """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
-    facts = photographed("photograph_panel.py")
+    facts = photographed("photograph_panel.py", "panel.png")
     assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
     assert facts["error"] == ""
 
 
 def test_a_comparison_in_a_window(photographed):
     """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
-    facts = photographed("photograph_comparison.py")
+    facts = photographed("photograph_comparison.py", "comparison.png")
     assert facts["played"]
     assert facts["posed"] > 0.01
     for when in ("played", "posed", "overlaid", "after undo", "reopened"):
@@ -191,3 +191,9 @@ def test_a_comparison_in_a_window(photographed):
     assert facts["flipped"] == [["lbs"], ["dq"], ["lbs"]]
     assert facts["after undo"] == ["dq", "lbs", "qv"]
     assert facts["left"] == []
+
+
+def test_heat_map_and_diagnostics_in_a_window(photographed):
+    """Frames are gone through in steps, the window drawing in between; then the scene is where it was."""
+    facts = photographed("photograph_heat.py", "heat-map.png", "diagnostics.png")
+    assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}

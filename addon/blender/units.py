@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured values as people read them, in the units of the scene."""
+
+from __future__ import annotations
+
+import bpy
+
+# Below this part of a unit a length is none.
+LEAST_LENGTH = 1e-6
+
+
+def text(scene: bpy.types.Scene, unit: str, value: float, signed: bool = False) -> str:
+    """A value whose unit is "length", "ratio" or "share", as in Metric; "not defined" for NaN.
+
+    signed  with a plus above zero, as for a change
+    """
+    if value != value:
+        return "not defined"
+    sign = "+" if signed and value > 0.0 else ""
+    if unit == "length":
+        return sign + _length(scene.unit_settings, value)
+    return f"{value:.2f}\u00d7" if unit == "ratio" else f"{sign}{100 * value:.3g} %"
+
+
+def _length(settings: bpy.types.UnitSettings, value: float) -> str:
+    if settings.system == "NONE":
+        return f"{value:.3g} units"
+    value *= settings.scale_length
+    if abs(value) < LEAST_LENGTH:
+        value = 0.0
+    return bpy.utils.units.to_string(settings.system, "LENGTH", value, precision=3)

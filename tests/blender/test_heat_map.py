@@ -1,0 +1,429 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The heat map: its colours are the measure's, they follow frame and pose, and nothing of it stays."""
+
+from __future__ import annotations
+
+import argparse
+import io
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import snapshot
+import test_linked_data
+import whole_file
+from sinew_addon.blender import (
+    drive,
+    evaluate,
+    handlers,
+    heat_legend,
+    heat_nodes,
+    live,
+    measure,
+    measures,
+    properties,
+)
+from sinew_addon.commands import compare
+from sinew_addon.commands.console import Console
+from sinew_addon.core.heat import HeatScale, linear
+from sinew_addon.core.metrics import METRICS
+
+
+def shown_colours(obj: bpy.types.Object) -> np.ndarray:
+    """float32 [vertices, 3], linear, of the final evaluated mesh."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    attribute = mesh.attributes[heat_nodes.NAME]
+    assert (attribute.data_type, attribute.domain) == ("FLOAT_COLOR", "POINT")
+    colours = np.empty(4 * len(mesh.vertices), dtype=np.float32)
+    attribute.data.foreach_get("color", colours)
+    return colours.reshape(-1, 4)[:, :3]
+
+
+def expected_fields(objects: list[bpy.types.Object], methods: tuple[str, str], frame: float) -> dict:
+    """Each measure at each vertex of all objects, by way of Blender's own evaluations: not what the heat map
+    is made with. Changes the methods."""
+    scene = bpy.context.scene
+    subject = measure.gather(scene, objects)
+    shapes = measure.shapes_at(subject, methods, frame)
+    measured = subject.gauge.measure(*(shapes[method] for method in methods))
+    return {name: measured.field(name) for name in METRICS} | {"diagonal": subject.gauge.rest.diagonal}
+
+
+def choose(quantity: str, **settings: object) -> measures.SinewMeasures:
+    chosen = measures.of(bpy.context.scene)
+    chosen.quantity = quantity
+    for name, value in settings.items():
+        setattr(chosen, name, value)
+    return chosen
+
+
+def in_front(obj: bpy.types.Object) -> None:
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def with_keys(obj: bpy.types.Object) -> None:
+    obj.shape_key_add(name="Basis")
+    block = obj.shape_key_add(name="Key")
+    for point in block.data:
+        point.co.z *= 1.5
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        block.value = value
+        block.keyframe_insert("value", frame=frame)
+
+
+def placed(obj: bpy.types.Object) -> None:
+    obj.location, obj.scale = (0.5, 0.2, 0.0), (1.5, 1.5, 1.5)
+    armature = obj.modifiers["Armature"].object
+    armature.location, armature.rotation_euler = (1.0, -2.0, 0.3), (0.2, 0.1, 0.7)
+
+
+@pytest.mark.parametrize("quantity", METRICS)
+@pytest.mark.parametrize("set_up", [None, in_front, with_keys, placed])
+def test_colours_are_those_of_the_measure(quantity, set_up):
+    obj, armature = scenes.make_arm()
+    if set_up is not None:
+        set_up(obj)
+    # Bent so far that linear blend turns faces over.
+    scenes.key_pose(armature, 170.0)
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(11)
+    expected = expected_fields([obj], ("lbs", "blender"), 11)
+    evaluate.use_method(obj, "lbs")
+    choose(quantity)
+    bpy.ops.sinew.heat_map()
+    values = expected[quantity]
+    assert np.ptp(values) > 0.02, "nothing is tested"
+    scale = HeatScale.over_values(METRICS[quantity], values.min(), values.max(), expected["diagonal"])
+    np.testing.assert_allclose(shown_colours(obj), linear(scale.colours(values)), atol=3e-3)
+
+
+def test_the_modifier_compared_with_is_blenders():
+    """With Preserve Volume the modifier is dq, and so is Sinew: nothing is far from it."""
+    obj, _armature = scenes.make_arm()
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    states = handlers.states_of([obj])
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    assert live.measure(states, "blender", depsgraph).measured.entry("distance_max") < 1e-5
+    assert live.measure(states, "lbs", depsgraph).measured.entry("distance_max") > 0.02
+
+
+def test_colours_follow_frames_poses_and_methods():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "lbs")
+    choose("stretch", range=measures.FIXED, ratio=2.0)
+    bpy.ops.sinew.heat_map()
+    seen = []
+    for frame in (1, 6, 11):
+        bpy.context.scene.frame_set(frame)
+        seen.append(shown_colours(obj))
+        evaluate_expected = expected_at(obj, "lbs", "stretch")
+        np.testing.assert_allclose(seen[-1], evaluate_expected, atol=3e-3)
+    assert np.ptp(seen[0], axis=0).max() < 1e-3
+    assert np.abs(seen[1] - seen[0]).max() > 0.05
+    assert np.abs(seen[2] - seen[1]).max() > 0.05
+    scenes.forget_keys(armature)
+    scenes.bend(armature, 120.0)
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
+    posed = shown_colours(obj)
+    np.testing.assert_allclose(posed, expected_at(obj, "lbs", "stretch"), atol=3e-3)
+    assert np.abs(posed - seen[2]).max() > 0.05
+    properties.of(obj).method = "dq"
+    np.testing.assert_allclose(shown_colours(obj), expected_at(obj, "dq", "stretch"), atol=3e-3)
+    assert np.abs(shown_colours(obj) - posed).max() > 0.05
+
+
+def expected_at(obj: bpy.types.Object, method: str, quantity: str) -> np.ndarray:
+    """Of the pose as it is, from the final points; with a fixed range up to 2."""
+    assert properties.of(obj).method == method
+    assert quantity == "stretch"
+    points, rest = (p.astype(np.float64) for p in (scenes.final_points(obj), scenes.rest_points(obj)))
+    longest, shortest = np.ones((2, len(points)))
+    for edge in obj.data.edges:
+        a, b = edge.vertices
+        ratio = np.linalg.norm(points[a] - points[b]) / np.linalg.norm(rest[a] - rest[b])
+        for vertex in (a, b):
+            longest[vertex], shortest[vertex] = max(longest[vertex], ratio), min(shortest[vertex], ratio)
+    values = np.where(longest * shortest >= 1.0, longest, shortest)
+    return linear(HeatScale.fixed(METRICS[quantity], 2.0, 1.0, 1.0).colours(values))
+
+
+def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
+    first, armature = scenes.make_arm()
+    second = first.copy()
+    second.name = "Twin"
+    bpy.context.scene.collection.objects.link(second)
+    rig = armature.copy()
+    bpy.context.scene.collection.objects.link(rig)
+    second.modifiers["Armature"].object = rig
+    rig.animation_data_clear()
+    for bone in rig.pose.bones:
+        bone.matrix_basis.identity()
+    second.select_set(True)
+    bpy.context.scene.frame_set(11)
+    bpy.ops.sinew.add()
+    choose("bulge")
+    bpy.ops.sinew.heat_map()
+    assert properties.of(first).attribute != properties.of(second).attribute
+    bent, straight = shown_colours(first), shown_colours(second)
+    assert np.ptp(bent, axis=0).max() > 0.1
+    assert np.ptp(straight, axis=0).max() < 1e-3
+    expected = expected_fields([first, second], ("lbs", "blender"), 11)
+    bulge = expected["bulge"]
+    scale = HeatScale.over_values(METRICS["bulge"], bulge.min(), bulge.max(), expected["diagonal"])
+    np.testing.assert_allclose(np.concatenate([bent, straight]), linear(scale.colours(bulge)), atol=3e-3)
+
+
+def color_types() -> list[str]:
+    return [
+        space.shading.color_type
+        for screen in bpy.data.screens
+        for area in screen.areas
+        for space in area.spaces
+        if space.type == "VIEW_3D"
+    ]
+
+
+def painted_arm() -> bpy.types.Object:
+    """With a material and colours of the artist's own."""
+    obj, _armature = scenes.make_arm()
+    obj.data.materials.append(bpy.data.materials.new("Skin"))
+    obj.data.color_attributes.new("First", "BYTE_COLOR", "CORNER")
+    obj.data.color_attributes.new("Second", "FLOAT_COLOR", "POINT")
+    for attribute in obj.data.color_attributes:
+        attribute.data.foreach_set("color", np.linspace(0.0, 1.0, 4 * len(attribute.data), dtype=np.float32))
+    obj.data.attributes.active_color_name = "Second"
+    obj.data.attributes.active_index = 2
+    return obj
+
+
+@pytest.mark.parametrize("set_up", [None, in_front, with_keys])
+def test_switched_off_it_leaves_no_trace(set_up):
+    obj = painted_arm()
+    if set_up is not None:
+        set_up(obj)
+    bpy.context.scene.frame_set(6)
+    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    before_sinew = whole_file.of_open_file()
+    types = color_types()
+    scenes.add_sinew(obj, "dq")
+    measures.of(bpy.context.scene)
+    before = whole_file.of_open_file()
+    bpy.ops.sinew.heat_map()
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert mesh.attributes.active_color_name == heat_nodes.NAME
+    assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
+    assert [slot.material.name for slot in obj.material_slots] == ["Skin"]
+    assert set(color_types()) == {"VERTEX"}
+    bpy.context.scene.frame_set(9)
+    bpy.context.scene.frame_set(6)
+    bpy.ops.sinew.heat_map()
+    bpy.context.view_layer.update()
+    assert color_types() == types
+    assert whole_file.differences(before, whole_file.of_open_file()) == []
+    # And off with all of Sinew while it is on.
+    bpy.ops.sinew.heat_map()
+    choose("bulge", range=measures.FIXED, length=0.5)
+    bpy.context.scene.sinew_most_influences = 2
+    bpy.ops.sinew.remove()
+    assert color_types() == types
+    assert obj.data.attributes.active_color_name == "Second"
+    assert whole_file.differences(before_sinew, whole_file.of_open_file()) == []
+
+
+def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
+    obj = painted_arm()
+    types = color_types()
+    before = snapshot.of_file()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(6)
+    bpy.ops.sinew.heat_map()
+    colours = shown_colours(obj)
+    path = str(tmp_path / "heat.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
+    obj = bpy.data.objects["Arm"]
+    np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
+    assert set(color_types()) == {"VERTEX"}
+    bpy.context.scene.frame_set(1)
+    bpy.ops.sinew.remove()
+    assert color_types() == types
+    assert snapshot.of_file() == before
+    assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
+
+
+def test_undo_and_redo():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(8)
+    types = color_types()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.sinew.heat_map()
+    bpy.ops.ed.undo_push(message="heat map")
+    colours = shown_colours(obj)
+    bpy.ops.ed.undo()
+    handlers.refresh(bpy.context)
+    obj = bpy.data.objects["Arm"]
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert heat_nodes.NAME not in mesh.attributes
+    assert color_types() == types
+    assert mesh.attributes.active_color_name == ""
+    bpy.ops.ed.redo()
+    handlers.refresh(bpy.context)
+    obj = bpy.data.objects["Arm"]
+    np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
+    assert set(color_types()) == {"VERTEX"}
+
+
+def test_what_is_deleted_gives_the_views_back():
+    obj, _armature = scenes.make_arm()
+    types = color_types()
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.sinew.heat_map()
+    bpy.data.objects.remove(obj)
+    bpy.context.view_layer.update()
+    handlers.refresh(bpy.context)
+    assert color_types() == types
+
+
+def test_a_duplicate_has_colours_of_its_own():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.sinew.heat_map()
+    bpy.context.scene.frame_set(9)
+    bpy.ops.object.duplicate(linked=True)
+    twin = bpy.context.object
+    assert twin != obj
+    bpy.context.scene.frame_set(8)
+    np.testing.assert_allclose(shown_colours(twin), shown_colours(obj), atol=1e-6)
+    bpy.ops.sinew.heat_map()
+    assert not properties.of(twin).heat
+    bpy.context.scene.frame_set(7)
+    assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
+    names = [a.name for a in obj.data.attributes if a.name.startswith("sinew_")]
+    assert len(names) == 3, names
+
+
+def test_a_render_shows_it(tmp_path):
+    """Cycles, looking along the tube's side: most of it violet to yellow, nothing of the red material."""
+    obj, _armature = scenes.make_arm()
+    red = bpy.data.materials.new("Red")
+    if bpy.app.version < (5, 0):
+        red.use_nodes = True
+    red.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (1.0, 0.0, 0.0, 1.0)
+    obj.data.materials.append(red)
+    scenes.add_sinew(obj, "lbs")
+    choose("stretch", range=measures.FIXED, ratio=2.0)
+    scene = bpy.context.scene
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.camera.location, scene.camera.data.type = (0.5, 0.0, 5.0), "ORTHO"
+    scene.camera.data.ortho_scale = 0.2
+    scene.world = bpy.data.worlds.new("World")
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    scene.view_settings.view_transform = "Raw"
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = str(tmp_path / "heat.png")
+    scene.frame_set(1)
+    bpy.ops.sinew.heat_map()
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(scene.render.filepath)
+    picture.colorspace_settings.name = "Non-Color"
+    pixels = np.array(picture.pixels).reshape(-1, 4)[:, :3]
+    # At rest nothing is stretched: the middle of the map.
+    middle = linear(HeatScale.fixed(METRICS["stretch"], 2.0, 1.0, 1.0).colours(np.ones(1)))[0]
+    np.testing.assert_allclose(np.median(pixels, axis=0), middle, atol=0.01)
+
+
+def test_the_legend_says_range_unit_and_methods():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    scene = bpy.context.scene
+    scene.unit_settings.system = "METRIC"
+    choose("distance", range=measures.FIXED, length=0.02)
+    bpy.context.scene.frame_set(11)
+    bpy.ops.sinew.heat_map()
+    content = heat_legend.content
+    assert content.title == "Distance, Dual Quaternion against Armature modifier"
+    assert heat_legend.labels(content.scale, scene)[0] == "0 m"
+    assert heat_legend.labels(content.scale, scene)[-1] == "\u2265 2 cm"
+    choose("stretch", ratio=4.0)
+    assert heat_legend.labels(heat_legend.content.scale, scene)[::2] == [
+        "0.25\u00d7",
+        "1.00\u00d7",
+        "4.00\u00d7",
+    ]
+    choose("flips")
+    assert heat_legend.labels(heat_legend.content.scale, scene)[::4] == ["0 %", "100 %"]
+    bpy.ops.sinew.heat_map()
+    assert heat_legend.content is None
+
+
+def test_off_it_measures_nothing(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+
+    def fail(*_args: object) -> None:
+        raise AssertionError("measured")
+
+    monkeypatch.setattr(live, "measure", fail)
+    for frame in (1, 5, 9):
+        bpy.context.scene.frame_set(frame)
+    assert not properties.of(obj).error
+    assert measures.of(bpy.context.scene) is not None
+
+
+def test_numbers_are_those_that_compare_writes(tmp_path):
+    obj, _armature = scenes.make_arm()
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    parser = compare.add_parser(argparse.ArgumentParser().add_subparsers())
+    out = tmp_path / "page"
+    args = parser.parse_args(
+        [str(path), "--methods", "dq", "--frames", "9", "--pictures", "0", "--out", str(out)]
+    )
+    assert compare.run(args, Console(io.StringIO(), io.StringIO())) == 0
+    header, line = (out / "arm" / "metrics.csv").read_text(encoding="utf-8").splitlines()
+    expected = dict(zip(header.split(","), line.split(","), strict=True))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Arm"]
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(9)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    measured = live.measure(handlers.states_of([obj]), "blender", depsgraph).measured
+    entries = measured.summary().__dict__
+    assert len(entries) == 16
+    for name, value in entries.items():
+        assert value == pytest.approx(float(expected[name]), rel=2e-4, abs=2e-5), name
+
+
+@pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])
+@pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
+def test_linked_meshes_show_it_too(tmp_path, override, front):
+    """By their material: a linked mesh keeps the active colour attribute that it has."""
+    test_linked_data.save_library(tmp_path, driven=False, front=front)
+    test_linked_data.link(tmp_path, override)
+    obj = test_linked_data.character()
+    scenes.add_sinew(obj, "dq")
+    types = color_types()
+    choose("stretch", range=measures.FIXED, ratio=2.0)
+    properties.of(obj).heat = True
+    bpy.context.scene.frame_set(11)
+    colours = shown_colours(obj)
+    assert np.ptp(colours, axis=0).max() > 0.05
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert heat_nodes.NAME in [m.name for m in mesh.materials if m is not None]
+    path = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
+    np.testing.assert_allclose(shown_colours(test_linked_data.character()), colours, atol=1e-6)
+    drive.remove(test_linked_data.character())
+    assert color_types() == types
+    assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
+    assert not [g for g in bpy.data.node_groups if g.get("sinew_node_group") and g.library is None]

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Worst frames, the range fitted to frames, and the numbers in the panel."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.blender import handlers, heat_map, heat_panel, live, measures, pose_io, stepped, worst_frames
+from sinew_addon.core.comparison import peaks
+from sinew_addon.core.metrics import METRICS
+
+
+def waving_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
+    """Bent most at frames 5, 15 and 25, farthest at 15 and least at 5; at rest at 1, 10, 20 and 30."""
+    obj, armature = scenes.make_arm()
+    scenes.forget_keys(armature)
+    for frame, degrees in ((1, 0), (5, 40), (10, 0), (15, 140), (20, 0), (25, 90), (30, 0)):
+        scenes.bend(armature, degrees)
+        armature.pose.bones[1].keyframe_insert("rotation_quaternion", frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 30
+    return obj, armature
+
+
+def scan() -> worst_frames.Scan:
+    return worst_frames.scans[bpy.context.scene.session_uid]
+
+
+@pytest.mark.parametrize("quantity", ["stretch", "area", "bulge", "distance"])
+def test_finds_the_peaks_worst_first(quantity):
+    obj, _armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    measures.of(bpy.context.scene).quantity = quantity
+    assert bpy.ops.sinew.worst_frames() == {"FINISHED"}
+    worst = scan().worst()
+    assert [frame for frame, _value in worst] == [15, 25, 5]
+    # The numbers are those of the frames.
+    for frame, value in worst:
+        bpy.context.scene.frame_set(frame)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        measured = live.measure(handlers.states_of([obj]), "blender", depsgraph).measured
+        assert measured.summary().__dict__ | {"bulge_worst": measured.summary().bulge_worst}
+        assert measured.entry(METRICS[quantity].worst) == pytest.approx(value, rel=1e-6)
+
+
+def test_leaves_frame_pose_and_file_as_they_were(tmp_path):
+    obj, armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    scene = bpy.context.scene
+    scene.frame_set(7, subframe=0.25)
+    # Posed by hand beside its keys.
+    scenes.bend(armature, 33.0)
+    bpy.context.view_layer.update()
+    before, points = pose_io.read_channels(armature.pose.bones), scenes.final_points(obj)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    dirty = bpy.data.is_dirty  # 4.2 without a window calls even a file just saved so
+    bpy.ops.sinew.worst_frames(over="ACTION")
+    assert (scene.frame_current, scene.frame_subframe) == (7, 0.25)
+    np.testing.assert_array_equal(pose_io.read_channels(armature.pose.bones), before)
+    assert scenes.worst(scenes.final_points(obj), points) < 1e-6
+    assert bpy.data.is_dirty == dirty
+
+
+def test_stopped_it_leaves_all_as_it_was():
+    obj, _armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    scene = bpy.context.scene
+    scene.frame_set(12)
+    worst_frames.scans.clear()
+    steps = worst_frames.scan(scene, [obj], "stretch", "blender", "SCENE")
+    shares = [next(steps) for _ in range(6)]
+    assert shares == sorted(shares)
+    assert scene.frame_current == 6
+    steps.close()
+    assert scene.frame_current == 12
+    assert not worst_frames.scans
+
+
+def test_ranges_are_the_scenes_the_previews_or_the_actions():
+    _obj, armature = waving_arm()
+    scene = bpy.context.scene
+    scene.frame_end = 20
+    assert stepped.frames_over(scene, [armature], "SCENE") == list(range(1, 21))
+    assert stepped.frames_over(scene, [armature], "ACTION") == list(range(1, 31))
+    scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 4, 6
+    assert stepped.frames_over(scene, [armature], "SCENE") == [4, 5, 6]
+
+
+def test_a_range_fitted_to_frames_holds_all_their_values():
+    obj, _armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    scene = bpy.context.scene
+    settings = measures.of(scene)
+    settings.quantity = "bulge"
+    bpy.ops.sinew.heat_map()
+    assert bpy.ops.sinew.fit_heat_range() == {"FINISHED"}
+    assert settings.range == measures.FIXED
+    largest = 0.0
+    for frame in range(1, 31):
+        scene.frame_set(frame)
+        subject = live.measure(
+            handlers.states_of([obj]), settings.other, bpy.context.evaluated_depsgraph_get()
+        )
+        values = subject.measured.field("bulge")
+        largest = max(largest, np.abs(values).max())
+        scale = heat_map.scale_of(settings, subject.measured, values)
+        assert scale.high == settings.length
+        assert -scale.low == settings.length
+    assert settings.length == pytest.approx(largest, rel=1e-5)
+
+
+def test_a_button_goes_to_the_frame():
+    bpy.ops.sinew.go_to_frame(frame=17.0)
+    assert bpy.context.scene.frame_current == 17
+
+
+def test_what_can_not_be_measured_is_said():
+    obj, armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    armature.animation_data_clear()
+    with pytest.raises(RuntimeError, match="no action; choose one"):
+        bpy.ops.sinew.worst_frames(over="ACTION")
+    obj.sinew.enabled = False
+    with pytest.raises(RuntimeError, match="switch Sinew on"):
+        bpy.ops.sinew.worst_frames()
+
+
+def test_peaks():
+    assert peaks([0.0, 2.0, 1.0, 3.0, 3.0, 0.0, 1.0], 5) == [3, 1, 6]
+    assert peaks([5.0, 4.0, 3.0], 5) == [0]
+    assert peaks([1.0, 1.0, 1.0], 5) == [0]
+    assert peaks([1.0, 0.0, 2.0, 0.0, 3.0], 2) == [4, 2]
+    assert peaks([], 5) == []
+
+
+def test_numbers_have_units_and_say_what_they_are():
+    obj, _armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    scene = bpy.context.scene
+    scene.unit_settings.system = "METRIC"
+    scene.frame_set(15)
+    measured = live.measure(handlers.states_of([obj]), "lbs", bpy.context.evaluated_depsgraph_get()).measured
+    rows = dict(heat_panel.rows(scene, measured))
+    summary = measured.summary()
+    assert rows["Volume"] == f"{100 * summary.volume_change:+.3g} %"
+    assert rows["Flipped faces"] == f"{summary.flipped_faces:,}"
+    assert rows["Stretch"] == f"{summary.stretch_min:.2f}\u00d7 to {summary.stretch_max:.2f}\u00d7"
+    assert rows["Distance"].startswith("at most ")
+    centimetres = float(rows["Distance"].removeprefix("at most ").removesuffix(" cm"))
+    assert centimetres == pytest.approx(100 * summary.distance_max, rel=0.01)
+
+
+def test_measuring_twice_measures_once():
+    """The panel draws often; a frame is worked out once."""
+    obj, _armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    first = live.measure(handlers.states_of([obj]), "lbs", depsgraph).measured
+    assert live.measure(handlers.states_of([obj]), "lbs", depsgraph).measured is first
+    bpy.context.scene.frame_set(9)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    second = live.measure(handlers.states_of([obj]), "lbs", depsgraph)
+    assert second.measured is not first
+    gauge = second.gauge
+    bpy.context.scene.frame_set(10)
+    assert live.measure(handlers.states_of([obj]), "lbs", depsgraph).gauge is gauge
+
+
+def test_topology_edited_is_measured_anew():
+    obj, _armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    before = live.measure(handlers.states_of([obj]), "lbs", depsgraph).gauge.surface
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.quads_convert_to_tris(quad_method="FIXED_ALTERNATE", ngon_method="CLIP")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.scene.frame_set(9)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    after = live.measure(handlers.states_of([obj]), "lbs", depsgraph).gauge.surface
+    assert len(after.edges) == len(obj.data.edges) > len(before.edges)
