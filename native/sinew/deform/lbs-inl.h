@@ -31,6 +31,15 @@ HWY_INLINE V in_register(V v) {
 /// Numbers of a bone: the columns of its displacement.
 inline constexpr std::size_t kColumns = 4 * kLbsQuads;
 
+/// `columns`, of which the compiler then does not know that they stay the same for all blocks: it would keep
+/// each spread over a vector on the stack, at three times the bytes to read.
+HWY_INLINE const float* loaded_anew(const float* columns) {
+#if HWY_COMPILER_GCC || HWY_COMPILER_CLANG
+    asm volatile("" : "+r"(columns) : : "memory");
+#endif
+    return columns;
+}
+
 /// Adds to each of kVectors `sum` what the displacement with these columns makes of `p`, by `weight` where
 /// there is one.
 template <std::size_t kVectors, bool kWeighted, class D>
@@ -103,7 +112,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float columns[(kCount > 0 ? kCount : 1) * kColumns];
     for (std::size_t k = 0; k < kCount; ++k) copy_columns(frame, bones, k, columns + kColumns * k);
     const auto columns_of = [&](std::size_t k) HWY_ATTR -> const float* {
-        if (kCount > 0) return columns + kColumns * k;
+        if (kCount > 0) return loaded_anew(columns + kColumns * k);
         copy_columns(frame, bones, k, columns);
         return columns;
     };
