@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SinewError, WrongUse
+from ..core.spaces import transformed
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 
@@ -159,7 +160,7 @@ def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
     parts = []
     for obj in objects:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-        parts.append(final_points(obj) @ matrix[:3, :3].T + matrix[:3, 3])
+        parts.append(transformed(final_points(obj), matrix))
     return np.concatenate(parts)
 
 
