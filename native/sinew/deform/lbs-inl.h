@@ -40,17 +40,37 @@ HWY_INLINE const float* loaded_anew(const float* columns) {
     return columns;
 }
 
+/// A bone's columns, or differences of them that are stored.
+struct Columns {
+    const float* columns;
+
+    template <class D>
+    HWY_INLINE Vec<D> at(D d, std::size_t i) const {
+        return hn::Set(d, columns[i]);
+    }
+};
+
+/// What a bone's columns differ from those of the first.
+struct Differences {
+    const float* columns;
+    const float* first;
+
+    template <class D>
+    HWY_INLINE Vec<D> at(D d, std::size_t i) const {
+        return hn::Sub(hn::Set(d, columns[i]), hn::Set(d, first[i]));
+    }
+};
+
 /// Adds to each of kVectors `sum` what the displacement with these columns makes of `p`, by `weight` where
 /// there is one.
-template <std::size_t kVectors, bool kWeighted, class D>
-HWY_INLINE void add_bone(D d, const float* columns, const Vec<D>* weight, const Points<D>* p,
-                         Points<D>* sum) {
+template <std::size_t kVectors, bool kWeighted, class D, class Bone>
+HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
     // Coordinate by coordinate, so that few of the bone's numbers are in registers at once.
     const auto add_along = [&](std::size_t row, Vec<D> Points<D>::*axis) HWY_ATTR {
-        const Vec<D> x = hn::Set(d, columns[row]);
-        const Vec<D> y = hn::Set(d, columns[4 + row]);
-        const Vec<D> z = hn::Set(d, columns[8 + row]);
-        const Vec<D> shift = hn::Set(d, columns[12 + row]);
+        const Vec<D> x = bone.at(d, row);
+        const Vec<D> y = bone.at(d, 4 + row);
+        const Vec<D> z = bone.at(d, 8 + row);
+        const Vec<D> shift = bone.at(d, 12 + row);
         for (std::size_t v = 0; v < kVectors; ++v) {
             const Vec<D> moved = hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, shift)));
             sum[v].*axis =
@@ -64,22 +84,23 @@ HWY_INLINE void add_bone(D d, const float* columns, const Vec<D>* weight, const 
 
 /// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
 ///
-/// columns_of  [kColumns] of the first bone, or what another differs from it, by number of the influence
-/// kCount      the number of influences, or 0 for `count`
-template <std::size_t kCount, std::size_t kVectors, class D, class ColumnsOf>
+/// first     columns of the first bone
+/// other_of  what the bone of an influence differs from it
+/// kCount    the number of influences, or 0 for `count`
+template <std::size_t kCount, std::size_t kVectors, class D, class OtherOf>
 HWY_INLINE void deform_lanes(D d, const Places& places, std::size_t b, std::size_t lane, std::size_t count,
-                             const ColumnsOf& columns_of) {
+                             const float* first, const OtherOf& other_of) {
     const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
     const std::size_t step = hn::Lanes(d);
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
     Vec<D> weight[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, rows, lane + v * step);
-    add_bone<kVectors, false>(d, columns_of(0), weight, p, sum);
+    add_bone<kVectors, false>(d, Columns{first}, weight, p, sum);
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
         const float* const weights = rows[2 + k].lane.data() + lane;
         for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
-        add_bone<kVectors, true>(d, columns_of(k), weight, p, sum);
+        add_bone<kVectors, true>(d, other_of(k), weight, p, sum);
     }
     for (std::size_t v = 0; v < kVectors; ++v) store_points(d, places, b, lane + v * step, sum[v]);
 }
@@ -88,40 +109,44 @@ HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
     return frame.palette->bones[kLbsQuads * static_cast<std::size_t>(bone)].value.data();
 }
 
-/// Writes the columns of a set's first bone, or what those of its bone `k` differ from them.
-HWY_INLINE void copy_columns(const Frame& frame, const std::int32_t* bones, std::size_t k, float* columns) {
-    const hn::CappedTag<float, kColumns> d;
-    const float* const first = columns_of_bone(frame, bones[0]);
-    const float* const bone = columns_of_bone(frame, bones[k]);
-    for (std::size_t i = 0; i < kColumns; i += hn::Lanes(d)) {
-        const auto column = hn::LoadU(d, bone + i);
-        hn::Store(k == 0 ? column : hn::Sub(column, hn::LoadU(d, first + i)), d, columns + i);
+template <std::size_t kCount, class OtherOf>
+HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
+                            const OtherOf& other_of) {
+    const Full d;
+    // A bone's numbers are spread over a vector once for two: a quarter of the time on AVX2.
+    constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
+    const Places places = places_of(frame);
+    const std::size_t count = places.blocks[begin].influences;
+    for (std::size_t b = begin; b < end; ++b) {
+        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
+            deform_lanes<kCount, kVectors>(d, places, b, lane, count, first, other_of);
+        }
     }
 }
 
 /// Blocks [begin, end), which have the same bones.
 template <std::size_t kCount>
 void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
-    const Full d;
-    // A bone's numbers are spread over a vector once for two: a quarter of the time on AVX2.
-    constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
-    const Places places = places_of(frame);
-    const std::int32_t* const bones = &frame.mesh->bones[places.blocks[begin].first_bone];
-    const std::size_t count = places.blocks[begin].influences;
-    // Where the number is not known, one bone's at a time.
+    const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
+    const float* const first = columns_of_bone(frame, bones[0]);
+    // What is stored can not be read at once: for one block alone that takes longer than it saves.
+    if (kCount == 0 || end - begin == 1) {
+        return deform_each<kCount>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+            return Differences{columns_of_bone(frame, bones[k]), first};
+        });
+    }
+    const hn::CappedTag<float, kColumns> d;
     alignas(64) float columns[(kCount > 0 ? kCount : 1) * kColumns];
-    for (std::size_t k = 0; k < kCount; ++k) copy_columns(frame, bones, k, columns + kColumns * k);
-    const auto columns_of = [&](std::size_t k) HWY_ATTR -> const float* {
-        if (kCount > 0) return loaded_anew(columns + kColumns * k);
-        copy_columns(frame, bones, k, columns);
-        return columns;
-    };
-    for (std::size_t b = begin; b < end; ++b) {
-        const std::size_t lanes = lanes_end(d, places.blocks[b]);
-        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
-            deform_lanes<kCount, kVectors>(d, places, b, lane, count, columns_of);
+    for (std::size_t i = 0; i < kColumns; i += hn::Lanes(d)) {
+        for (std::size_t k = 1; k < kCount; ++k) {
+            const float* const bone = columns_of_bone(frame, bones[k]);
+            hn::Store(hn::Sub(hn::LoadU(d, bone + i), hn::LoadU(d, first + i)), d,
+                      columns + kColumns * k + i);
         }
     }
+    deform_each<kCount>(frame, begin, end, first,
+                        [&](std::size_t k) HWY_ATTR { return Columns{loaded_anew(columns + kColumns * k)}; });
 }
 
 #if HWY_TARGET != HWY_SCALAR
@@ -171,16 +196,15 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
     const Places places = places_of(frame);
     const Block& block = places.blocks[b];
     const Lanes<float>* const rows = places.rows + block.first_row;
-    float columns[kColumns];
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
         const Points<One> p = load_points(d, rows, lane);
         Points<One> sum = p;
-        for (std::size_t k = 0; k < block.influences; ++k) {
+        const float* const first = columns_of_bone(frame, bones[0]);
+        add_bone<1, false>(d, Columns{first}, static_cast<const Vec<One>*>(nullptr), &p, &sum);
+        for (std::size_t k = 1; k < block.influences; ++k) {
             const Vec<One> weight = hn::Load(d, rows[3 + k].lane.data() + lane);
-            copy_columns(frame, bones, k, columns);
-            k == 0 ? add_bone<1, false>(d, columns, &weight, &p, &sum)
-                   : add_bone<1, true>(d, columns, &weight, &p, &sum);
+            add_bone<1, true>(d, Differences{columns_of_bone(frame, bones[k]), first}, &weight, &p, &sum);
         }
         store_points(d, places, b, lane, sum);
     }
