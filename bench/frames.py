@@ -42,16 +42,16 @@ class Case:
 
 
 def cases(quick: bool) -> list[Case]:
-    sizes = [1_080, 13_380, 100_000] if quick else [1_080, 13_380, 25_000, 100_000, 1_000_000]
-    found = [Case(size, method) for size in sizes for method in ("dq", "lbs")]
-    found += [Case(size, method, normals=True) for size in sizes[2:] for method in ("dq", "lbs")]
-    found += [Case(characters=count, bones=50) for count in (10, 50)]
-    found.append(Case(13_380, subdivision=1))
+    sizes = [1_080, 13_380, 100_000] if quick else [1_080, 13_380, 100_000, 1_000_000]
+    scenes = [Case(size) for size in sizes]
+    scenes += [Case(characters=count, bones=50) for count in (10, 50)]
     folder = os.environ.get("SINEW_RIGS")
     for name in ("human.blend", "CesiumMan.glb", "Fox.glb") if folder else ():
         if (Path(folder) / name).exists():
-            found += [replace(Case(rig=name), method=method) for method in ("dq", "lbs")]
-    return found
+            scenes.append(Case(rig=name))
+    found = [replace(scene, normals=normals) for scene in scenes for normals in (False, True)]
+    found.append(Case(13_380, subdivision=1))
+    return [replace(case, method=method) for case in found for method in ("dq", "lbs")]
 
 
 # --- In the two processes

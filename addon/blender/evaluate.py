@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SinewError, WrongUse
+from ..core.spaces import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
 from .properties import BLENDER, method_label  # noqa: F401
@@ -203,7 +204,7 @@ def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
     parts = []
     for obj in objects:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-        parts.append(matrix[:3, :3] @ final_points(obj).T.astype(np.float64) + matrix[:3, 3:])
+        parts.append(transformed_axes(final_points(obj), matrix))
     return np.concatenate(parts, axis=1).T
 
 

@@ -16,6 +16,7 @@ from ..core import influences
 from ..core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ..core.scale_rule import BLENDER_4
 from ..core.session import Binding, Chain, Link, LinkFrame
+from ..core.spaces import transformed, transformed_axes
 from ..core.surface import Surface, joined
 from . import armature_io, drive, front, mesh_io, properties
 from .driven import Driven
@@ -124,7 +125,7 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
     for part in parts:
         weighting, driven = part.driven.binding.weighting, part.driven
         space = _space(part, depsgraph)
-        held.append(weighting.influences_over_joints(driven.rest_points @ space[:3, :3].T + space[:3, 3]))
+        held.append(weighting.influences_over_joints(transformed(driven.rest_points, space)))
         bone_counts.append(len(weighting.bones.rest))
     surface = joined([part.surface for part in parts])
     return Subject(parts, Gauge(surface, influences.joined(held, bone_counts)))
@@ -217,7 +218,7 @@ def _in_world(shapes: Sequence[np.ndarray], worlds: Sequence[np.ndarray]) -> np.
         [
             np.ascontiguousarray(shape.T, dtype=np.float64)
             if np.array_equal(world, IDENTITY)
-            else world[:3, :3] @ shape.T.astype(np.float64) + world[:3, 3:]
+            else transformed_axes(shape, world)
             for shape, world in zip(shapes, worlds, strict=True)
         ],
         axis=1,

@@ -21,6 +21,7 @@ from ..core.influences import GroupWeights, Influences, entries_of_bones
 from ..core.influences import joined as influences_of_all
 from ..core.metrics import FrameOfRig, Gauge, Summary, bone_axes
 from ..core.rig import Bones, Weighting
+from ..core.spaces import transformed
 from ..core.surface import joined
 from . import armature_io, drive, evaluate, handlers, mesh_io, stack
 from .modifier_options import ModifierOptions
@@ -301,4 +302,4 @@ def _in_armature_space(
 ) -> np.ndarray:
     points = mesh_io.read_points(mesh.vertices)
     space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
-    return points if space is None else points @ space[:3, :3].T + space[:3, 3]
+    return points if space is None else transformed(points, space)

@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+from itertools import chain
+from operator import itemgetter
+
+import bmesh
 import bpy
 import numpy as np
 
@@ -30,17 +34,25 @@ def read_surface(mesh: bpy.types.Mesh) -> Surface:
 
 
 def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
-    """All entries of all vertices, in stored order; about 1 microsecond an entry."""
-    counts = np.empty(len(mesh.vertices), dtype=np.int32)
-    groups: list[int] = []
-    weights: list[float] = []
-    for index, vertex in enumerate(mesh.vertices):
-        entries = vertex.groups
-        counts[index] = len(entries)
-        for entry in entries:
-            groups.append(entry.group)
-            weights.append(entry.weight)
-    return GroupWeights(counts, np.array(groups, dtype=np.int32), np.array(weights, dtype=np.float32))
+    """All entries of all vertices, in stored order; 0.2 to 0.5 microseconds an entry."""
+    # A BMesh gives a vertex's entries at once; vertex.groups makes a Python object of each, which takes two
+    # to four times as long, the making of the BMesh counted.
+    edited = bmesh.new()
+    try:
+        edited.from_mesh(mesh, face_normals=False, vertex_normals=False)
+        layer = edited.verts.layers.deform.active
+        if layer is None:
+            return GroupWeights.none(len(mesh.vertices))
+        vertices = list(map(itemgetter(layer), edited.verts))
+        counts = np.fromiter(map(len, vertices), np.int32, len(vertices))
+        entries = int(counts.sum())
+        groups = chain.from_iterable(map(bmesh.types.BMDeformVert.keys, vertices))
+        weights = chain.from_iterable(map(bmesh.types.BMDeformVert.values, vertices))
+        return GroupWeights(
+            counts, np.fromiter(groups, np.int32, entries), np.fromiter(weights, np.float32, entries)
+        )
+    finally:
+        edited.free()
 
 
 def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.errors import SinewError
 from ..core.rig import RigFacts, Weighting, describe_rig
+from ..core.spaces import transformed
 from . import armature_io, drive, mesh_io, properties, stack
 from .modifier_options import ModifierOptions, differences
 
@@ -24,10 +25,9 @@ def describe(
     points  [vertices, 3], rest points in object space
     """
     space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
-    if space is None:
-        space = np.identity(4)
-    there = points @ space[:3, :3].T + space[:3, 3]
-    facts = describe_rig(weighting, there, [group.name for group in obj.vertex_groups])
+    if space is not None and weighting.depends_on_points:
+        points = transformed(points, space)
+    facts = describe_rig(weighting, points, [group.name for group in obj.vertex_groups])
     return facts.with_warnings(differences(obj))
 
 

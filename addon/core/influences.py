@@ -25,6 +25,11 @@ class GroupWeights:
     groups: np.ndarray
     weights: np.ndarray
 
+    @classmethod
+    def none(cls, vertices: int) -> GroupWeights:
+        empty = np.empty(0, dtype=np.int32)
+        return cls(np.zeros(vertices, dtype=np.int32), empty, empty.astype(np.float32))
+
     def equals(self, other: GroupWeights) -> bool:
         return (
             np.array_equal(self.counts, other.counts)
@@ -66,6 +71,9 @@ class Entries:
         sums = np.bincount(vertices, weights=self.weights, minlength=len(self.counts))
         kept = (self.weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
         offsets = np.zeros(len(self.counts) + 1, dtype=np.int32)
+        if kept.all():
+            np.cumsum(self.counts, out=offsets[1:])
+            return Influences(offsets, self.bones, self.weights)
         np.cumsum(np.bincount(vertices[kept], minlength=len(self.counts)), out=offsets[1:])
         return Influences(offsets, self.bones[kept], self.weights[kept])
 
@@ -109,10 +117,12 @@ def entries_of_bones(groups: GroupWeights, bone_of_group: np.ndarray) -> Entries
 
     bone_of_group  int32 [groups], the bone that each group moves with, -1 for none
     """
-    vertices = np.repeat(np.arange(len(groups.counts)), groups.counts)
     table = np.append(bone_of_group.astype(np.int32), np.int32(-1))
     # A group index past the last group can stay behind in a mesh whose groups were deleted.
     bones = table[np.minimum(groups.groups, len(table) - 1)]
     kept = bones >= 0
+    if kept.all():
+        return Entries(groups.counts, bones, groups.weights)
+    vertices = np.repeat(np.arange(len(groups.counts)), groups.counts)
     counts = np.bincount(vertices[kept], minlength=len(groups.counts)).astype(np.int32)
     return Entries(counts, bones[kept], groups.weights[kept])

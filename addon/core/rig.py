@@ -99,10 +99,18 @@ class Weighting:
         multiply = bool(self.bones.envelopes.multiply[self.entries.bones].any())
         return self.bones.bend or multiply or self.use_envelopes
 
+    @cached_property
+    def _influences_of_groups(self) -> Influences:
+        return self.entries.influences()
+
     def influences(self, points: np.ndarray) -> Influences:
-        """Over bones alone, for rest points float [vertices, 3] in armature space."""
+        """Over bones alone, for rest points float [vertices, 3]: in armature space where depends_on_points,
+        else any."""
         entries, envelopes = self.entries, self.bones.envelopes
-        if envelopes.multiply[entries.bones].any():
+        multiply = envelopes.multiply[entries.bones].any() if envelopes.multiply.any() else False
+        if not multiply and not self.use_envelopes:
+            return self._influences_of_groups
+        if multiply:
             entries = multiply_by_envelopes(entries, envelopes, points)
         if self.use_envelopes:
             entries = fill_from_envelopes(entries, envelopes, self.bones.deform, points)
@@ -142,7 +150,7 @@ class RigFacts:
 def describe_rig(weighting: Weighting, points: np.ndarray, group_names: list[str]) -> RigFacts:
     """Counts and warnings. `weighted_bones` counts those that move at least one vertex.
 
-    points  [vertices, 3], rest points in armature space
+    points  [vertices, 3], rest points: see Weighting.influences
     """
     influences, bones = weighting.influences(points), weighting.bones
     counts = influences.counts

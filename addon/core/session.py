@@ -11,6 +11,7 @@ import sinew
 
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
+from .spaces import transformed
 
 IDENTITY = np.identity(4)
 LINEAR = "lbs"
@@ -119,8 +120,10 @@ class Binding:
         )
 
     def _bind(self, frame: Frame, rest_points: np.ndarray, method: str) -> sinew.Deformer:
-        space = frame.bones_from_model
-        influences = self.weighting.influences_over_joints(frame.rest_points @ space[:3, :3].T + space[:3, 3])
+        points = frame.rest_points
+        if self.weighting.depends_on_points:
+            points = transformed(points, frame.bones_from_model)
+        influences = self.weighting.influences_over_joints(points)
         return sinew.Deformer(
             rest_points,
             influences.offsets,

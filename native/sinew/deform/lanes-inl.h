@@ -22,6 +22,21 @@ using One = hn::CappedTag<float, 1>;
 template <class D>
 using Vec = hn::Vec<D>;
 
+/// Where a frame's blocks are and where their points go. A copy on the stack, as the compiler would read what
+/// the frame refers to anew after every vector that it stores.
+struct Places {
+    const Block* blocks;
+    const Lanes<float>* rows;
+    const Lanes<std::int32_t>* vertices;
+    const Run* runs;
+    Vec3<float>* points;
+};
+
+HWY_INLINE Places places_of(const Frame& frame) {
+    const PackedMesh& mesh = *frame.mesh;
+    return {mesh.blocks.data(), mesh.rows.data(), mesh.vertices.data(), mesh.runs.data(), frame.points};
+}
+
 /// One coordinate of several vertices in each vector.
 template <class D>
 struct Points {
@@ -108,13 +123,12 @@ HWY_INLINE void store_consecutive(Full d, const Points<Full>& p, float* to) {
 }
 
 /// Whole vectors with all but the run's own floats masked out.
-HWY_INLINE void store_runs(Full, const Frame& frame, const Block& block, const Points<Full>& p) {
-    const Interleaved points = interleave(p);
-    const Run* const runs = &frame.mesh->runs[block.place];
-    for (std::size_t r = 0; r < block.runs; ++r) {
-        float* const to = &frame.points->x + 3 * static_cast<std::ptrdiff_t>(runs[r].origin);
+HWY_INLINE void store_runs(Full, const Run* runs, std::size_t count, const Points<Full>& p, float* points) {
+    const Interleaved interleaved = interleave(p);
+    for (std::size_t r = 0; r < count; ++r) {
+        float* const to = points + 3 * static_cast<std::ptrdiff_t>(runs[r].origin);
         for (std::size_t i = 0; i < 3; ++i) {
-            _mm512_mask_storeu_ps(to + kLanes * i, runs[r].floats[i], points.part[i].raw);
+            _mm512_mask_storeu_ps(to + kLanes * i, runs[r].floats[i], interleaved.part[i].raw);
         }
     }
 }
@@ -156,29 +170,35 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* place, Vec3<float>* po
 
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
 template <class D>
-HWY_INLINE void store_points(D d, const Frame& frame, std::size_t b, std::size_t lane, const Points<D>& p) {
-    const Block& block = frame.mesh->blocks[b];
-    const std::int32_t* const place = frame.mesh->vertices[b].lane.data() + lane;
+HWY_INLINE void store_points(D d, const Places& to, std::size_t b, std::size_t lane, const Points<D>& p) {
+    const Block& block = to.blocks[b];
+    const std::int32_t* const place = to.vertices[b].lane.data() + lane;
     if constexpr (hn::MaxLanes(D()) == 1) {
-        frame.points[*place] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
+        to.points[*place] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
     } else {
-        if (block.consecutive) {
-            return store_consecutive(d, p, &frame.points[block.place + lane].x);
-        }
+        if (block.consecutive) return store_consecutive(d, p, &to.points[block.place + lane].x);
 #if HWY_TARGET == HWY_AVX3
-        if (block.runs > 0) return store_runs(d, frame, block, p);
+        if (block.runs > 0) return store_runs(d, to.runs + block.place, block.runs, p, &to.points->x);
 #endif
-        scatter_points(d, place, frame.points, p.x, p.y, p.z);
+        scatter_points(d, place, to.points, p.x, p.y, p.z);
     }
+}
+
+/// Where the lanes to be deformed of a block end: known before where one vector holds them all.
+template <class D>
+HWY_INLINE std::size_t lanes_end(D d, const Block& block) {
+    return hn::MaxLanes(D()) == kLanes ? hn::Lanes(d) : block.vertices;
 }
 
 /// Blocks [begin, end), which have no bones.
 inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
+    const Places places = places_of(frame);
     for (std::size_t b = begin; b < end; ++b) {
-        const Block& block = frame.mesh->blocks[b];
-        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-            store_points(d, frame, b, lane, load_points(d, &frame.mesh->rows[block.first_row], lane));
+        const Block& block = places.blocks[b];
+        const std::size_t lanes = lanes_end(d, block);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            store_points(d, places, b, lane, load_points(d, places.rows + block.first_row, lane));
         }
     }
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Linear blend on blocks: compiled once for each instruction set, see kernels.cpp.
 //
+// A vertex is moved as by its first bone, then by what each other bone differs from the first, by weight: a
+// weight's part in the sum is then never asked of the first.
 #if defined(SINEW_DEFORM_LBS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_LBS_INL_H_
 #undef SINEW_DEFORM_LBS_INL_H_
@@ -26,19 +28,53 @@ HWY_INLINE V in_register(V v) {
     return v;
 }
 
-/// Adds to each of kVectors `sum` what the bone with these columns adds to its weight's part of `p`.
-template <std::size_t kVectors, class D>
-HWY_INLINE void add_bone(D d, const float* columns, const Vec<D>* weight, const Points<D>* p,
-                         Points<D>* sum) {
+/// Numbers of a bone: the columns of its displacement.
+inline constexpr std::size_t kColumns = 4 * kLbsQuads;
+
+/// `columns`, of which the compiler then does not know that they stay the same for all blocks: it would keep
+/// each spread over a vector on the stack, at three times the bytes to read.
+HWY_INLINE const float* loaded_anew(const float* columns) {
+#if HWY_COMPILER_GCC || HWY_COMPILER_CLANG
+    asm volatile("" : "+r"(columns) : : "memory");
+#endif
+    return columns;
+}
+
+/// A bone's columns, or differences of them that are stored.
+struct Columns {
+    const float* columns;
+
+    template <class D>
+    HWY_INLINE Vec<D> at(D d, std::size_t i) const {
+        return hn::Set(d, columns[i]);
+    }
+};
+
+/// What a bone's columns differ from those of the first.
+struct Differences {
+    const float* columns;
+    const float* first;
+
+    template <class D>
+    HWY_INLINE Vec<D> at(D d, std::size_t i) const {
+        return hn::Sub(hn::Set(d, columns[i]), hn::Set(d, first[i]));
+    }
+};
+
+/// Adds to each of kVectors `sum` what the displacement with these columns makes of `p`, by `weight` where
+/// there is one.
+template <std::size_t kVectors, bool kWeighted, class D, class Bone>
+HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
     // Coordinate by coordinate, so that few of the bone's numbers are in registers at once.
     const auto add_along = [&](std::size_t row, Vec<D> Points<D>::*axis) HWY_ATTR {
-        const Vec<D> x = hn::Set(d, columns[row]);
-        const Vec<D> y = hn::Set(d, columns[4 + row]);
-        const Vec<D> z = hn::Set(d, columns[8 + row]);
-        const Vec<D> shift = hn::Set(d, columns[12 + row]);
+        const Vec<D> x = bone.at(d, row);
+        const Vec<D> y = bone.at(d, 4 + row);
+        const Vec<D> z = bone.at(d, 8 + row);
+        const Vec<D> shift = bone.at(d, 12 + row);
         for (std::size_t v = 0; v < kVectors; ++v) {
             const Vec<D> moved = hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, shift)));
-            sum[v].*axis = hn::MulAdd(weight[v], moved, sum[v].*axis);
+            sum[v].*axis =
+                kWeighted ? hn::MulAdd(weight[v], moved, sum[v].*axis) : hn::Add(moved, sum[v].*axis);
         }
     };
     add_along(0, &Points<D>::x);
@@ -48,57 +84,69 @@ HWY_INLINE void add_bone(D d, const float* columns, const Vec<D>* weight, const 
 
 /// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
 ///
-/// columns_of  columns of the bone of an influence
-/// kCount      the number of influences, or 0 for any
-template <std::size_t kCount, std::size_t kVectors, class D, class ColumnsOf>
-HWY_INLINE void deform_lanes(D d, const Frame& frame, std::size_t b, std::size_t lane,
-                             const ColumnsOf& columns_of) {
-    const Block& block = frame.mesh->blocks[b];
-    const Lanes<float>* const rows = &frame.mesh->rows[block.first_row];
+/// first     columns of the first bone
+/// other_of  what the bone of an influence differs from it
+/// kCount    the number of influences, or 0 for `count`
+template <std::size_t kCount, std::size_t kVectors, class D, class OtherOf>
+HWY_INLINE void deform_lanes(D d, const Places& places, std::size_t b, std::size_t lane, std::size_t count,
+                             const float* first, const OtherOf& other_of) {
+    const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
     const std::size_t step = hn::Lanes(d);
-    const std::size_t last = (kCount > 0 ? kCount : block.influences) - 1;
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
     Vec<D> weight[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, rows, lane + v * step);
-    for (std::size_t k = 0; k < last; ++k) {
-        const float* const columns = columns_of(k);
-        const float* const weights = rows[3 + k].lane.data() + lane;
+    add_bone<kVectors, false>(d, Columns{first}, weight, p, sum);
+    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+        const float* const weights = rows[2 + k].lane.data() + lane;
         for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
-        add_bone<kVectors>(d, columns, weight, p, sum);
+        add_bone<kVectors, true>(d, other_of(k), weight, p, sum);
     }
-    for (std::size_t v = 0; v < kVectors; ++v) {
-        weight[v] = hn::Set(d, 1.0f);
-        for (std::size_t k = 0; k < last; ++k) {
-            weight[v] = hn::Sub(weight[v], hn::Load(d, rows[3 + k].lane.data() + lane + v * step));
-        }
-    }
-    add_bone<kVectors>(d, columns_of(last), weight, p, sum);
-    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, frame, b, lane + v * step, sum[v]);
+    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, places, b, lane + v * step, sum[v]);
 }
 
 HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
     return frame.palette->bones[kLbsQuads * static_cast<std::size_t>(bone)].value.data();
 }
 
-/// Blocks [begin, end), which have the same bones.
-template <std::size_t kCount>
-void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
+template <std::size_t kCount, class OtherOf>
+HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
+                            const OtherOf& other_of) {
     const Full d;
     // A bone's numbers are spread over a vector once for two: a quarter of the time on AVX2.
     constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
-    const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
-    const float* columns[kCount > 0 ? kCount : 1];
-    for (std::size_t k = 0; k < kCount; ++k) columns[k] = columns_of_bone(frame, bones[k]);
-    const auto columns_of = [&](std::size_t k) {
-        return kCount > 0 ? columns[k] : columns_of_bone(frame, bones[k]);
-    };
+    const Places places = places_of(frame);
+    const std::size_t count = places.blocks[begin].influences;
     for (std::size_t b = begin; b < end; ++b) {
-        const std::size_t vertices = frame.mesh->blocks[b].vertices;
-        for (std::size_t lane = 0; lane < vertices; lane += kVectors * hn::Lanes(d)) {
-            deform_lanes<kCount, kVectors>(d, frame, b, lane, columns_of);
+        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
+            deform_lanes<kCount, kVectors>(d, places, b, lane, count, first, other_of);
         }
     }
+}
+
+/// Blocks [begin, end), which have the same bones.
+template <std::size_t kCount>
+void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
+    const float* const first = columns_of_bone(frame, bones[0]);
+    // What is stored can not be read at once: for one block alone that takes longer than it saves.
+    if (kCount == 0 || end - begin == 1) {
+        return deform_each<kCount>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+            return Differences{columns_of_bone(frame, bones[k]), first};
+        });
+    }
+    const hn::CappedTag<float, kColumns> d;
+    alignas(64) float columns[(kCount > 0 ? kCount : 1) * kColumns];
+    for (std::size_t i = 0; i < kColumns; i += hn::Lanes(d)) {
+        for (std::size_t k = 1; k < kCount; ++k) {
+            const float* const bone = columns_of_bone(frame, bones[k]);
+            hn::Store(hn::Sub(hn::LoadU(d, bone + i), hn::LoadU(d, first + i)), d,
+                      columns + kColumns * k + i);
+        }
+    }
+    deform_each<kCount>(frame, begin, end, first,
+                        [&](std::size_t k) HWY_ATTR { return Columns{loaded_anew(columns + kColumns * k)}; });
 }
 
 #if HWY_TARGET != HWY_SCALAR
@@ -118,13 +166,21 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
         const V4 z = hn::Set(four, rows[2].lane[lane]);
         // Not by way of memory: a vector load of what was just stored in parts waits for it.
         V4 sum = hn::IfThenElse(first, x, hn::IfThenElse(first_two, y, z));
+        V4 first_columns[kLbsQuads];
         for (std::size_t k = 0; k < block.influences; ++k, ++bones) {
-            const Quad* const columns = &frame.palette->bones[kLbsQuads * static_cast<std::size_t>(*bones)];
-            const V4 moved = hn::MulAdd(hn::Load(four, columns[2].value.data()), z,
-                                        hn::Load(four, columns[3].value.data()));
-            const V4 moved2 = hn::MulAdd(hn::Load(four, columns[1].value.data()), y, moved);
-            sum = hn::MulAdd(hn::Set(four, rows[3 + k].lane[lane]),
-                             hn::MulAdd(hn::Load(four, columns[0].value.data()), x, moved2), sum);
+            const float* const stored = columns_of_bone(frame, *bones);
+            V4 columns[kLbsQuads];
+            for (std::size_t c = 0; c < kLbsQuads; ++c) {
+                columns[c] = hn::Load(four, stored + 4 * c);
+                if (k == 0)
+                    first_columns[c] = columns[c];
+                else
+                    columns[c] = hn::Sub(columns[c], first_columns[c]);
+            }
+            const V4 moved =
+                hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
+            sum =
+                k == 0 ? hn::Add(moved, sum) : hn::MulAdd(hn::Set(four, rows[3 + k].lane[lane]), moved, sum);
         }
         alignas(16) float point[4];
         hn::Store(sum, four, point);
@@ -136,18 +192,21 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
 #else
 
 inline void deform_mixed(const Frame& frame, std::size_t b) {
-    const Block& block = frame.mesh->blocks[b];
+    const One d;
+    const Places places = places_of(frame);
+    const Block& block = places.blocks[b];
+    const Lanes<float>* const rows = places.rows + block.first_row;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const One d;
-        const Lanes<float>* const rows = &frame.mesh->rows[block.first_row];
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
         const Points<One> p = load_points(d, rows, lane);
         Points<One> sum = p;
-        for (std::size_t k = 0; k < block.influences; ++k) {
+        const float* const first = columns_of_bone(frame, bones[0]);
+        add_bone<1, false>(d, Columns{first}, static_cast<const Vec<One>*>(nullptr), &p, &sum);
+        for (std::size_t k = 1; k < block.influences; ++k) {
             const Vec<One> weight = hn::Load(d, rows[3 + k].lane.data() + lane);
-            add_bone<1>(d, columns_of_bone(frame, bones[k]), &weight, &p, &sum);
+            add_bone<1, true>(d, Differences{columns_of_bone(frame, bones[k]), first}, &weight, &p, &sum);
         }
-        store_points(d, frame, b, lane, sum);
+        store_points(d, places, b, lane, sum);
     }
 }
 

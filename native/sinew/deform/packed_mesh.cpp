@@ -208,15 +208,14 @@ private:
             Lanes<float>* const weights = &mesh_.rows[block.first_row] + 3;
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 const auto vertex = static_cast<std::uint32_t>(mesh_.vertices[b].lane[lane]);
-                // In the kernels' order: a vertex gets the same last weight in either kind of block.
+                // In the kernels' order: a vertex gets the same first weight in either kind of block.
                 float left = 1.0f;
-                const std::size_t kept = weights_kept(count(vertex));
-                for (std::size_t k = 0; k < kept; ++k) {
-                    const float weight = influences_[offsets_[vertex] + k].weight;
-                    weights[k].lane[lane] = weight;
-                    left -= weight;
+                Lanes<float>* row = weights + (block.mixed ? 1 : 0);
+                for (std::size_t k = 1; k < count(vertex); ++k, ++row) {
+                    row->lane[lane] = influences_[offsets_[vertex] + k].weight;
+                    left -= row->lane[lane];
                 }
-                if (block.mixed) weights[kept].lane[lane] = left;
+                if (block.mixed && count(vertex) > 0) weights->lane[lane] = left;
             }
         }
     }

@@ -23,7 +23,7 @@ struct alignas(kLanes * sizeof(T)) Lanes {
 
 /// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
 struct Block {
-    // Of PackedMesh::rows: x, y, z, then the weights of each influence; without the last, which is what the
+    // Of PackedMesh::rows: x, y, z, then the weights of each influence; without the first, which is what the
     // others leave of 1, unless mixed.
     std::uint32_t first_row;
     std::uint32_t first_bone;  // of PackedMesh::bones: [influences], or if mixed [kLanes][influences]
@@ -54,7 +54,7 @@ struct PackedMesh {
 
 /// rest_points  [vertices]
 /// offsets      [vertices + 1] into `influences`
-/// influences   of each vertex, or none; of positive weights, of which the last is taken as what the others
+/// influences   of each vertex, or none; of positive weights, of which the first is taken as what the others
 ///              leave of 1
 [[nodiscard]] PackedMesh pack(std::span<const Vec3<float>> rest_points,
                               std::span<const std::uint32_t> offsets,

@@ -38,6 +38,18 @@ HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t c
     return true;
 }
 
+/// What each row but the first differs from the first.
+HWY_INLINE void subtract_first(float* rows, std::size_t count) {
+    const hn::CappedTag<float, kRow> d;
+    for (std::size_t i = 0; i < kRow; i += hn::Lanes(d)) {
+        const auto first = hn::LoadU(d, rows + i);
+        for (std::size_t k = 1; k < count; ++k) {
+            float* const row = rows + kRow * k + i;
+            hn::StoreU(hn::Sub(hn::LoadU(d, row), first), d, row);
+        }
+    }
+}
+
 #if HWY_TARGET != HWY_SCALAR
 
 using Four = hn::CappedTag<float, 4>;
@@ -50,7 +62,9 @@ HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
 }
 
 /// Copies rows of the palette, each turned to the side of the first; the least of their cosines.
-template <class Kernel>
+///
+/// kDifferences  of all but the first, what they differ from it
+template <class Kernel, bool kDifferences>
 HWY_INLINE float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              float* rows) {
     const Four d;
@@ -58,22 +72,27 @@ HWY_INLINE float copy_turned(const Palette& palette, const std::int32_t* bones, 
         return hn::Load(d, palette.bones[kRowQuads * static_cast<std::size_t>(bones[k]) + q].value.data());
     };
     const Vec<Four> first = quad_of(0, 0);
+    const Vec<Four> first_second = quad_of(0, 1);
+    hn::Store(first, d, rows);
+    hn::Store(first_second, d, rows + 4);
     Vec<Four> least = hn::Set(d, 1.0f);
-    for (std::size_t k = 0; k < count; ++k) {
-        const Vec<Four> quad = quad_of(k, 0);
+    for (std::size_t k = 1; k < count; ++k) {
+        Vec<Four> quad = quad_of(k, 0);
+        Vec<Four> second = quad_of(k, 1);
         const Vec<Four> cosine = dot(quad, first);
         const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
         least = hn::Min(least, hn::Abs(cosine));
-        hn::Store(hn::Xor(quad, sign), d, rows + kRow * k);
-        const Vec<Four> second = quad_of(k, 1);
-        hn::Store(Kernel::kSignedQuads == 2 ? hn::Xor(second, sign) : second, d, rows + kRow * k + 4);
+        quad = hn::Xor(quad, sign);
+        if (Kernel::kSignedQuads == 2) second = hn::Xor(second, sign);
+        hn::Store(kDifferences ? hn::Sub(quad, first) : quad, d, rows + kRow * k);
+        hn::Store(kDifferences ? hn::Sub(second, first_second) : second, d, rows + kRow * k + 4);
     }
     return hn::GetLane(least);
 }
 
 #else
 
-template <class Kernel>
+template <class Kernel, bool kDifferences>
 float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
     float least = 1.0f;
     for (std::size_t k = 0; k < count; ++k) {
@@ -86,13 +105,15 @@ float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t
             for (std::size_t i = 0; i < 4 * Kernel::kSignedQuads; ++i) row[i] = -row[i];
         }
     }
+    if (kDifferences) subtract_first(rows, count);
     return least;
 }
 
 #endif
 
-/// Copies the bones of a set to `rows`, each turned to the side on which it is added. False where that
-/// depends on the weights, or where a bone has scale and so depends on the vertex.
+/// Copies the first bone of a set to `rows` and what the others differ from it, each turned to the side on
+/// which it is added. False where that depends on the weights, or where a bone has scale and so depends on
+/// the vertex.
 template <class Kernel>
 HWY_INLINE bool resolve(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
     if (count > kMostResolved) return false;
@@ -102,81 +123,95 @@ HWY_INLINE bool resolve(const Palette& palette, const std::int32_t* bones, std::
         }
     }
     // Within 45 degrees of the first, all lie within 90 of each other.
-    return copy_turned<Kernel>(palette, bones, count, rows) > 0.7072f || signs_agree(rows, kRow, count);
+    if (copy_turned<Kernel, true>(palette, bones, count, rows) > 0.7072f) return true;
+    copy_turned<Kernel, false>(palette, bones, count, rows);
+    if (!signs_agree(rows, kRow, count)) return false;
+    subtract_first(rows, count);
+    return true;
 }
 
-/// Lanes [lane, lane + N) of a block whose bones are resolved. That the first is not added to zeros and
-/// that a fixed count makes one run of instructions saves a twentieth of the time.
+/// Lanes [lane, lane + N) of a block whose bones are resolved. A fixed count makes one run of instructions.
+///
+/// weights  of the second influence and those after it
 template <std::size_t kCount, class D>
 HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const float* weights) {
     Sum<D> sum;
-    if constexpr (kCount == 1) {
-        for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Set(d, rows[i]);
-        return sum;
+    for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Set(d, rows[i]);
+    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+        add_row(d, hn::Load(d, weights + kLanes * (k - 1)), rows + kRow * k, 0, kRow, sum);
     }
-    const std::size_t last = (kCount > 0 ? kCount : count) - 1;
-    const Vec<D> first = hn::Load(d, weights);
-    Vec<D> left = hn::Sub(hn::Set(d, 1.0f), first);
-    for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, hn::Set(d, rows[i]));
-    for (std::size_t k = 1; k < last; ++k) {
-        const Vec<D> weight = hn::Load(d, weights + kLanes * k);
-        left = hn::Sub(left, weight);
-        add_row(d, weight, rows + kRow * k, 0, kRow, sum);
-    }
-    add_row(d, left, rows + kRow * last, 0, kRow, sum);
     return sum;
 }
 
 /// The same for bones with scale, or with signs that depend on the weights.
 ///
-/// kMixed  the last weight is with the others
+/// kMixed  the first weight is with the others
 template <class Kernel, bool kMixed, class D>
 HWY_INLINE Sum<D> blend_bones(D d, const Palette& palette, const std::int32_t* bones, std::size_t count,
                               const float* weights, const Points<D>& rest) {
-    Sum<D> sum;
-    for (auto& value : sum.value) value = hn::Zero(d);
-    Vec<D> left = hn::Set(d, 1.0f);
-    for (std::size_t k = 0; k < count; ++k) {
-        const Vec<D> weight = kMixed || k + 1 < count ? hn::Load(d, weights + kLanes * k) : left;
-        left = hn::Sub(left, weight);
-        Kernel::add(d, palette, static_cast<std::size_t>(bones[k]), weight, rest, sum);
+    Vec<D> first_weight;
+    if constexpr (kMixed) {
+        first_weight = hn::Load(d, weights);
+        weights += kLanes;
+    } else {
+        first_weight = hn::Set(d, 1.0f);
+        for (std::size_t k = 1; k < count; ++k) {
+            first_weight = hn::Sub(first_weight, hn::Load(d, weights + kLanes * (k - 1)));
+        }
     }
-    return sum;
+    Blend<D> blend = begin_blend(d, row_of(palette, bones[0]), first_weight);
+    Kernel::add_scale(d, palette, bones[0], first_weight, first_weight, rest, blend.sum);
+    for (std::size_t k = 1; k < count; ++k) {
+        const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
+        const Vec<D> signed_weight =
+            add_to_blend<Kernel>(d, row_of(palette, bones[0]), row_of(palette, bones[k]), weight, blend);
+        Kernel::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
+    }
+    return blend.sum;
+}
+
+/// Displacements between model space and the space of the bones, null where they are the same: see Frame.
+struct Spaces {
+    const float* bones_from_model;
+    const float* model_from_bones;
+};
+
+HWY_INLINE Spaces spaces_of(const Frame& frame) {
+    if (frame.bones_from_model == nullptr) return {nullptr, nullptr};
+    return {frame.bones_from_model->value.data(), frame.model_from_bones->value.data()};
 }
 
 template <class Kernel, class D>
-HWY_INLINE void finish_and_store(D d, const Frame& frame, std::size_t b, std::size_t lane, const Sum<D>& sum,
-                                 const Points<D>& rest) {
+HWY_INLINE void finish_and_store(D d, const Places& places, const Spaces& spaces, std::size_t b,
+                                 std::size_t lane, const Sum<D>& sum, const Points<D>& rest) {
     Points<D> points = Kernel::finish(d, sum, rest);
-    if (frame.model_from_bones != nullptr) {
-        points = displaced(d, frame.model_from_bones->value.data(), points);
-    }
-    store_points(d, frame, b, lane, points);
+    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
+    store_points(d, places, b, lane, points);
 }
 
 template <class D>
-HWY_INLINE Points<D> load_rest(D d, const Frame& frame, const Block& block, std::size_t lane) {
-    const Points<D> rest = load_points(d, &frame.mesh->rows[block.first_row], lane);
-    if (frame.bones_from_model == nullptr) return rest;
-    return displaced(d, frame.bones_from_model->value.data(), rest);
+HWY_INLINE Points<D> load_rest(D d, const Lanes<float>* rows, const Spaces& spaces, std::size_t lane) {
+    const Points<D> rest = load_points(d, rows, lane);
+    return spaces.bones_from_model == nullptr ? rest : displaced(d, spaces.bones_from_model, rest);
 }
 
-HWY_INLINE const float* weights_of(const Frame& frame, const Block& block) {
-    return frame.mesh->rows[block.first_row].lane.data() + 3 * kLanes;
-}
+HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].lane.data(); }
 
 /// Blocks [begin, end), which have the same resolved bones.
 ///
 /// kCount  their influences, or 0 for any number
 template <class Kernel, std::size_t kCount>
-void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* rows) {
+void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
     const Full d;
+    const Places places = places_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const std::size_t influences = places.blocks[begin].influences;
     for (std::size_t b = begin; b < end; ++b) {
-        const Block& block = frame.mesh->blocks[b];
-        const float* const weights = weights_of(frame, block);
-        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-            const auto sum = blend_rows<kCount>(d, rows, block.influences, weights + lane);
-            finish_and_store<Kernel>(d, frame, b, lane, sum, load_rest(d, frame, block, lane));
+        const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
+        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            const auto sum = blend_rows<kCount>(d, bone_rows, influences, weights_of(rows) + lane);
+            finish_and_store<Kernel>(d, places, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
         }
     }
 }
@@ -184,15 +219,18 @@ void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, con
 template <class Kernel>
 void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
+    const Places places = places_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const std::size_t influences = places.blocks[begin].influences;
+    const std::int32_t* const bones = &frame.mesh->bones[places.blocks[begin].first_bone];
     for (std::size_t b = begin; b < end; ++b) {
-        const Block& block = frame.mesh->blocks[b];
-        const float* const weights = weights_of(frame, block);
-        const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
-        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-            const Points<Full> rest = load_rest(d, frame, block, lane);
-            const auto sum =
-                blend_bones<Kernel, false>(d, *frame.palette, bones, block.influences, weights + lane, rest);
-            finish_and_store<Kernel>(d, frame, b, lane, sum, rest);
+        const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
+        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            const Points<Full> rest = load_rest(d, rows, spaces, lane);
+            const auto sum = blend_bones<Kernel, false>(d, *frame.palette, bones, influences,
+                                                        weights_of(rows) + lane, rest);
+            finish_and_store<Kernel>(d, places, spaces, b, lane, sum, rest);
         }
     }
 }
@@ -219,14 +257,16 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
 template <class Kernel>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
-    const Block& block = frame.mesh->blocks[b];
-    const float* const weights = weights_of(frame, block);
+    const Places places = places_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const Block& block = places.blocks[b];
+    const Lanes<float>* const rows = places.rows + block.first_row;
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const Points<One> rest = load_rest(d, frame, block, lane);
+        const Points<One> rest = load_rest(d, rows, spaces, lane);
         const auto sum = blend_bones<Kernel, true>(d, *frame.palette, bones + block.influences * lane,
-                                                   block.influences, weights + lane, rest);
-        finish_and_store<Kernel>(d, frame, b, lane, sum, rest);
+                                                   block.influences, weights_of(rows) + lane, rest);
+        finish_and_store<Kernel>(d, places, spaces, b, lane, sum, rest);
     }
 }
 
@@ -238,22 +278,31 @@ template <class Kernel>
 void deform_mixed(const Frame& frame, std::size_t b) {
     const Four four;
     using V4 = Vec<Four>;
-    const Block& block = frame.mesh->blocks[b];
-    const Lanes<float>* const weights = &frame.mesh->rows[block.first_row + 3];
+    const Places places = places_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const Block& block = places.blocks[b];
+    const Lanes<float>* const rows = places.rows + block.first_row;
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     alignas(64) float sums[kRowQuads][4 * kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const Quad* const first = &frame.palette->bones[kRowQuads * static_cast<std::size_t>(*bones)];
         V4 sum[kRowQuads];
-        for (V4& quad : sum) quad = hn::Zero(four);
-        for (std::size_t k = 0; k < block.influences; ++k, ++bones) {
+        for (std::size_t q = 0; q < kRowQuads; ++q) sum[q] = hn::Load(four, first[q].value.data());
+        V4 side = hn::Mul(hn::Set(four, rows[3].lane[lane]), sum[0]);
+        ++bones;
+        for (std::size_t k = 1; k < block.influences; ++k, ++bones) {
             const Quad* const row = &frame.palette->bones[kRowQuads * static_cast<std::size_t>(*bones)];
-            const V4 weight = hn::Set(four, weights[k].lane[lane]);
-            const V4 cosine = dot(hn::Load(four, row->value.data()), sum[0]);
-            const V4 side = hn::IfThenElse(hn::Lt(cosine, hn::Zero(four)), hn::Neg(weight), weight);
+            const V4 weight = hn::Set(four, rows[3 + k].lane[lane]);
+            const V4 quaternion = hn::Load(four, row->value.data());
+            const auto below = hn::Lt(dot(quaternion, side), hn::Zero(four));
+            const V4 away = hn::And(hn::SignBit(four), hn::VecFromMask(four, below));
             for (std::size_t q = 0; q < kRowQuads; ++q) {
-                sum[q] = hn::MulAdd(q < Kernel::kSignedQuads ? side : weight,
-                                    hn::Load(four, row[q].value.data()), sum[q]);
+                V4 turned = hn::Load(four, row[q].value.data());
+                if (q < Kernel::kSignedQuads) turned = hn::Xor(turned, away);
+                const V4 difference = hn::Sub(turned, hn::Load(four, first[q].value.data()));
+                sum[q] = hn::MulAdd(weight, difference, sum[q]);
             }
+            side = hn::MulAdd(hn::Xor(weight, away), quaternion, side);
         }
         for (std::size_t q = 0; q < kRowQuads; ++q) hn::Store(sum[q], four, sums[q] + 4 * lane);
     }
@@ -264,7 +313,7 @@ void deform_mixed(const Frame& frame, std::size_t b) {
             Vec<Full>* const value = sum.value + 4 * q;
             hn::LoadInterleaved4(d, sums[q] + 4 * lane, value[0], value[1], value[2], value[3]);
         }
-        finish_and_store<Kernel>(d, frame, b, lane, sum, load_rest(d, frame, block, lane));
+        finish_and_store<Kernel>(d, places, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
     }
 }
 

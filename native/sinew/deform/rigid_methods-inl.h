@@ -2,7 +2,8 @@
 // The rigid methods on lanes, agreeing with skinning/: compiled once for each instruction set, see
 // kernels.cpp.
 //
-// `add` sums a bone's row by weight, `finish` makes points of the sums. There is no case for blends that
+// Rows of bones are summed as the first and, by weight, what the others differ from it, which saves the first's
+// products; `finish` makes points of the sums. There is no case for blends that
 // cancel: a term never points against the sum before it, so |sum|^2 >= the sum of squared weights
 // >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
 #if defined(SINEW_DEFORM_RIGID_METHODS_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -35,33 +36,71 @@ HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin,
     }
 }
 
-/// `weight`, negative where the quaternion of `row` points away from that of `sum`.
+/// A weighted sum, and that of the quaternions alone up to here, which says on what side the next is added.
+template <class D>
+struct Blend {
+    Sum<D> sum;
+    Vec<D> side[4];
+};
+
+template <class D>
+HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight) {
+    Blend<D> blend;
+    for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Set(d, row[i]);
+    for (std::size_t i = 0; i < 4; ++i) blend.side[i] = hn::Mul(weight, hn::Set(d, row[i]));
+    return blend;
+}
+
+/// Adds what `row`, turned to the side of the blend, differs from the `first`; the weight, negative where it
+/// was turned.
 ///
 /// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
 /// must decide a tie alike.
+template <class Kernel, class D>
+HWY_INLINE Vec<D> add_to_blend(D d, const float* first, const float* row, Vec<D> weight, Blend<D>& blend) {
+    Vec<D>* const side = blend.side;
+    const Vec<D> dot =
+        hn::Add(hn::Add(hn::Mul(hn::Set(d, row[0]), side[0]), hn::Mul(hn::Set(d, row[2]), side[2])),
+                hn::Add(hn::Mul(hn::Set(d, row[1]), side[1]), hn::Mul(hn::Set(d, row[3]), side[3])));
+    const auto away = hn::Lt(dot, hn::Zero(d));
+    const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
+    for (std::size_t i = 0; i < kRow; ++i) {
+        const Vec<D> difference = hn::Set(d, row[i] - first[i]);
+        const Vec<D> turned = hn::Set(d, -row[i] - first[i]);
+        const Vec<D> by =
+            i < 4 * Kernel::kSignedQuads ? hn::IfThenElse(away, turned, difference) : difference;
+        blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
+    }
+    for (std::size_t i = 0; i < 4; ++i) side[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), side[i]);
+    return signed_weight;
+}
+
+HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
+    return palette.bones[kRow / 4 * static_cast<std::size_t>(bone)].value.data();
+}
+
+/// What the scale of `bone` adds to `rest`, or false where it has none.
 template <class D>
-HWY_INLINE Vec<D> on_the_side_of(D d, const Sum<D>& sum, const float* row, Vec<D> weight) {
-    const Vec<D> dot = hn::Add(
-        hn::Add(hn::Mul(hn::Set(d, row[0]), sum.value[0]), hn::Mul(hn::Set(d, row[2]), sum.value[2])),
-        hn::Add(hn::Mul(hn::Set(d, row[1]), sum.value[1]), hn::Mul(hn::Set(d, row[3]), sum.value[3])));
-    return hn::IfThenElse(hn::Lt(dot, hn::Zero(d)), hn::Neg(weight), weight);
+HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest, Points<D>& by) {
+    const auto index = static_cast<std::size_t>(bone);
+    if (palette.has_scale.empty() || palette.has_scale[index] == 0) return false;
+    by = displacement(d, palette.scales[kDisplacementQuads * index].value.data(), rest);
+    return true;
 }
 
 struct DqKernel {
     static constexpr std::size_t kSignedQuads = 2;
 
+    /// The dual part that also moves by the scale: + 1/2 real * displacement.
     template <class D>
-    static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
-                               const Points<D>& rest, Sum<D>& sum) {
-        const float* const row = palette.bones[2 * bone].value.data();
-        weight = on_the_side_of(d, sum, row, weight);
-        add_row(d, weight, row, 0, 8, sum);
-        if (palette.has_scale.empty() || palette.has_scale[bone] == 0) return;
-        // The dual part that also moves by the scale: + 1/2 real * displacement.
-        const Points<D> by = displacement(d, palette.scales[kDisplacementQuads * bone].value.data(), rest);
+    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D>,
+                                     Vec<D> signed_weight, const Points<D>& rest, Sum<D>& sum) {
+        Points<D> by;
+        if (!scaled(d, palette, bone, rest, by)) return;
+        const float* const row = row_of(palette, bone);
         const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
         const Points<D> turned = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
-        const Vec<D> half = hn::Mul(weight, hn::Set(d, 0.5f));
+        const Vec<D> half = hn::Mul(signed_weight, hn::Set(d, 0.5f));
         const Vec<D> along = hn::MulAdd(axis.x, by.x, hn::MulAdd(axis.y, by.y, hn::Mul(axis.z, by.z)));
         sum.value[4] = hn::NegMulAdd(half, along, sum.value[4]);
         sum.value[5] = hn::MulAdd(half, turned.x, sum.value[5]);
@@ -91,14 +130,13 @@ struct DqKernel {
 struct QvKernel {
     static constexpr std::size_t kSignedQuads = 1;
 
+    /// The translation that also moves by the turned scale.
     template <class D>
-    static HWY_INLINE void add(D d, const Palette& palette, std::size_t bone, Vec<D> weight,
-                               const Points<D>& rest, Sum<D>& sum) {
-        const float* const row = palette.bones[2 * bone].value.data();
-        add_row(d, on_the_side_of(d, sum, row, weight), row, 0, 4, sum);
-        add_row(d, weight, row, 4, 7, sum);
-        if (palette.has_scale.empty() || palette.has_scale[bone] == 0) return;
-        const Points<D> by = displacement(d, palette.scales[kDisplacementQuads * bone].value.data(), rest);
+    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
+                                     const Points<D>& rest, Sum<D>& sum) {
+        Points<D> by;
+        if (!scaled(d, palette, bone, rest, by)) return;
+        const float* const row = row_of(palette, bone);
         const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
         const Points<D> inner = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
         const Points<D> turned = add_scaled<D>(by, hn::Set(d, 2.0f), cross<D>(axis, inner));

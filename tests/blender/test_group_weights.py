@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Vertex groups as they are read in bulk, beside a loop over Blender's own collections."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from sinew_addon.blender import mesh_io
+from sinew_addon.core.influences import GroupWeights
+
+
+def in_a_loop(mesh: bpy.types.Mesh) -> GroupWeights:
+    entries = [[(entry.group, entry.weight) for entry in vertex.groups] for vertex in mesh.vertices]
+    flat = [entry for of_vertex in entries for entry in of_vertex]
+    return GroupWeights(
+        np.array([len(of_vertex) for of_vertex in entries], dtype=np.int32),
+        np.array([group for group, _weight in flat], dtype=np.int32),
+        np.array([weight for _group, weight in flat], dtype=np.float32),
+    )
+
+
+def read_alike(mesh: bpy.types.Mesh) -> GroupWeights:
+    """What mesh_io reads, which must be what the loop reads, bit for bit and type for type."""
+    read, expected = mesh_io.read_group_weights(mesh), in_a_loop(mesh)
+    for name in ("counts", "groups", "weights"):
+        assert getattr(read, name).dtype == getattr(expected, name).dtype
+    assert read.equals(expected)
+    return read
+
+
+def a_grid(side: int = 20) -> bpy.types.Object:
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=side, y_subdivisions=side)
+    return bpy.context.object
+
+
+def weigh_at_random(obj: bpy.types.Object, groups: int, seed: int) -> None:
+    """Vertices of none to all groups in any order, one weight in five being zero."""
+    random = np.random.default_rng(seed)
+    made = [obj.vertex_groups.new(name=f"group {number}") for number in range(groups)]
+    for vertex in range(len(obj.data.vertices)):
+        for group in random.permutation(groups)[: random.integers(groups + 1)]:
+            weight = 0.0 if random.random() < 0.2 else random.random(dtype=np.float32)
+            made[group].add([vertex], float(weight), "REPLACE")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_weights_are_read_as_they_are_stored(seed):
+    obj = a_grid()
+    weigh_at_random(obj, 7, seed)
+    read = read_alike(obj.data)
+    assert (read.counts == 0).any()
+    assert (read.weights == 0.0).any()
+    vertex_of = np.repeat(np.arange(len(read.counts)), read.counts)
+    assert (np.diff(read.groups)[np.diff(vertex_of) == 0] < 0).any(), "in the order of the groups"
+
+
+def test_more_groups_than_a_deformer_resolves_at_once():
+    obj = a_grid(4)
+    weigh_at_random(obj, 50, 1)
+    assert read_alike(obj.data).counts.max() > 32
+
+
+def test_without_groups_or_vertices():
+    obj = a_grid(3)
+    assert not read_alike(obj.data).counts.any()
+    obj.vertex_groups.new(name="empty")
+    assert not read_alike(obj.data).counts.any()
+    assert len(read_alike(bpy.data.meshes.new("nothing")).counts) == 0
+
+
+def test_groups_that_are_gone_leave_no_trace():
+    obj = a_grid(6)
+    weigh_at_random(obj, 5, 2)
+    obj.vertex_groups.remove(obj.vertex_groups[1])
+    assert read_alike(obj.data).groups.max() == 3
+
+
+def test_evaluated_mesh():
+    obj = a_grid(6)
+    weigh_at_random(obj, 5, 3)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    obj.modifiers.new("Mirror", "MIRROR")
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert len(read_alike(evaluated).counts) > len(obj.data.vertices)
+
+
+def test_shape_keys_loose_vertices_and_layers_change_nothing():
+    obj = a_grid(6)
+    weigh_at_random(obj, 5, 4)
+    obj.data.vertices.add(3)
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Key").value = 1.0
+    obj.data.uv_layers.new(name="second")
+    obj.data.attributes.new("colour", "FLOAT_COLOR", "CORNER")
+    obj.data.attributes.new("number", "INT", "POINT")
+    assert (read_alike(obj.data).counts[-3:] == 0).all()
+
+
+def test_mesh_in_edit_mode_is_read_as_it_was():
+    obj = a_grid(6)
+    weigh_at_random(obj, 5, 5)
+    before = read_alike(obj.data)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert read_alike(obj.data).equals(before)
+    bpy.ops.object.mode_set(mode="OBJECT")
