@@ -78,7 +78,8 @@ class Driven:
 def update(
     obj: bpy.types.Object, driven: Driven | None, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> Driven | None:
-    """Deforms an object that is on, if anything changed; its state from now on.
+    """Deforms an object that is on, if anything changed; its state from now on, None where it waits for
+    another evaluation, or is in a mode of the modifier.
 
     Raises SinewError with a sentence for the user where it can not be driven.
     """
@@ -106,10 +107,12 @@ def update(
         if not touched and driven.mode == mode and obj.data.session_uid not in changes.touched:
             driven.dirtied_by_frames = False
             return driven
+    was_on = properties.of(obj).standing_in
     if driven is None or touched or driven.mode != mode:
         _maintain(obj, changes)
-    if not source.is_ready(obj, depsgraph):
-        return driven
+    # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
+    if not source.is_ready(obj, depsgraph, was_on):
+        return None
     known, known_source = driven, driven and driven.source
     driven = _current(obj, driven, depsgraph, changes, touched)
     if touched or not driven.watched:

@@ -60,9 +60,11 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     signature = _signature(obj)
     if settings.front is None or settings.front.data != obj.data or settings.front_signature != signature:
         check(obj)
+        # Before the old one goes: at its address, Blender would take the new one for evaluated already.
+        made = _make(obj)
         remove(obj)
-        settings.front = _make(obj)
-        settings.front_signature = signature
+        settings.front, settings.front_signature = made, signature
+        made.name = f"{obj.name} Sinew front"
     return settings.front
 
 
@@ -88,7 +90,6 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
-    copy.name = f"{obj.name} Sinew front"
     properties.clear(copy)
     properties.of(copy).helper = True
     wanted = {m.name for m in stack.in_front(obj) if m.type != "ARMATURE"}

@@ -30,6 +30,7 @@ class Session:
     object_count: int = 0
     driven: dict[int, Driven] = field(default_factory=dict)
     depsgraph: int = 0  # the address of the one last seen
+    waiting: set[int] = field(default_factory=set)  # as _waiting()
     gate: Gate = field(default_factory=Gate)
     updating: bool = False
 
@@ -41,6 +42,7 @@ class Session:
     def forget(self) -> None:
         self.objects = None
         self.depsgraph = 0
+        self.waiting = set()
         self.driven.clear()
 
 
@@ -72,7 +74,7 @@ def refresh(context: bpy.types.Context) -> None:
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
         # Where all is known, only what was just written is new: weights need not be read again for that.
-        with contextlib.nullcontext() if _wants_evaluation() else held():
+        with contextlib.nullcontext() if _waiting() else held():
             context.view_layer.update()
 
 
@@ -101,14 +103,15 @@ def deform_for_file(context: bpy.types.Context) -> None:
         if depsgraph is None or driven_before:
             depsgraph = context.evaluated_depsgraph_get()
         _update(depsgraph, changes)
-        if _wants_evaluation():
+        if _waiting():
             _update(context.evaluated_depsgraph_get(), changes)
         lay_down()
 
 
-def _wants_evaluation() -> bool:
-    """Whether a driven object waits for what Blender makes of the modifiers in front of it."""
-    return any(properties.of(obj).enabled and state_of(obj) is None for obj in _driven_objects(Changes()))
+def _waiting() -> set[int]:
+    """The session_uid of each driven object that waits for what Blender makes of the modifiers in front."""
+    driven_now = [(obj, properties.of(obj)) for obj in _driven_objects(Changes()) if state_of(obj) is None]
+    return {obj.session_uid for obj, settings in driven_now if settings.enabled and settings.standing_in}
 
 
 def lay_down() -> None:
@@ -249,13 +252,23 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     if not session.idle:
         changes = _read_changes(depsgraph, frame=True)
         changes.gated = gated
-        _update(depsgraph, changes)
+        _follow(depsgraph, changes)
+
+
+def _follow(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
+    _update(depsgraph, changes)
+    known, session.waiting = session.waiting, _waiting()
+    # What handlers change Blender evaluates without telling of it. Once for each: what is in another scene
+    # goes on waiting.
+    if session.waiting - known and depsgraph == bpy.context.view_layer.depsgraph:
+        refresh(bpy.context)
 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not session.idle and not session.updating:
-        _update(depsgraph, _read_changes(depsgraph, frame=False))
+    if session.idle or session.updating:
+        return
+    _follow(depsgraph, _read_changes(depsgraph, frame=False))
 
 
 @persistent

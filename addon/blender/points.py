@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import carrier, front, heat_nodes, mesh_io, node_group, properties, stack
+from . import carrier, front, heat_nodes, mesh_io, node_group, pose_driver, properties, stack
 
 ATTRIBUTE = "sinew_points"
 # Beside them, while a heat map is shown: the colour of each vertex.
@@ -27,6 +27,8 @@ def arrange(obj: bpy.types.Object) -> None:
         if settings.attribute:
             remove_attributes(obj)
             settings.attribute = ""
+            # It is on an input that a carrier's modifier does not have.
+            pose_driver.remove(obj)
         kind = node_group.CARRIER
         inputs = {"Points": carrier.ensure(obj), "Front": made}
     else:

@@ -38,10 +38,12 @@ class Source:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
 
-def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
     """False as long as Blender has not evaluated what stands in front: it was just made, or Sinew was off and
     nothing needed it."""
-    return properties.of(obj).front is None or front.evaluated_mesh(obj, depsgraph) is not None
+    if properties.of(obj).front is None:
+        return True
+    return was_on and front.evaluated_mesh(obj, depsgraph) is not None
 
 
 def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:

@@ -192,6 +192,36 @@ def test_a_modifier_in_front_that_comes_changes_and_goes():
     assert armature.name in bpy.data.objects
 
 
+MODES = ["EDIT", "SCULPT"]
+
+
+@pytest.mark.parametrize("event", [*MODES, "added", "added at a frame", "changed"])
+def test_one_update_is_enough(event):
+    """What waits for the modifiers in front is not left at rest until the pose changes."""
+    obj = arm_with("CAST" if event.startswith("added") else "SUBSURF")
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(8)
+    if event in MODES:
+        bpy.ops.object.mode_set(mode=event)
+        bpy.context.view_layer.update()
+        bpy.ops.object.mode_set(mode="OBJECT")
+    elif event.startswith("added"):
+        obj.modifiers.new("Added", "SUBSURF").levels = 1
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    else:
+        obj.modifiers[0].levels = 2
+    if event.endswith("frame"):
+        bpy.context.scene.frame_set(9)
+    else:
+        bpy.context.view_layer.update()
+    shown = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    expected = scenes.final_points(obj)
+    assert shown.shape == expected.shape
+    assert scenes.worst(shown, expected) <= 1e-5
+    assert not properties.of(obj).error
+
+
 def test_removing_leaves_the_file_as_it_was():
     obj = arm_with("SUBSURF")
     bpy.context.view_layer.update()
