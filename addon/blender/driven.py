@@ -112,7 +112,8 @@ def update(
         _maintain(obj, changes)
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
-        return None
+        # What is in another scene stays as it is.
+        return None if obj.evaluated_get(depsgraph).is_evaluated else driven
     known, known_source = driven, driven and driven.source
     driven = _current(obj, driven, depsgraph, changes, touched)
     if touched or not driven.watched:

@@ -18,14 +18,14 @@ BACKGROUND, TEXT = (0.08, 0.08, 0.08, 0.75), (1.0, 1.0, 1.0, 1.0)
 
 @dataclass
 class Content:
-    """title  what is shown, under which methods; scene  the session_uid of the scene it is measured in"""
+    """title  what is shown, under which methods"""
 
     scale: HeatScale
     title: str
-    scene: int
 
 
-content: Content | None = None
+# By the session_uid of the scene that is measured.
+contents: dict[int, Content] = {}
 _handle: object | None = None
 
 
@@ -51,7 +51,8 @@ def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str
 
 def _draw() -> None:
     context = bpy.context
-    if content is None or content.scene != context.scene.session_uid:
+    content = contents.get(context.scene.session_uid)
+    if content is None:
         return
     if not context.space_data.overlay.show_overlays:
         return

@@ -11,17 +11,25 @@ from ..core.metrics import Measured
 from . import heat_legend, live, measures, points, properties
 from .measures import SinewMeasures
 
-_last: tuple | None = None
+# What colours were made from, by the session_uid of the scene.
+_last: dict[int, tuple] = {}
 
 
 def update(pairs: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
-    """Colours those of the driven objects that show a heat map, if anything changed."""
-    global _last
-    shown = [(obj, driven) for obj, driven in pairs if properties.of(obj).heat]
-    if not shown:
-        if _last is not None:
+    """Colours those of the driven objects that show a heat map in the scene that was evaluated, if anything
+    changed."""
+    heated = [(obj, driven) for obj, driven in pairs if properties.of(obj).heat]
+    if not heated:
+        if _last:
             live.forget()
-        _last = heat_legend.content = None
+        _last.clear()
+        heat_legend.contents.clear()
+        return
+    scene = depsgraph.scene.session_uid
+    shown = [(obj, driven) for obj, driven in heated if obj.evaluated_get(depsgraph).is_evaluated]
+    if not shown:
+        _last.pop(scene, None)
+        heat_legend.contents.pop(scene, None)
         return
     settings = measures.of(depsgraph.scene)
     subject = live.measure(shown, settings.other, depsgraph)
@@ -29,15 +37,15 @@ def update(pairs: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
         return
     # Kept whole, not by id: that of an object that is gone may be another's.
     inputs = (subject.measured, *_choices(settings))
-    if _equal(inputs, _last) and all(points.has_colours(obj) for obj, _driven in shown):
+    if _equal(inputs, _last.get(scene)) and all(points.has_colours(obj) for obj, _driven in shown):
         return
     values = subject.measured.field(settings.quantity)
     scale = scale_of(settings, subject.measured, values)
     colours = scale.linear_colours(values)
     for (obj, _driven), own in zip(shown, subject.split(colours), strict=True):
         points.write_colours(obj, own)
-    _last = inputs
-    heat_legend.content = heat_legend.Content(scale, _title(settings, shown), depsgraph.scene.session_uid)
+    _last[scene] = inputs
+    heat_legend.contents[scene] = heat_legend.Content(scale, _title(settings, shown))
 
 
 def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) -> HeatScale:

@@ -179,6 +179,35 @@ def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     np.testing.assert_allclose(np.concatenate([bent, straight]), linear(scale.colours(bulge)), atol=3e-3)
 
 
+@pytest.mark.parametrize("set_up", [None, in_front])
+def test_scenes_have_ranges_of_their_own(set_up):
+    first, bent = scenes.make_arm()
+    scenes.key_pose(bent, 160.0)
+    if set_up is not None:
+        set_up(first)
+    scenes.add_sinew(first, "dq")
+    choose("bulge")
+    bpy.context.scene.frame_set(11)
+    bpy.ops.sinew.heat_map()
+    before = shown_colours(first)
+    one, two = bpy.context.scene, bpy.data.scenes.new("Two")
+    bpy.context.window.scene = two
+    second, _armature = scenes.make_arm(name="Second")
+    scenes.add_sinew(second, "lbs")
+    choose("bulge")
+    two.frame_set(5)
+    bpy.ops.sinew.heat_map()
+    assert heat_legend.contents.keys() == {one.session_uid, two.session_uid}
+    shown = shown_colours(second)
+    expected = expected_fields([second], ("lbs", "blender"), 5)
+    bulge = expected["bulge"]
+    scale = HeatScale.over_values(METRICS["bulge"], bulge.min(), bulge.max(), expected["diagonal"])
+    np.testing.assert_allclose(shown, linear(scale.colours(bulge)), atol=3e-3)
+    bpy.context.window.scene = one
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(shown_colours(first), before, atol=1e-6)
+
+
 def color_types() -> list[str]:
     return [
         space.shading.color_type
@@ -349,20 +378,20 @@ def test_the_legend_says_range_unit_and_methods():
     choose("distance", range=measures.FIXED, length=0.02)
     bpy.context.scene.frame_set(11)
     bpy.ops.sinew.heat_map()
-    content = heat_legend.content
+    (content,) = heat_legend.contents.values()
     assert content.title == "Distance, Dual Quaternion against Armature modifier"
     assert heat_legend.labels(content.scale, scene)[0] == "0 m"
     assert heat_legend.labels(content.scale, scene)[-1] == "\u2265 2 cm"
     choose("stretch", ratio=4.0)
-    assert heat_legend.labels(heat_legend.content.scale, scene)[::2] == [
+    assert heat_legend.labels(heat_legend.contents[scene.session_uid].scale, scene)[::2] == [
         "0.25\u00d7",
         "1.00\u00d7",
         "4.00\u00d7",
     ]
     choose("flips")
-    assert heat_legend.labels(heat_legend.content.scale, scene)[::4] == ["0 %", "100 %"]
+    assert heat_legend.labels(heat_legend.contents[scene.session_uid].scale, scene)[::4] == ["0 %", "100 %"]
     bpy.ops.sinew.heat_map()
-    assert heat_legend.content is None
+    assert not heat_legend.contents
 
 
 def test_off_it_measures_nothing(monkeypatch):
