@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import atexit
 import os
+import re
 import shutil
 import sys
 
@@ -52,7 +53,7 @@ def main(argv: list[str]) -> int:
     for module in modules.values():
         module.add_parser(subparsers)
     try:
-        args = parser.parse_args(argv)
+        args = parser.parse_args(_with_signed_frames(argv))
     except SystemExit as stop:
         # Inside Blender an exit would skip its own ending.
         return stop.code if isinstance(stop.code, int) else 2
@@ -70,6 +71,17 @@ def main(argv: list[str]) -> int:
     finally:
         output.out.flush()
         output.err.flush()
+
+
+def _with_signed_frames(argv: list[str]) -> list[str]:
+    """Frames such as -5-3 belong to --frames: by themselves argparse takes them for an option."""
+    joined: list[str] = []
+    for argument in argv:
+        if joined and joined[-1] in ("--frames", "--frame") and re.fullmatch(r"-[\d.][\d.,\s-]*", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 def run() -> None:

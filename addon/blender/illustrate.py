@@ -111,7 +111,7 @@ class Illustrator:
         mesh, index = subject.owner_of(vertex)
         where = f"vertex {index} of {mesh} under {comparison.methods[worst.method]}"
         places = np.stack([shapes[method][vertex] for method in self._methods])
-        close = close_view(shapes[worst.method], places)
+        close = close_view(subject.character_of(vertex, shapes[worst.method]), places)
         colours = {method: scale.colours(field) for method, field in fields.items()}
         return HeatPlan(metric, scale, worst.frame, colours, close, where)
 

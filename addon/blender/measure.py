@@ -77,6 +77,13 @@ class Subject:
             vertex -= part.vertex_count
         raise IndexError(vertex)
 
+    def character_of(self, vertex: int, points: np.ndarray) -> np.ndarray:
+        """[n, 3]: of `points` [vertices, 3] those of the meshes that have the armature of a vertex's mesh."""
+        ends = np.cumsum([part.vertex_count for part in self.parts])
+        armature = self.parts[int(np.searchsorted(ends, vertex, side="right"))].armature
+        own = zip(self.parts, self.split(points), strict=True)
+        return np.concatenate([shape for part, shape in own if part.armature == armature])
+
 
 @dataclass
 class Measurements:

@@ -12,7 +12,7 @@ from ..core.comparison import Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..core.output import write_text
+from ..core.output import check_folder, write_text
 from ..core.page import page
 from ..core.sheet import require_pillow
 from . import sheet
@@ -83,11 +83,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
         render.check_size(args.size)
     if args.out.suffix.lower() in sheet.PICTURES:
         return sheet.run(args, methods, console)
-    frames = parse_frames(args.frames) if args.frames else None
+    frames = parse_frames(args.frames) if args.frames is not None else None
     for option in ("pictures", "influences"):
         if getattr(args, option) < 0:
             raise WrongUse(f"{option}: expected 0 or more, got {getattr(args, option)}")
     _check_names(args.files)
+    check_folder(args.out)
     if args.video:
         require_pillow()
         video.check_can_encode()

@@ -17,7 +17,7 @@ from ..core.golden import (
     differing_share,
     picture_name,
 )
-from ..core.output import write_text, write_whole
+from ..core.output import check_folder, write_text, write_whole
 from .console import Console
 
 # In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
@@ -71,12 +71,13 @@ def run(args: argparse.Namespace, console: Console) -> int:
             raise WrongUse(f"{args.out}: would replace the golden pictures; choose another --out")
         golden = RenderSettings.read(args.against)
     method = args.method or (golden and golden.method)
-    frames = parse_frames(args.frames) if args.frames else golden and golden.frames
+    frames = parse_frames(args.frames) if args.frames is not None else golden and golden.frames
     if method is None or frames is None:
         raise WrongUse("render: --method and --frames are needed where there is no --against")
     evaluate.check_methods([method])
     if golden is not None:
         _check_fits(args, golden, frames)
+    check_folder(args.out)
     settings = _draw(args, method, frames, golden, console)
     write_text(args.out / SETTINGS, settings.to_json())
     console.say(f"{len(frames)} picture{'s' if len(frames) > 1 else ''} in {args.out}")

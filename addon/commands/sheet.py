@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.errors import WrongUse
 from ..core.frames import parse_frames
+from ..core.output import check_folder
 from ..core.sheet import Column, require_pillow, write_sheet
 from ..core.views import close_view, place_of_difference
 from .console import Console
@@ -34,6 +35,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     frames = parse_frames(args.frames or "")
     if len(frames) != 1:
         raise WrongUse(f"frame: expected one frame, got {args.frames!r}")
+    check_folder(args.out.parent)
     (path,), (frame,) = args.files, frames
     files.open_file(path)
     scene = bpy.context.scene

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from .errors import WrongUse
 
+# Blender's own; it would take frames beyond for these.
+FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574
+
 
 def parse_frames(text: str) -> list[float]:
     """The frames of "1,12,40-48": single frames, which may be fractions, and ranges, in the order typed.
@@ -19,12 +22,16 @@ def parse_frames(text: str) -> list[float]:
             dash = part.find("-", 1)
             if dash > 0:
                 first, last = int(part[:dash]), int(part[dash + 1 :])
-                if last < first:
-                    raise WrongUse(f"frames: {part!r} runs backwards; write {last}-{first}")
-                frames.extend(range(first, last + 1))
             else:
-                number = float(part)
-                frames.append(int(number) if number.is_integer() else number)
-        except (ValueError, OverflowError):
+                first = last = float(part)
+        except ValueError:
             raise WrongUse(f"frames: expected frames such as 1,12,40-48, got {text!r}") from None
+        if last < first:
+            raise WrongUse(f"frames: {part!r} runs backwards; write {last}-{first}")
+        if not FIRST_FRAME <= first <= last <= LAST_FRAME:
+            raise WrongUse(f"frames: expected {FIRST_FRAME} to {LAST_FRAME}, got {part!r}")
+        if isinstance(first, int):
+            frames.extend(range(first, last + 1))
+        else:
+            frames.append(int(first) if first.is_integer() else first)
     return frames

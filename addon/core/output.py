@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -14,6 +15,16 @@ def remove(path: Path) -> None:
     """Takes away what is not wanted, if it is there and can be: on a read-only disk even asking fails."""
     with suppress(OSError):
         path.unlink(missing_ok=True)
+
+
+def check_folder(folder: Path) -> None:
+    """Raises SinewError where files can not be written to a folder that is there or is to be made: known
+    before what takes long."""
+    nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not nearest.is_dir():
+        raise SinewError(f"{folder}: can not be written: {nearest} is a file")
+    if not os.access(nearest, os.W_OK):
+        raise SinewError(f"{folder}: can not be written: no permission to write to {nearest}")
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:

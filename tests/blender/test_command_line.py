@@ -189,6 +189,12 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["compare", path, "--frame", "1", "--out", tmp_path / "a.jpg"], "ending in .png"),
         (["compare", path, path, "--frame", "1", "--out", tmp_path / "a.png"], "a sheet shows one file"),
         (["compare", path, "--frames", "9-3", "--out", tmp_path], "backwards"),
+        (["compare", path, "--frames", "1,nan", "--out", tmp_path], "expected -1048574 to 1048574"),
+        (["compare", path, "--frames", "1-10000000", "--out", tmp_path], "expected -1048574 to 1048574"),
+        (["compare", path, "--frames", "", "--out", tmp_path], "expected frames"),
+        (["compare", path, "--out", path], "is a file"),
+        (["compare", path, "--frame", "1", "--out", path / "a.png"], "is a file"),
+        (["render", path, "--method", "dq", "--frames", "1", "--out", path / "golden"], "is a file"),
         (["compare", path, "--reference", "best", "--out", tmp_path], "expected one of"),
         (["compare", path, "--pictures", "-1", "--out", tmp_path], "expected 0 or more"),
         (["compare", path, "--influences", "-1", "--out", tmp_path], "expected 0 or more"),
@@ -199,7 +205,14 @@ def test_bad_input_is_one_sentence(arm_file, tmp_path):
         (["render", path, "--tolerance", "-1", "--out", tmp_path], "a percentage"),
         (["info", tmp_path / "no.blend"], "no such file"),
     ]
-    of_files = {"no such file", "is empty", "is a folder", "no mesh is deformed", "no mesh called 'Leg'"}
+    of_files = {
+        "is a file",
+        "no such file",
+        "is empty",
+        "is a folder",
+        "no mesh is deformed",
+        "no mesh called 'Leg'",
+    }
     for arguments, sentence in cases:
         result = run_sinew(*arguments, status=1 if sentence in of_files else 2)
         complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]

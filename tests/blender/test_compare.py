@@ -121,6 +121,30 @@ def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     assert ((tmp_path / "two.html").read_text(encoding="utf-8").count("<img") > 2) == NEWEST
 
 
+def test_frames_below_zero(tmp_path):
+    scenes.make_arm()
+    path = save(tmp_path / "arm.blend")
+    for number, frames in enumerate(("-2-0", "-2--1,0.5", "-1")):
+        out = tmp_path / str(number)
+        run_sinew("compare", path, "--methods", "dq", "--frames", frames, "--pictures", 0, "--out", out)
+    found = [json.loads((tmp_path / f"{n}/arm/metrics.json").read_text(encoding="utf-8")) for n in range(3)]
+    assert [each["frames"] for each in found] == [[-2, -1, 0], [-2, -1, 0.5], [-1]]
+
+
+@newest_only
+def test_close_ups_are_of_one_character(tmp_path):
+    """However far apart several stand."""
+    scenes.make_arm()
+    second, rig = scenes.make_arm(name="Far")
+    rig.location = second.location = (0.0, 50.0, 0.0)
+    path = save(tmp_path / "two.blend")
+    run_sinew(
+        *("compare", path, "--methods", "lbs", "--frames", "11", "--pictures", 1, "--size", 64),
+        *("--engine", "cycles", "--out", tmp_path),
+    )
+    assert len(opaque_pixels(tmp_path / "two" / "pictures" / "lbs-bulge-11-close.png")) > 400
+
+
 def test_planted_faults_are_found(tmp_path):
     obj, armature = scenes.make_arm()
     scenes.forget_keys(armature)
