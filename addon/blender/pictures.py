@@ -20,6 +20,8 @@ def read_picture(path: Path) -> np.ndarray:
         raise SinewError(f"{path}: can not be read as a picture") from None
     try:
         width, height = image.size
+        if not width:
+            raise SinewError(f"{path}: can not be read as a picture")
         pixels = np.empty(width * height * image.channels, dtype=np.float32)
         # Reads the file; without it size is known and pixels are not.
         image.pixels.foreach_get(pixels)

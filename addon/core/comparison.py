@@ -102,7 +102,7 @@ class Comparison:
 
     def length(self, value: float) -> str:
         """With its unit; what is rounding is 0."""
-        return f"{value if abs(value) > ROUNDING * self.rest.diagonal else 0.0:.3g} {self.unit}"
+        return f"{value if abs(value) > ROUNDING * self.rest.diagonal else 0.0:.3g}\u00a0{self.unit}"
 
     def shows(self, entry: str, value: float) -> bool:
         """Whether an entry of the summaries is more than rounding."""

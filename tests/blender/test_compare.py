@@ -254,6 +254,9 @@ def test_golden_pictures(tmp_path):
     result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
     assert re.search(r"\b1\b.*0\.000 %.*as before", result.stdout)
     assert "1 of 2 pictures within" in result.stdout
+    (tmp_path / "golden" / "0011.png").write_bytes(b"no picture")
+    result = run_sinew("render", path, "--against", tmp_path / "golden", "--out", tmp_path / "now", status=1)
+    assert "0011.png: can not be read as a picture" in result.stderr
 
 
 def test_wrong_use_is_one_sentence(tmp_path):
