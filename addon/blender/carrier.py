@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import properties
+from . import mesh_io, properties
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object:
@@ -28,7 +28,8 @@ def write(carrier: bpy.types.Object, points: np.ndarray) -> None:
     if len(mesh.vertices) != len(points):
         mesh.clear_geometry()
         mesh.vertices.add(len(points))
-    mesh.vertices.foreach_set("co", points.ravel())
+    if len(points):
+        mesh.attributes[mesh_io.POSITION].data.foreach_set("vector", points.ravel())
     mesh.update_tag()
 
 

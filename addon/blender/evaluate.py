@@ -195,7 +195,7 @@ def whole_views(
 
 def final_points(obj: bpy.types.Object) -> np.ndarray:
     """Vertices of the final evaluated mesh, object space, float32 [vertices, 3]."""
-    return mesh_io.read_points(_evaluated_mesh(obj).vertices)
+    return mesh_io.read_points(_evaluated_mesh(obj))
 
 
 def world_points(objects: list[bpy.types.Object]) -> np.ndarray:

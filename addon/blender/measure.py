@@ -307,6 +307,6 @@ def _weighting(obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> We
 def _in_armature_space(
     obj: bpy.types.Object, armature: bpy.types.Object, mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph
 ) -> np.ndarray:
-    points = mesh_io.read_points(mesh.vertices)
+    points = mesh_io.read_points(mesh)
     space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     return points if space is None else transformed(points, space)

@@ -77,7 +77,7 @@ def read_chain(mesh: bpy.types.Object) -> meshes.Chain:
     # One group to a vertex: that is what these figures are about.
     group_of = mesh_io.read_group_weights(mesh.data).groups
     return meshes.Chain(
-        points=mesh_io.read_points(mesh.data.vertices).astype(np.float64),
+        points=mesh_io.read_points(mesh.data).astype(np.float64),
         triangles=measure.read_surface(mesh.data).triangles,
         bones=bones.of_groups([group.name for group in mesh.vertex_groups])[group_of],
         parents=np.array(parents, np.int32),

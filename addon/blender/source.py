@@ -51,10 +51,10 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
     names = [group.name for group in obj.vertex_groups]
     if properties.of(obj).front is not None:
         mesh = front.evaluated_mesh(obj, depsgraph)
-        points = mesh_io.read_points(mesh.vertices)
+        points = mesh_io.read_points(mesh)
         return Source(names, mesh_io.read_group_weights(mesh), points, None, from_front=True)
     weights = mesh_io.read_group_weights(obj.data)
-    points = mesh_io.read_points(obj.data.vertices)
+    points = mesh_io.read_points(obj.data)
     return Source(names, weights, points, mesh_io.read_shape_keys(obj, weights))
 
 
@@ -107,7 +107,7 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
     Requires is_ready.
     """
     if properties.of(obj).front is not None:
-        points = mesh_io.read_points(front.evaluated_mesh(obj, depsgraph).vertices)
+        points = mesh_io.read_points(front.evaluated_mesh(obj, depsgraph))
         if not np.array_equal(points, source.points):
             source.points = points
         return source.points

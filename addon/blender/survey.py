@@ -39,7 +39,7 @@ def describe_undriven(obj: bpy.types.Object) -> RigFacts:
     weights = mesh_io.read_group_weights(obj.data)
     options = ModifierOptions.read(stack.armature_modifier(obj))
     weighting = options.weighting(obj, weights, bones)
-    points = mesh_io.read_points(obj.data.vertices)
+    points = mesh_io.read_points(obj.data)
     return describe(obj, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
 
 

@@ -357,7 +357,7 @@ def test_keyed_visibility_of_the_modifier():
 def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:
     """In edit mode the evaluated mesh is another than what it converts to."""
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    points = mesh_io.read_points(evaluated.to_mesh().vertices)
+    points = mesh_io.read_points(evaluated.to_mesh())
     evaluated.to_mesh_clear()
     return points
 
