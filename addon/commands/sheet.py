@@ -52,7 +52,8 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     place = place_of_difference(list(shapes.values()))
     if place is not None:
         places = np.stack([points[place] for points in shapes.values()])
-        views.append(("Where the methods differ most", close_view(shapes[methods[0]], places)))
+        character = subject.character_of(place, shapes[methods[0]])
+        views.append(("Where the methods differ most", close_view(character, places)))
 
     studio = render.Studio(scene, meshes, render.chosen_engine(args.engine), args.size or 640)
     columns = []
