@@ -62,7 +62,7 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
         )
         for row, picture in enumerate(pictures[index]):
             y = head + label + row * row_label + sum(heights[:row])
-            draw.text((x, y), row_titles[row], font=small, fill=FAINT)
+            draw.text((x, y), _fitted(draw, row_titles[row], small, cell), font=small, fill=FAINT)
             sheet.paste(picture, (x + (cell - picture.width) // 2, y + row_label - MARGIN // 2), picture)
     write_whole(path, lambda unfinished: sheet.save(unfinished, format="PNG"))
 

@@ -12,6 +12,7 @@ from sinew_addon.core.heat import HeatScale, viridis
 from sinew_addon.core.metrics import METRICS, Summary
 from sinew_addon.core.page import legend_texts
 from sinew_addon.core.plots import HEIGHT, WIDTH, line_plot
+from sinew_addon.core.sheet import Column, write_sheet
 
 
 def lightness(colours):
@@ -145,3 +146,16 @@ def test_a_folder_that_holds_no_golden_pictures_is_named(tmp_path):
     (tmp_path / golden.SETTINGS).write_text('{"frames": 3}')
     with pytest.raises(SinewError, match="make the pictures again"):
         golden.RenderSettings.read(tmp_path)
+
+
+def test_titles_of_a_sheet_stay_in_their_columns(tmp_path):
+    """Where pictures are small, what stands over one does not run into the next."""
+    image = pytest.importorskip("PIL.Image")
+    image.new("RGBA", (64, 64)).save(tmp_path / "picture.png")
+    columns = [Column("dq", "", [tmp_path / "picture.png"]), Column("", "", [tmp_path / "picture.png"])]
+    edges = []
+    for title in ("", "Where the methods differ most"):
+        write_sheet("", columns, [title], tmp_path / "sheet.png")
+        with image.open(tmp_path / "sheet.png") as sheet:
+            edges.append(np.asarray(sheet.convert("L"), dtype=float)[:, 80:96])
+    np.testing.assert_array_equal(*edges)
