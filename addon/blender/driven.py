@@ -134,7 +134,7 @@ def _looks(obj: bpy.types.Object) -> list:
     for modifier in obj.modifiers:
         looks += (modifier.name, modifier.show_viewport, modifier.show_render)
         if modifier.type == "ARMATURE":
-            looks += (modifier.object, ModifierOptions.read(modifier))
+            looks += (modifier.object, *ModifierOptions.values(modifier))
     return looks
 
 
@@ -150,7 +150,10 @@ def _deform(
     started = time.perf_counter()
     stand_ins = properties.of(obj).stand_ins
     armatures = [s.armature and s.armature.evaluated_get(depsgraph) for s in stand_ins]
-    frames = _frames(obj.evaluated_get(depsgraph), armatures, driven, depsgraph.mode)
+    evaluated = obj.evaluated_get(depsgraph)
+    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
+    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
+    frames = _frames(evaluated, settings, armatures, driven, depsgraph.mode)
     if frames is None:
         return
     driven.frames = frames
@@ -190,11 +193,11 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     if len(armatures) != len(driven.chain.links) or not all(a and a.is_evaluated for a in armatures):
         return
     attribute = mesh.attributes.get(settings.attribute)
-    if attribute is None or len(attribute.data) != len(driven.source.points):
+    if attribute is None:
         return
     with driven.lock:
         started = time.perf_counter()
-        frames = _frames(evaluated, armatures, driven, "VIEWPORT")
+        frames = _frames(evaluated, settings, armatures, driven, "VIEWPORT")
         if frames is None:
             return
         driven.rest_points = source.keyed_points(obj, mesh.shape_keys, driven.source)
@@ -274,21 +277,24 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
 
 
 def _frames(
-    evaluated: bpy.types.Object, armatures: list[bpy.types.Object | None], driven: Driven, mode: str
+    evaluated: bpy.types.Object,
+    settings: properties.SinewSettings,
+    armatures: list[bpy.types.Object | None],
+    driven: Driven,
+    mode: str,
 ) -> list[LinkFrame | None] | None:
     """What decides each link's part in this frame; None where that is unknown, and the last shape stays.
 
+    settings   the object's, evaluated
     armatures  each link's, evaluated
     mode       the depsgraph's
     """
-    obj = evaluated.original
-    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
-    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
-    stand_ins = properties.of(obj).stand_ins
+    method, scale_rule = settings.method, settings.scale_rule
     frames: list[LinkFrame | None] = []
-    for number, (link, armature) in enumerate(zip(driven.chain.links, armatures, strict=False)):
-        stand_in = stand_ins[number]
-        flags = evaluated.modifiers[stand_in.name] if driven.keyed[number] else stand_in
+    for link, stand_in, armature, keyed in zip(
+        driven.chain.links, settings.stand_ins, armatures, driven.keyed, strict=False
+    ):
+        flags = evaluated.modifiers[stand_in.name] if keyed else stand_in
         if armature is None or armature.mode == "EDIT" or not _takes_part(flags, mode):
             frames.append(None)
             continue
@@ -299,9 +305,9 @@ def _frames(
         pose = armature_io.read_pose(armature, link.binding.bones)
         if not np.isfinite(pose).all():
             return None
-        method = settings.stand_ins[number].method if number else properties.SAME_METHOD
-        method = settings.method if method == properties.SAME_METHOD else method
-        frames.append(LinkFrame(method, pose, space, settings.scale_rule))
+        # The first link's is the object's.
+        own = stand_in.method if frames else properties.SAME_METHOD
+        frames.append(LinkFrame(method if own == properties.SAME_METHOD else own, pose, space, scale_rule))
     return frames
 
 

@@ -11,9 +11,8 @@ import sinew
 
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
-from .spaces import transformed
+from .spaces import is_same_space, transformed
 
-IDENTITY = np.identity(4)
 LINEAR = "lbs"
 
 
@@ -103,7 +102,7 @@ class Binding:
         elif points is not rest_points:
             deformer.set_rest_points(rest_points)
         self._bound[purpose] = (deformer, rest_points)
-        same_space = np.array_equal(frame.bones_from_model, IDENTITY)
+        same_space = is_same_space(frame.bones_from_model)
         deformer.deform(
             posed_from_rest.astype(np.float32),
             out=out,
@@ -138,9 +137,9 @@ def _same(a: Frame, b: Frame) -> bool:
     return (
         a.method == b.method
         and a.scale_rule == b.scale_rule
-        and (a.rest_points is b.rest_points or np.array_equal(a.rest_points, b.rest_points))
+        and _equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
-        and np.array_equal(a.bones_from_model, b.bones_from_model)
+        and _equal(a.bones_from_model, b.bones_from_model)
     )
 
 
