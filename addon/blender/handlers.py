@@ -32,6 +32,7 @@ class Session:
     depsgraph: int = 0  # the address of the one last seen
     gate: Gate = field(default_factory=Gate)
     updating: bool = False
+    settling: bool = False  # what Sinew itself changed is evaluated, and nothing else
 
     @property
     def idle(self) -> bool:
@@ -86,13 +87,30 @@ def held() -> Iterator[None]:
         session.updating = before
 
 
-def deform_for_file(context: bpy.types.Context) -> None:
-    """Deforms all driven objects at the current frame and lays Sinew down, as a saved file has it.
+@contextlib.contextmanager
+def changing(context: bpy.types.Context) -> Iterator[None]:
+    """Settings are changed inside, and all is deformed by them at the end."""
+    # What others changed before is seen apart from it.
+    context.evaluated_depsgraph_get()
+    with held():
+        yield
+    session.settling = True
+    try:
+        refresh(context)
+    finally:
+        session.settling = False
 
-    For a file that was opened for that: Blender has the poses from opening it, and has to evaluate only what
-    was driven before or has something in front. To go on with it afterwards, take_up() and refresh().
+
+@contextlib.contextmanager
+def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
+    """The same for a file that was opened to be saved so: at the end Sinew is laid down, too. To go on with
+    it, take_up() and refresh().
+
+    Blender has the poses from opening the file, and has to evaluate only what was driven before or has
+    something in front.
     """
     with held():
+        yield
         session.objects = None
         depsgraph, changes = context.view_layer.depsgraph, Changes()
         driven_before = depsgraph is not None and any(
@@ -255,7 +273,11 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not session.idle and not session.updating:
-        _update(depsgraph, _read_changes(depsgraph, frame=False))
+        changes = _read_changes(depsgraph, frame=False)
+        if session.settling:
+            # Settings touch the meshes. Nobody changed weights, and they take long to read.
+            changes.meshes.clear()
+        _update(depsgraph, changes)
 
 
 @persistent
