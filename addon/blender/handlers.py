@@ -244,6 +244,21 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
     return Changes.read(depsgraph, frame, complete=same)
 
 
+def _are_all_answered(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether the evaluation gave all driven objects their points, and there is nothing else to look at."""
+    if session.depsgraph != depsgraph.as_pointer() or not Changes.are_motion_only(depsgraph):
+        return False
+    try:
+        states = [(obj, state_of(obj)) for obj in _driven_objects(Changes())]
+        answered = all(state is not None and state.is_answered(obj, depsgraph) for obj, state in states)
+    except ReferenceError:
+        # Deleted since the objects were listed.
+        return False
+    if answered:
+        redraw.tell()
+    return answered
+
+
 @persistent
 def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     for state in session.driven.values():
@@ -264,10 +279,11 @@ def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     gated = session.gate.open()
-    if not session.idle:
-        changes = _read_changes(depsgraph, frame=True)
-        changes.gated = gated
-        _update(depsgraph, changes)
+    if session.idle or _are_all_answered(depsgraph):
+        return
+    changes = _read_changes(depsgraph, frame=True)
+    changes.gated = gated
+    _update(depsgraph, changes)
 
 
 @persistent
