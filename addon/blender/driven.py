@@ -158,7 +158,7 @@ def _deform(
     # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
     settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
     frames = _frames(evaluated, settings, armatures, driven, depsgraph.mode)
-    if frames is None:
+    if frames is None or not all(np.isfinite(frame.pose).all() for frame in frames if frame is not None):
         return
     driven.frames = frames
     rest_points = source.rest_points(obj, driven.source, depsgraph)
@@ -193,8 +193,9 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     obj, settings = evaluated.original, evaluated.sinew
     if not driven.asking or driven.mode != evaluated.mode or driven.mesh_users != obj.data.users:
         return
+    # Evaluated ones, as the driver reads them.
     armatures = [stand_in.armature for stand_in in settings.stand_ins]
-    if len(armatures) != len(driven.chain.links) or not all(a and a.is_evaluated for a in armatures):
+    if len(armatures) != len(driven.chain.links) or None in armatures:
         return
     attribute = mesh.attributes.get(driven.attribute)
     if attribute is None:
@@ -205,7 +206,7 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
         if frames is None:
             return
         driven.rest_points = source.keyed_points(obj, mesh, driven.source)
-        driven.chain.deform(driven.rest_points, frames)
+        driven.chain.deform(driven.rest_points, frames, anew=True)
         attribute.data.foreach_set("vector", driven.chain.points.ravel())
         driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
         driven.dirtied_by_frames = False
@@ -304,8 +305,6 @@ def _frames(
             # An armature scaled to nothing for a moment.
             return None
         pose = armature_io.read_pose(armature, link.binding.bones)
-        if not np.isfinite(pose).all():
-            return None
         # The first link's is the object's.
         own = stand_in.method if frames else properties.SAME_METHOD
         frames.append(LinkFrame(method if own == properties.SAME_METHOD else own, pose, space, scale_rule))
