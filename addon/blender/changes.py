@@ -37,7 +37,8 @@ class Changes:
     def are_motion_only(depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether nothing changed but what animation moves: all that an artist changes of an object or of its
         data makes Blender list the mesh, the armature or the scene, too (seen on 4.2 and 5.2)."""
-        return not any(map(depsgraph.id_type_updated, ("MESH", "ARMATURE", "SCENE", "COLLECTION")))
+        changed = depsgraph.id_type_updated
+        return not (changed("MESH") or changed("ARMATURE") or changed("SCENE") or changed("COLLECTION"))
 
     @classmethod
     def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:

@@ -246,17 +246,23 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
 
 def _are_all_answered(depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the evaluation gave all driven objects their points, and there is nothing else to look at."""
-    if session.depsgraph != depsgraph.as_pointer() or not Changes.are_motion_only(depsgraph):
+    objects, known = session.objects, session.driven
+    if (
+        objects is None
+        or session.depsgraph != depsgraph.as_pointer()
+        or not Changes.are_motion_only(depsgraph)
+    ):
         return False
     try:
-        states = [(obj, state_of(obj)) for obj in _driven_objects(Changes())]
-        answered = all(state is not None and state.is_answered(obj, depsgraph) for obj, state in states)
+        for obj in objects:
+            state = known.get(obj.session_uid)
+            if state is None or not state.is_answered(obj, depsgraph):
+                return False
     except ReferenceError:
         # Deleted since the objects were listed.
         return False
-    if answered:
-        redraw.tell()
-    return answered
+    redraw.tell()
+    return True
 
 
 @persistent
