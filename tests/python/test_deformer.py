@@ -303,15 +303,12 @@ def test_rest_inverses_equal_multiplying_by_hand(method):
     posed = (rig.transforms.astype(np.float64) @ far).astype(np.float32)
     by_columns = posed.transpose(0, 2, 1).copy().transpose(0, 2, 1)
     inverses = np.linalg.inv(far)
-    expected = rig.deform(method, transforms=(posed.astype(np.float64) @ inverses).astype(np.float32))
-    for given in (posed, by_columns, posed[:, :3]):
-        np.testing.assert_allclose(
-            rig.deform(method, transforms=given, rest_inverses=inverses), expected, atol=TOLERANCE
-        )
-    np.testing.assert_array_equal(
-        rig.deform(method, transforms=posed, rest_inverses=inverses[:, :3]),
-        rig.deform(method, transforms=posed, rest_inverses=inverses),
-    )
+    expected = rig.with_motions(posed.astype(np.float64) @ inverses).deform(method)
+    deformer = rig.deformer(method)
+    whole = deformer.deform(posed, rest_inverses=inverses)
+    np.testing.assert_allclose(whole, expected, atol=TOLERANCE)
+    np.testing.assert_array_equal(deformer.deform(by_columns, rest_inverses=inverses), whole)
+    np.testing.assert_array_equal(deformer.deform(posed[:, :3], rest_inverses=inverses[:, :3]), whole)
 
 
 @every_method
