@@ -10,8 +10,7 @@ import numpy as np
 
 from ..core.envelopes import Envelopes
 from ..core.rig import Bones
-
-SAME_SPACE = np.identity(4)
+from ..core.spaces import SAME_SPACE
 
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
@@ -135,12 +134,13 @@ def bones_from_model(
     evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object
 ) -> np.ndarray | None:
     """float64 [4, 4]: the mesh object's space to armature space; None where the armature has no size."""
-    mesh_world = np.array(evaluated_mesh.matrix_world, dtype=np.float64)
-    armature_world = np.array(evaluated_armature.matrix_world, dtype=np.float64)
-    if np.array_equal(mesh_world, armature_world):
+    mesh_world, armature_world = evaluated_mesh.matrix_world, evaluated_armature.matrix_world
+    if mesh_world == armature_world:
         return SAME_SPACE
     try:
-        space = np.linalg.inv(armature_world) @ mesh_world
+        space = np.linalg.inv(np.array(armature_world, dtype=np.float64)) @ np.array(
+            mesh_world, dtype=np.float64
+        )
         np.linalg.inv(space)
     except np.linalg.LinAlgError:
         return None

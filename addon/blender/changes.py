@@ -33,6 +33,13 @@ class Changes:
     frame: bool = False
     complete: bool = False
 
+    @staticmethod
+    def are_motion_only(depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether nothing changed but what animation moves: all that an artist changes of an object or of its
+        data makes Blender list the mesh, the armature or the scene, too (seen on 4.2 and 5.2)."""
+        changed = depsgraph.id_type_updated
+        return not (changed("MESH") or changed("ARMATURE") or changed("SCENE") or changed("COLLECTION"))
+
     @classmethod
     def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:
         changes = cls(frame=frame, complete=complete)

@@ -36,6 +36,8 @@ class Driven:
     dirtied_by_frames  the last change of frame moved the object or its rest points
     looks              what the artist can change of the object itself
     asking             the driver asks for the points within Blender's evaluation
+    attribute          what holds them there
+    mesh_users         how many the mesh has; others could read while it is written
     answered           the address of the evaluated mesh that was given points in the last evaluation, or 0
     is_kept            the mesh itself holds the last points too, not only the evaluated one
     lock               held while the chain works: a render may ask from a thread of its own
@@ -55,6 +57,8 @@ class Driven:
     dirtied_by_frames: bool = False
     looks: list = field(default_factory=list)
     asking: bool = False
+    attribute: str = ""
+    mesh_users: int = 0
     answered: int = 0
     is_kept: bool = True
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -68,6 +72,10 @@ class Driven:
             and not (changes.structure or changes.armatures)
             and self.watched.isdisjoint(changes.touched)
         )
+
+    def is_answered(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether the last evaluation gave the object its points."""
+        return self.answered != 0 and self.answered == obj.data.evaluated_get(depsgraph).as_pointer()
 
     @property
     def binding(self) -> Binding:
@@ -95,11 +103,7 @@ def update(
     if mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
         drive.switch(obj, on=False)
         return None
-    answered = (
-        driven is not None
-        and driven.answered != 0
-        and driven.answered == obj.data.evaluated_get(depsgraph).as_pointer()
-    )
+    answered = driven is not None and driven.is_answered(obj, depsgraph)
     touched = changes.structure or bool(changes.armatures) or obj.session_uid in changes.objects
     if answered and not (changes.structure or changes.armatures):
         # Being asked for points touches the object by itself.
@@ -138,7 +142,7 @@ def _looks(obj: bpy.types.Object) -> list:
     for modifier in obj.modifiers:
         looks += (modifier.name, modifier.show_viewport, modifier.show_render)
         if modifier.type == "ARMATURE":
-            looks += (modifier.object, ModifierOptions.read(modifier))
+            looks += (modifier.object, *ModifierOptions.values(modifier))
     return looks
 
 
@@ -154,8 +158,11 @@ def _deform(
     started = time.perf_counter()
     stand_ins = properties.of(obj).stand_ins
     armatures = [s.armature and s.armature.evaluated_get(depsgraph) for s in stand_ins]
-    frames = _frames(obj.evaluated_get(depsgraph), armatures, driven, depsgraph.mode)
-    if frames is None:
+    evaluated = obj.evaluated_get(depsgraph)
+    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
+    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
+    frames = _frames(evaluated, settings, armatures, driven, depsgraph.mode)
+    if frames is None or not all(np.isfinite(frame.pose).all() for frame in frames if frame is not None):
         return
     driven.frames = frames
     rest_points = source.rest_points(obj, driven.source, depsgraph)
@@ -187,42 +194,40 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
 
     Leaves it as it is where something is out of the ordinary: that is for update().
     """
-    settings, obj = evaluated.sinew, evaluated.original
-    if not driven.asking or driven.mode != evaluated.mode or not _is_own(obj):
+    obj, settings = evaluated.original, evaluated.sinew
+    if not driven.asking or driven.mode != evaluated.mode or driven.mesh_users != obj.data.users:
         return
+    # Evaluated ones, as the driver reads them.
     armatures = [stand_in.armature for stand_in in settings.stand_ins]
-    if len(armatures) != len(driven.chain.links) or not all(a and a.is_evaluated for a in armatures):
+    if len(armatures) != len(driven.chain.links) or None in armatures:
         return
-    attribute = mesh.attributes.get(settings.attribute)
-    if attribute is None or len(attribute.data) != len(driven.source.points):
+    attribute = mesh.attributes.get(driven.attribute)
+    if attribute is None:
         return
     with driven.lock:
         started = time.perf_counter()
-        frames = _frames(evaluated, armatures, driven, "VIEWPORT")
+        frames = _frames(evaluated, settings, armatures, driven, "VIEWPORT")
         if frames is None:
             return
-        driven.rest_points = source.keyed_points(obj, mesh.shape_keys, driven.source)
-        driven.chain.deform(driven.rest_points, frames)
+        driven.rest_points = source.keyed_points(obj, mesh, driven.source)
+        driven.chain.deform(driven.rest_points, frames, anew=True)
         attribute.data.foreach_set("vector", driven.chain.points.ravel())
         driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
+        driven.dirtied_by_frames = False
         driven.shapes += 1
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
-
-
-def _is_own(obj: bpy.types.Object) -> bool:
-    """Whether nothing else uses the object's mesh, which could be read while it is written."""
-    return obj.data.users - obj.data.use_fake_user == 1
 
 
 def hold_pose(obj: bpy.types.Object, driven: Driven) -> None:
     """Keeps the poses evaluated even where an armature is hidden, and has Blender ask for the points where it
     can."""
-    settings, pairs = properties.of(obj), drive.stand_ins(obj)
+    settings, pairs, mesh = properties.of(obj), drive.stand_ins(obj), obj.data
+    driven.attribute, driven.mesh_users = settings.attribute, mesh.users
     driven.asking = (
         bool(settings.attribute)
         # Its colours are written into the mesh itself, which is evaluated once more for them.
         and not settings.heat
-        and _is_own(obj)
+        and mesh.users - mesh.use_fake_user == 1
         and not any(driven.keyed)
         and all(stand_in.show_viewport == stand_in.show_render for _modifier, stand_in in pairs)
     )
@@ -278,21 +283,24 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
 
 
 def _frames(
-    evaluated: bpy.types.Object, armatures: list[bpy.types.Object | None], driven: Driven, mode: str
+    evaluated: bpy.types.Object,
+    settings: properties.SinewSettings,
+    armatures: list[bpy.types.Object | None],
+    driven: Driven,
+    mode: str,
 ) -> list[LinkFrame | None] | None:
     """What decides each link's part in this frame; None where that is unknown, and the last shape stays.
 
+    settings   the object's, evaluated
     armatures  each link's, evaluated
     mode       the depsgraph's
     """
-    obj = evaluated.original
-    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
-    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
-    stand_ins = properties.of(obj).stand_ins
+    method, scale_rule = settings.method, settings.scale_rule
     frames: list[LinkFrame | None] = []
-    for number, (link, armature) in enumerate(zip(driven.chain.links, armatures, strict=False)):
-        stand_in = stand_ins[number]
-        flags = evaluated.modifiers[stand_in.name] if driven.keyed[number] else stand_in
+    for link, stand_in, armature, keyed in zip(
+        driven.chain.links, settings.stand_ins, armatures, driven.keyed, strict=False
+    ):
+        flags = evaluated.modifiers[stand_in.name] if keyed else stand_in
         if armature is None or armature.mode == "EDIT" or not _takes_part(flags, mode):
             frames.append(None)
             continue
@@ -301,11 +309,9 @@ def _frames(
             # An armature scaled to nothing for a moment.
             return None
         pose = armature_io.read_pose(armature, link.binding.bones)
-        if not np.isfinite(pose).all():
-            return None
-        method = settings.stand_ins[number].method if number else properties.SAME_METHOD
-        method = settings.method if method == properties.SAME_METHOD else method
-        frames.append(LinkFrame(method, pose, space, settings.scale_rule))
+        # The first link's is the object's.
+        own = stand_in.method if frames else properties.SAME_METHOD
+        frames.append(LinkFrame(method if own == properties.SAME_METHOD else own, pose, space, scale_rule))
     return frames
 
 

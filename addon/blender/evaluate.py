@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import MappingProxyType
 
@@ -91,24 +91,24 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
 
 def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
     """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
-    return _use_methods(wanted, handlers.refresh)
+    return _use_methods(wanted, handlers.changing)
 
 
 def use_methods_for_file(
     wanted: Sequence[tuple[bpy.types.Object, str]], scales: Mapping[bpy.types.Object, str | None]
 ) -> list[SinewError | None]:
-    """The same for a file that was opened to be saved with them (see handlers.deform_for_file), and with the
-    names of their scale rules; None leaves an object its own."""
-    return _use_methods(wanted, handlers.deform_for_file, scales)
+    """The same for a file that was opened to be saved so (see handlers.changing_for_file), and with the names
+    of their scale rules; None leaves an object its own."""
+    return _use_methods(wanted, handlers.changing_for_file, scales)
 
 
 def _use_methods(
     wanted: Sequence[tuple[bpy.types.Object, str]],
-    deform: Callable[[bpy.types.Context], None],
+    changing: Callable[[bpy.types.Context], AbstractContextManager[None]],
     scales: Mapping[bpy.types.Object, str | None] = MappingProxyType({}),
 ) -> list[SinewError | None]:
     errors: list[SinewError | None] = []
-    with handlers.held():
+    with changing(bpy.context):
         for obj, method in wanted:
             try:
                 _choose(obj, method)
@@ -119,7 +119,6 @@ def _use_methods(
                 errors.append(None)
             except SinewError as error:
                 errors.append(error)
-    deform(bpy.context)
     for index, (obj, method) in enumerate(wanted):
         if errors[index] is None and method != BLENDER and properties.of(obj).error:
             errors[index] = SinewError(properties.of(obj).error)

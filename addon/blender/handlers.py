@@ -33,6 +33,7 @@ class Session:
     waiting: set[int] = field(default_factory=set)  # as _waiting()
     gate: Gate = field(default_factory=Gate)
     updating: bool = False
+    settling: bool = False  # what Sinew itself changed is evaluated, and nothing else
 
     @property
     def idle(self) -> bool:
@@ -88,13 +89,30 @@ def held() -> Iterator[None]:
         session.updating = before
 
 
-def deform_for_file(context: bpy.types.Context) -> None:
-    """Deforms all driven objects at the current frame and lays Sinew down, as a saved file has it.
+@contextlib.contextmanager
+def changing(context: bpy.types.Context) -> Iterator[None]:
+    """Settings are changed inside, and all is deformed by them at the end."""
+    # What others changed before is seen apart from it.
+    context.evaluated_depsgraph_get()
+    with held():
+        yield
+    session.settling = True
+    try:
+        refresh(context)
+    finally:
+        session.settling = False
 
-    For a file that was opened for that: Blender has the poses from opening it, and has to evaluate only what
-    was driven before or has something in front. To go on with it afterwards, take_up() and refresh().
+
+@contextlib.contextmanager
+def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
+    """The same for a file that was opened to be saved so: at the end Sinew is laid down, too. To go on with
+    it, take_up() and refresh().
+
+    Blender has the poses from opening the file, and has to evaluate only what was driven before or has
+    something in front.
     """
     with held():
+        yield
         session.objects = None
         depsgraph, changes = context.view_layer.depsgraph, Changes()
         driven_before = depsgraph is not None and any(
@@ -229,6 +247,27 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
     return Changes.read(depsgraph, frame, complete=same)
 
 
+def _are_all_answered(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether the evaluation gave all driven objects their points, and there is nothing else to look at."""
+    objects, known = session.objects, session.driven
+    if (
+        objects is None
+        or session.depsgraph != depsgraph.as_pointer()
+        or not Changes.are_motion_only(depsgraph)
+    ):
+        return False
+    try:
+        for obj in objects:
+            state = known.get(obj.session_uid)
+            if state is None or not state.is_answered(obj, depsgraph):
+                return False
+    except ReferenceError:
+        # Deleted since the objects were listed.
+        return False
+    redraw.tell()
+    return True
+
+
 @persistent
 def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     for state in session.driven.values():
@@ -249,10 +288,11 @@ def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     gated = session.gate.open()
-    if not session.idle:
-        changes = _read_changes(depsgraph, frame=True)
-        changes.gated = gated
-        _follow(depsgraph, changes)
+    if session.idle or _are_all_answered(depsgraph):
+        return
+    changes = _read_changes(depsgraph, frame=True)
+    changes.gated = gated
+    _follow(depsgraph, changes)
 
 
 def _follow(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
@@ -268,7 +308,11 @@ def _follow(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if session.idle or session.updating:
         return
-    _follow(depsgraph, _read_changes(depsgraph, frame=False))
+    changes = _read_changes(depsgraph, frame=False)
+    if session.settling:
+        # Settings touch the meshes. Nobody changed weights, and they take long to read.
+        changes.meshes.clear()
+    _follow(depsgraph, changes)
 
 
 @persistent

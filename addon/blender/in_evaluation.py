@@ -32,8 +32,7 @@ class Answers:
         self._asking: dict[int, bpy.types.Object] = {}
 
     def object_asked(self, evaluated: bpy.types.Object) -> None:
-        if evaluated.is_evaluated:
-            self._asking[threading.get_ident()] = evaluated
+        self._asking[threading.get_ident()] = evaluated
 
     def mesh_asked(self, evaluated_mesh: bpy.types.Mesh) -> None:
         evaluated = self._asking.pop(threading.get_ident(), None)

@@ -16,7 +16,7 @@ from ..core import influences
 from ..core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ..core.scale_rule import BLENDER_4
 from ..core.session import Binding, Chain, Link, LinkFrame
-from ..core.spaces import transformed, transformed_axes
+from ..core.spaces import is_same_space, transformed, transformed_axes
 from ..core.surface import Surface, joined
 from . import armature_io, drive, front, mesh_io, properties
 from .driven import Driven
@@ -24,7 +24,6 @@ from .driven import Driven
 # Sets of objects that are kept ready to be measured: those of the heat map and those of the panel.
 MOST_SUBJECTS = 2
 
-IDENTITY = np.identity(4)
 Pairs = Sequence[tuple[bpy.types.Object, Driven]]
 
 
@@ -217,7 +216,7 @@ def _in_world(shapes: Sequence[np.ndarray], worlds: Sequence[np.ndarray]) -> np.
     return np.concatenate(
         [
             np.ascontiguousarray(shape.T, dtype=np.float64)
-            if np.array_equal(world, IDENTITY)
+            if is_same_space(world)
             else transformed_axes(shape, world)
             for shape, world in zip(shapes, worlds, strict=True)
         ],

@@ -28,7 +28,12 @@ class ModifierOptions:
         """None stands for the parent type Armature, which has no modifier in the stack."""
         if modifier is None:
             return cls(True, True, "", False, False)
-        return cls(
+        return cls(*cls.values(modifier))
+
+    @staticmethod
+    def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
+        """The same, in order, for a quick look."""
+        return (
             modifier.use_vertex_groups,
             modifier.use_bone_envelopes,
             modifier.vertex_group,

@@ -17,7 +17,7 @@ from ..core.metrics import volume
 from ..core.report import meshes
 from ..core.report.model import Figure, Picture
 from ..core.views import View, seen_extent, whole_view
-from . import armature_io, drive, evaluate, files, measure, mesh_io
+from . import armature_io, drive, evaluate, files, mesh_io
 from .render import Studio
 
 LINKS, MESH = "report_links.blend", "report_mesh.blend"
@@ -78,7 +78,7 @@ def read_chain(mesh: bpy.types.Object) -> meshes.Chain:
     group_of = mesh_io.read_group_weights(mesh.data).groups
     return meshes.Chain(
         points=mesh_io.read_points(mesh.data).astype(np.float64),
-        triangles=measure.read_surface(mesh.data).triangles,
+        triangles=mesh_io.read_surface(mesh.data).triangles,
         bones=bones.of_groups([group.name for group in mesh.vertex_groups])[group_of],
         parents=np.array(parents, np.int32),
         rest=bones.rest.astype(np.float64),
@@ -111,7 +111,7 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
     scene = bpy.context.scene
     evaluate.set_frame(scene, scene.frame_start)
     rest = evaluate.world_points([mesh])
-    triangles = measure.read_surface(mesh.data).triangles
+    triangles = mesh_io.read_surface(mesh.data).triangles
     groups = mesh_io.read_group_weights(mesh.data)
     skin = meshes.Skin(
         rest=rest,

@@ -111,15 +111,14 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
         if not np.array_equal(points, source.points):
             source.points = points
         return source.points
-    keys = obj.data.shape_keys
-    return keyed_points(obj, keys and keys.evaluated_get(depsgraph), source)
+    return keyed_points(obj, obj.data.evaluated_get(depsgraph), source)
 
 
-def keyed_points(obj: bpy.types.Object, evaluated_keys: bpy.types.Key | None, source: Source) -> np.ndarray:
+def keyed_points(obj: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
     """The same for a source that is the mesh itself."""
     if source.shape_keys is None:
         return source.points
-    values = mesh_io.read_key_values(evaluated_keys)
+    values = mesh_io.read_key_values(evaluated_mesh.shape_keys)
     if source.mixed_points is None or not np.array_equal(values, source.key_values):
         source.key_values = values
         source.mixed_points = source.shape_keys.mix(values)

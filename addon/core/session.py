@@ -11,9 +11,8 @@ import sinew
 
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
-from .spaces import transformed
+from .spaces import is_same_space, transformed
 
-IDENTITY = np.identity(4)
 LINEAR = "lbs"
 
 
@@ -65,25 +64,28 @@ class Binding:
         """The result of the last call of deform, float32 [vertices, 3]."""
         return self._points
 
-    def deform(self, frame: Frame) -> bool:
-        """Brings `points` up to date, object space; false where the frame equals the last one."""
+    def deform(self, frame: Frame, anew: bool = False) -> bool:
+        """Brings `points` up to date, object space; false where the frame equals the last one.
+
+        anew  without looking whether it does
+        """
         last = self._last
-        if last is not None and _same(last, frame):
+        if not anew and last is not None and _same(last, frame):
             return False
-        # In double: a bone far from the origin would lose digits in the product of two float matrices.
-        posed_from_rest = frame.pose.astype(np.float64) @ self._rest_from_armature
-        rest_points = frame.rest_points
+        rest_points, bones, rest_inverses = frame.rest_points, frame.pose, self._rest_from_armature
         if self._spread_anew(frame):
             self._bound.clear()
         if frame.scale_rule != BLENDER_4.name:
-            split = sinew.affine.split_scale(posed_from_rest, self.bones.rest_axes.astype(np.float64))
+            motions = frame.pose.astype(np.float64) @ self._rest_from_armature
+            split = sinew.affine.split_scale(motions, self.bones.rest_axes.astype(np.float64))
             if frame.scale_rule == IGNORED.name:
-                posed_from_rest = split.rigid
+                bones, rest_inverses = split.rigid.astype(np.float32), None
             elif frame.method != LINEAR and split.has_scale.any():
                 rest_points = np.empty_like(self._points)
-                self._deform("scale", LINEAR, frame, frame.rest_points, split.scale, rest_points)
-                posed_from_rest = split.rigid
-        self._deform("motion", frame.method, frame, rest_points, posed_from_rest, self._points)
+                scale = split.scale.astype(np.float32)
+                self._deform("scale", LINEAR, frame, frame.rest_points, scale, None, rest_points)
+                bones, rest_inverses = split.rigid.astype(np.float32), None
+        self._deform("motion", frame.method, frame, rest_points, bones, rest_inverses, self._points)
         self._last = frame
         return True
 
@@ -93,7 +95,8 @@ class Binding:
         method: str,
         frame: Frame,
         rest_points: np.ndarray,
-        posed_from_rest: np.ndarray,
+        bones: np.ndarray,
+        rest_inverses: np.ndarray | None,
         out: np.ndarray,
     ) -> None:
         """Deforms `rest_points` with the deformer bound for `purpose`, bound anew where it must be."""
@@ -103,11 +106,12 @@ class Binding:
         elif points is not rest_points:
             deformer.set_rest_points(rest_points)
         self._bound[purpose] = (deformer, rest_points)
-        same_space = np.array_equal(frame.bones_from_model, IDENTITY)
+        same_space = is_same_space(frame.bones_from_model)
         deformer.deform(
-            posed_from_rest.astype(np.float32),
+            bones,
             out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
+            rest_inverses=rest_inverses,
         )
 
     def _spread_anew(self, frame: Frame) -> bool:
@@ -138,9 +142,9 @@ def _same(a: Frame, b: Frame) -> bool:
     return (
         a.method == b.method
         and a.scale_rule == b.scale_rule
-        and (a.rest_points is b.rest_points or np.array_equal(a.rest_points, b.rest_points))
+        and _equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
-        and np.array_equal(a.bones_from_model, b.bones_from_model)
+        and _equal(a.bones_from_model, b.bones_from_model)
     )
 
 
@@ -176,11 +180,12 @@ class Chain:
         self._rest_points: np.ndarray | None = None
         self._active: tuple[bool, ...] = ()
 
-    def deform(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None]) -> bool:
+    def deform(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None], anew: bool = False) -> bool:
         """Brings `points` up to date; false where nothing differs from the last call.
 
         rest_points  float32 [vertices, 3], object space
         frames       one for each link, None for one that is switched off or has no pose
+        anew         without looking whether anything differs
         """
         active = tuple(frame is not None for frame in frames)
         changed = self.points is None or active != self._active
@@ -188,11 +193,11 @@ class Chain:
             changed = changed or not _equal(rest_points, self._rest_points)
             self.points = rest_points
         else:
-            changed |= self._run(rest_points, frames)
+            changed |= self._run(rest_points, frames, anew)
         self._active, self._rest_points = active, rest_points
         return changed
 
-    def _run(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None]) -> bool:
+    def _run(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None], anew: bool) -> bool:
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
         for number, (link, frame) in enumerate(zip(self.links, frames, strict=True)):
@@ -205,7 +210,7 @@ class Chain:
                 starts[behind] = result
             start = starts.get(number, result)
             changed |= link.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule)
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule), anew
             )
             posed = link.binding.points
             if link.mask is not None:

@@ -6,6 +6,9 @@ from __future__ import annotations
 import numpy as np
 import sinew
 
+# From a space to itself; where this very matrix is given, no comparison is needed.
+SAME_SPACE = np.identity(4)
+
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """`points` [n, 3] after `matrix` [4, 4], an affine transform; float64 [n, 3]."""
@@ -19,3 +22,7 @@ def transformed_axes(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     x, y, z = points.T.astype(np.float64)
     columns = matrix[:3, :, np.newaxis]
     return columns[:, 0] * x + columns[:, 1] * y + columns[:, 2] * z + columns[:, 3]
+
+
+def is_same_space(matrix: np.ndarray) -> bool:
+    return matrix is SAME_SPACE or np.array_equal(matrix, SAME_SPACE)

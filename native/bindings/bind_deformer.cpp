@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -8,6 +9,8 @@
 
 namespace sinew::bindings {
 namespace {
+
+constexpr std::size_t kVerticesUnderLock = 32'768;  // some 30 microseconds
 
 static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and written in place");
 
@@ -67,9 +70,54 @@ std::size_t checked_threads(const py::object& threads) {
     return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
+// Read in place, as posed bones come by columns from Blender on every frame. Multiplied in double, as a bone
+// far from the origin would lose digits.
+std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
+                                           const py::object& rest_inverses) {
+    const char* const wanted = "float32 [n, 4, 4] or [n, 3, 4]";
+    const auto are_affines = [](const py::array& a) {
+        return a.ndim() == 3 && a.shape(2) == 4 && (a.shape(1) == 4 || a.shape(1) == 3);
+    };
+    if (!py::isinstance<py::array_t<float>>(bone_transforms)) {
+        fail("bone_transforms", wanted, describe(bone_transforms));
+    }
+    const auto posed = py::reinterpret_borrow<py::array_t<float>>(bone_transforms);
+    if (!are_affines(posed)) fail("bone_transforms", wanted, describe(bone_transforms));
+    const std::string as_many =
+        "float64 [" + std::to_string(posed.shape(0)) + ", 4, 4], one for each of bone_transforms";
+    const auto inverse = checked<double>(rest_inverses, "rest_inverses", 3, as_many);
+    if (!are_affines(inverse) || inverse.shape(0) != posed.shape(0)) {
+        fail("rest_inverses", as_many, describe(rest_inverses));
+    }
+    const auto p = posed.unchecked<3>();
+    const auto r = inverse.unchecked<3>();
+    std::vector<Affine<float>> bones(static_cast<std::size_t>(posed.shape(0)));
+    for (py::ssize_t i = 0; i < posed.shape(0); ++i) {
+        Affine<float>& bone = bones[static_cast<std::size_t>(i)];
+        bool finite = true;
+        for (py::ssize_t row = 0; row < 3; ++row) {
+            for (py::ssize_t column = 0; column < 4; ++column) {
+                double sum = column == 3 ? p(i, row, 3) : 0.0;
+                for (py::ssize_t k = 0; k < 3; ++k) sum += p(i, row, k) * r(i, k, column);
+                const auto value = static_cast<float>(sum);
+                finite = finite && std::isfinite(value);
+                (column == 3 ? bone.translation[static_cast<int>(row)]
+                             : bone.linear[static_cast<int>(column)][static_cast<int>(row)]) = value;
+            }
+        }
+        if (!finite) {
+            fail("bone_transforms", "finite values", "NaN or infinity at index " + std::to_string(i));
+        }
+    }
+    return bones;
+}
+
 py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
-                          const py::object& threads, const py::object& bones_from_model) {
-    const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
+                          const py::object& threads, const py::object& bones_from_model,
+                          const py::object& rest_inverses) {
+    const std::vector<Affine<float>> bones = rest_inverses.is_none()
+                                                 ? checked_affines(bone_transforms, "bone_transforms")
+                                                 : posed_from_rest(bone_transforms, rest_inverses);
     if (bones.size() < deformer.bone_count()) {
         fail("bone_transforms", "at least " + std::to_string(deformer.bone_count()) + " bones",
              std::to_string(bones.size()));
@@ -85,10 +133,11 @@ py::array_t<float> deform(const Deformer& deformer, const py::object& bone_trans
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
                                         deformer.vertex_count());
-    {
-        const py::gil_scoped_release release;
-        deformer.deform(bones, options, target);
-    }
+    // Where many threads want the lock, getting it back takes longer than to deform a small mesh.
+    std::optional<py::gil_scoped_release> release;
+    if (deformer.vertex_count() > kVerticesUnderLock) release.emplace();
+    deformer.deform(bones, options, target);
+    release.reset();
     return points;
 }
 
@@ -129,15 +178,19 @@ void bind_deformer(py::module_& m) {
             py::arg("rest_points"), "New rest points, float32 [vertices, 3], as when shape keys change.")
         .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
              py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
+             py::arg("rest_inverses") = py::none(),
              "The deformed points, float32 [vertices, 3], model space.\n\n"
              "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
              "read.\n"
              "out: written and returned where given: float32 [vertices, 3], C-contiguous.\n"
              "threads: how many at most; None: as many as help. The result is the same bit for bit.\n"
              "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
-             "    transforms, where the blending happens; the result is taken back. None: the same space.\n\n"
-             "A vertex without influences stays. The GIL is released. Raises ValueError that names the\n"
-             "argument, what was wanted and what came.");
+             "    transforms, where the blending happens; the result is taken back. None: the same space.\n"
+             "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the "
+             "posed\n    bones, and each is multiplied by the inverse of its rest, in double.\n\n"
+             "A vertex without influences stays. The GIL is released for large meshes. Raises ValueError "
+             "that\n"
+             "names the argument, what was wanted and what came.");
 }
 
 }  // namespace sinew::bindings

@@ -119,6 +119,38 @@ def test_posing_evaluates_the_mesh_once():
     assert [evaluations_in(pose, obj.name) for _ in range(3)] == [1, 1, 1]
 
 
+def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame():
+    """Of the first evaluation: anything that asks later would have Blender evaluate the rest."""
+    followed, armature = scenes.make_arm()
+    obj, follower = scenes.make_arm()
+    constraint = follower.pose.bones[1].constraints.new("COPY_LOCATION")
+    constraint.target, constraint.subtarget = followed, followed.vertex_groups[-1].name
+    key(armature, "location", (0.0, 0.0, 0.0), (3.0, 1.0, 0.0))
+    shapes: list[np.ndarray] = []
+
+    def record(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        shapes.append(mesh_io.read_points(obj.evaluated_get(depsgraph).data))
+
+    frames = (5, 9, 2)
+    bpy.app.handlers.frame_change_post.append(record)
+    try:
+        for modifier in (followed.modifiers["Armature"], obj.modifiers["Armature"]):
+            modifier.use_deform_preserve_volume = True
+        for frame in frames:
+            bpy.context.scene.frame_set(frame)
+        for each in (followed, obj):
+            scenes.add_sinew(each, "dq")
+        bpy.context.scene.frame_set(1)
+        shapes.pop()
+        for frame in frames:
+            bpy.context.scene.frame_set(frame)
+    finally:
+        bpy.app.handlers.frame_change_post.remove(record)
+    assert scenes.worst(shapes[0], shapes[1]) > 0.1
+    for expected, got in zip(shapes[:3], shapes[3:], strict=True):
+        assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
 def share_mesh(obj: bpy.types.Object) -> None:
     """What is shared can not be written while Blender evaluates."""
     other = bpy.data.objects.new("Other", obj.data)

@@ -296,6 +296,22 @@ def test_bones_from_model_takes_three_rows_and_identity(method):
 
 
 @every_method
+def test_rest_inverses_equal_multiplying_by_hand(method):
+    """Also of bones by columns, and far away, where the product of two float matrices would lose digits."""
+    rig, rng = random_rig(42), np.random.default_rng(43)
+    far = np.array([random_motion(rng, 1000.0) for _bone in rig.transforms])
+    posed = (rig.transforms.astype(np.float64) @ far).astype(np.float32)
+    by_columns = posed.transpose(0, 2, 1).copy().transpose(0, 2, 1)
+    inverses = np.linalg.inv(far)
+    expected = rig.with_motions(posed.astype(np.float64) @ inverses).deform(method)
+    deformer = rig.deformer(method)
+    whole = deformer.deform(posed, rest_inverses=inverses)
+    np.testing.assert_allclose(whole, expected, atol=TOLERANCE)
+    np.testing.assert_array_equal(deformer.deform(by_columns, rest_inverses=inverses), whole)
+    np.testing.assert_array_equal(deformer.deform(posed[:, :3], rest_inverses=inverses[:, :3]), whole)
+
+
+@every_method
 def test_out_is_written_in_place_and_returned(method):
     rig = random_rig(41, scaled=True)
     out = np.full_like(rig.rest_points, np.nan)

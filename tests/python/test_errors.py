@@ -135,6 +135,7 @@ def read_only():
 
 
 OUT = "writable C-contiguous float32 [2, 3]"
+INVERSES = "float64 [2, 4, 4], one for each of bone_transforms"
 AFFINE = "float32 [4, 4] or [3, 4]"
 THREADS = "None or 1 or more"
 
@@ -167,6 +168,10 @@ DEFORM = [
     ("bones_from_model", bones(), AFFINE, "float32 [2, 4, 4]"),
     ("bones_from_model", bones()[0].tolist(), AFFINE, "list"),
     ("bones_from_model", spoilt(bones()[0], (2, 3), NAN), "finite values", "NaN or infinity"),
+    ("rest_inverses", bones(), INVERSES, "float32 [2, 4, 4]"),
+    ("rest_inverses", bones(3).astype(np.float64), INVERSES, "float64 [3, 4, 4]"),
+    ("rest_inverses", np.eye(4), INVERSES, "float64 [4, 4]"),
+    ("rest_inverses", np.zeros((2, 4, 3)), INVERSES, "float64 [2, 4, 3]"),
     ("bones_from_model", np.zeros((4, 4), np.float32), "an invertible transform", "one of determinant 0"),
     ("bones_from_model", spoilt(bones()[0], (1, 1), 0), "an invertible transform", "one of determinant 0"),
 ]

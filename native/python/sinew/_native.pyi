@@ -71,4 +71,5 @@ class Deformer:
         out: NDArray[np.float32] | None = None,
         threads: int | None = None,
         bones_from_model: NDArray[np.float32] | None = None,
+        rest_inverses: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float32]: ...
