@@ -119,14 +119,15 @@ class Cache:
         modifier.interpolation, modifier.deform_mode, modifier.time_mode = "LINEAR", "OVERWRITE", "FRAME"
         # Blender's own axes, which is no conversion at all.
         modifier.forward_axis, modifier.up_axis = "POS_Y", "POS_Z"
-        if bake.is_even(self.frames, 1):
-            modifier.frame_start = self.frames[0]
+        times = shape_animation.key_times(self.frames)
+        if bake.is_even(times, 1):
+            modifier.frame_start = times[0]
             return
         modifier.play_mode = "CUSTOM"
         path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].eval_frame'
-        for sample, frame in enumerate(self.frames):
+        for sample, time in enumerate(times):
             modifier.eval_frame = sample
-            obj.keyframe_insert(path, frame=frame)
+            obj.keyframe_insert(path, frame=time)
         shape_animation.make_straight(obj, path)
 
     @property
@@ -172,7 +173,7 @@ class Bake:
     def sample(self) -> Iterator[float]:
         """Goes through the frames; how much is done, 0 to 1, after each."""
         scene = bpy.context.scene
-        before = scene.frame_current_final
+        before = scene.frame_float
         try:
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
@@ -233,7 +234,7 @@ def start(
     if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
     if kind in bake_export.SCENES:
-        return bake_export.SceneExport(meshes, kind, frames, target)
+        return bake_export.SceneExport(meshes, kind, frames, target, overwrite)
     if kind == bake_export.GLTF:
         return bake_export.MorphExport(meshes, frames, target)
     return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"), overwrite)

@@ -112,9 +112,10 @@ def _bake(
             raise SinewError(f"{source}: {error}") from None
     try:
         started.place()
-        if args.to not in EXPORTS:
-            files.save_copy(source, target)
-        started.publish()
+        if args.to in EXPORTS:
+            started.publish()
+        else:
+            files.save_copy(source, target, started.publish)
     except BaseException as error:
         started.discard()
         if isinstance(error, SinewError):
