@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..core.bake import BAKED
 from ..core.errors import WrongUse
 from .journal import UNFINISHED
 
@@ -56,24 +57,36 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     if path.is_dir():
         root, found = path, path.rglob("*.blend")
     elif glob.has_magic(given) and not path.exists():
-        fixed = Path(*_before_magic(path.parts))
-        root, found = fixed, (Path(p) for p in glob.iglob(str(path), recursive=True))
+        root = _fixed_part(path)
+        pattern = os.path.join(glob.escape(str(root)), path.relative_to(root))
+        found = (Path(p) for p in glob.iglob(pattern, recursive=True))
     else:
         return path.parent, [path]
     # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
     files = [
         p
         for p in sorted(found)
-        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED)
+        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED) and not _is_bake(p)
     ]
     if not files:
         raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
     return root, files
 
 
-def _before_magic(parts: tuple[str, ...]) -> tuple[str, ...]:
-    first = next(index for index, part in enumerate(parts) if glob.has_magic(part))
-    return parts[:first]
+def _fixed_part(pattern: Path) -> Path:
+    """The folder that all files of a pattern are below. What is there under that very name is no pattern."""
+    fixed = Path(pattern.anchor)
+    for part in pattern.parts[1:-1]:
+        if glob.has_magic(part) and not (fixed / part).exists():
+            break
+        fixed /= part
+    return fixed
+
+
+def _is_bake(path: Path) -> bool:
+    """Whether a batch baked it beside a copy."""
+    start = path.name.removesuffix(BAKED)
+    return start != path.name and path.with_name(f"{start}.blend").exists()
 
 
 def _check(jobs: list[Job]) -> None:
