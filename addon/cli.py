@@ -52,7 +52,7 @@ def main(argv: list[str]) -> int:
     for module in modules.values():
         module.add_parser(subparsers)
     try:
-        args = parser.parse_args(argv)
+        args = parser.parse_args(_with_frames_joined(argv))
     except SystemExit as stop:
         # Inside Blender an exit would skip its own ending.
         return stop.code if isinstance(stop.code, int) else 2
@@ -70,6 +70,17 @@ def main(argv: list[str]) -> int:
     finally:
         output.out.flush()
         output.err.flush()
+
+
+def _with_frames_joined(argv: list[str]) -> list[str]:
+    """Has "--frames -5--1" as "--frames=-5--1": argparse takes such a range for an option."""
+    joined: list[str] = []
+    for argument in argv:
+        if joined and joined[-1] in ("--frame", "--frames") and argument.startswith("-"):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 def run() -> None:

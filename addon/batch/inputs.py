@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
             raise WrongUse("standard input: no paths, expected one a line")
         return Path(os.path.commonpath([p.parent for p in paths])), paths
     if path.is_dir():
-        root, found = path, path.rglob("*.blend")
+        root, found = path, _blend_files_below(path)
     elif glob.has_magic(given) and not path.exists():
         root = _fixed_part(path)
         pattern = os.path.join(glob.escape(str(root)), path.relative_to(root))
@@ -71,6 +71,14 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     if not files:
         raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
     return root, files
+
+
+def _blend_files_below(folder: Path) -> Iterator[Path]:
+    """Also in linked folders, but in none that the way there has been through."""
+    for path, folders, names in os.walk(folder, followlinks=True):
+        above = {os.path.realpath(part) for part in (path, *Path(path).parents)}
+        folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
+        yield from (Path(path, name) for name in names if name.endswith(".blend"))
 
 
 def _fixed_part(pattern: Path) -> Path:

@@ -17,7 +17,7 @@ import numpy as np
 from ..core import bake
 from ..core.errors import SinewError
 from . import (
-    actions,
+    animation,
     bake_export,
     drive,
     evaluate,
@@ -249,16 +249,17 @@ def _take_off(obj: bpy.types.Object) -> None:
     for name in run:
         modifier = obj.modifiers[name]
         modifier.show_viewport = modifier.show_render = False
-        _mute(obj, f'modifiers["{bpy.utils.escape_identifier(name)}"].show_')
+        if not _mute(obj, f'modifiers["{bpy.utils.escape_identifier(name)}"].show_'):
+            modifier.object = None
 
 
-def _mute(obj: bpy.types.Object, start: str) -> None:
-    animation = obj.animation_data
-    if animation is not None:
-        curves = [*animation.drivers, *actions.all_curves(animation.action, actions.slot_of(animation))]
-        for curve in curves:
-            if curve.data_path.startswith(start):
-                curve.mute = True
+def _mute(obj: bpy.types.Object, start: str) -> bool:
+    """Whether nothing sets those paths any more: curves of a linked action do."""
+    found = [curve for curve in animation.curves_of(obj) if curve.data_path.startswith(start)]
+    for curve in found:
+        if curve.id_data.library is None:
+            curve.mute = True
+    return all(curve.mute for curve in found)
 
 
 def _file_name(obj: bpy.types.Object, taken: set[str]) -> str:

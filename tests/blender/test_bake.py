@@ -382,8 +382,9 @@ def test_a_folder_that_can_not_be_written(arm, locked_folder, kind):
     assert "can not be written" in refused.stderr
 
 
+@pytest.mark.parametrize("in_strip", [False, True])
 @pytest.mark.parametrize("kind", ["mdd", "usd"])
-def test_keyed_visibility(arm, tmp_path, kind):
+def test_keyed_visibility(arm, tmp_path, kind, in_strip):
     """A modifier that keys switch off half-way: the bake has the rest shape from there on."""
     obj, path = arm
     modifier = obj.modifiers["Armature"]
@@ -391,6 +392,9 @@ def test_keyed_visibility(arm, tmp_path, kind):
         for flag in ("show_viewport", "show_render"):
             setattr(modifier, flag, on)
             obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=frame)
+    if in_strip:
+        obj.animation_data.nla_tracks.new().strips.new("Strip", 1, obj.animation_data.action)
+        obj.animation_data.action = None
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     rest = scenes.rest_points(obj)
     expected = shown(obj, FRAMES)
@@ -511,7 +515,7 @@ def test_frames_before_zero(arm, tmp_path, kind):
     frames = [-5, -3, -1]
     expected = shown(obj, frames)
     assert scenes.worst(expected[0], expected[-1]) > 0.1
-    command = ("bake", path, "--method", METHOD, "--to", kind, "--frames=-5--1", "--out", tmp_path / "out")
+    command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", "-5--1", "--out", tmp_path / "out")
     if kind in ("usd", "gltf"):
         assert "Blender exports no frames before 0" in run_sinew(*command, status=1).stderr
         assert not (tmp_path / "out").exists()
@@ -595,6 +599,47 @@ def test_a_copy_has_its_name_last(arm, tmp_path):
     command = ("bake", path, "--method", METHOD, "--to", "mdd", "--frames", "1-2", "--out", out)
     assert "Arm.mdd: can not be written" in run_sinew(*command, "--overwrite", status=1).stderr
     assert sorted(p.name for p in out.rglob("*")) == ["Arm.mdd", "arm_cache", "mine"]
+
+
+def test_a_library_override_whose_library_keys_visibility(arm, tmp_path):
+    """Keys that no one can mute here do not switch the Armature modifier on again on top of the bake."""
+    obj, path = arm
+    for flag in ("show_viewport", "show_render"):
+        obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=1)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    shot = path.with_name("shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    with bpy.data.libraries.load(str(path), link=True, relative=True) as (_, to):
+        to.objects = ["Arm", "Arm Rig"]
+    for linked in list(to.objects):
+        bpy.context.scene.collection.objects.link(linked)
+    for linked in list(to.objects):
+        linked.override_create(remap_local_usages=True)
+    obj = next(o for o in bpy.data.objects if o.override_library and o.type == "MESH")
+    obj.modifiers["Armature"].object = next(
+        o for o in bpy.data.objects if o.override_library and o.type == "ARMATURE"
+    )
+    assert obj.animation_data.action.library is not None
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    expected = shown(obj, FRAMES)
+    run_sinew("bake", shot, "--method", METHOD, "--to", "mdd", "--frames", "1-11", "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / "shot.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+def test_what_is_in_another_scene_is_named(arm, tmp_path):
+    _obj, path = arm
+    away, rig = scenes.make_arm(name="Away")
+    other = bpy.data.scenes.new("Other")
+    for each in (away, rig):
+        bpy.context.scene.collection.objects.unlink(each)
+        other.collection.objects.link(each)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    out = tmp_path / "out"
+    result = run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", out, status=1)
+    assert "left as it was: Away is not in the scene Scene" in result.stderr
+    assert [p.name for p in (out / "arm_cache").iterdir()] == ["Arm.mdd"]
 
 
 def test_wrong_use(arm, tmp_path):

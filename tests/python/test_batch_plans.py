@@ -89,6 +89,15 @@ def test_a_folder_with_brackets_is_no_pattern(studio, monkeypatch):
     assert planned(["old/*.blend"]) == {"old/b.blend": "out/b.blend"}
 
 
+def test_linked_folders_and_their_circles(studio):
+    (studio / "chars" / "guests").symlink_to(studio)
+    elsewhere = studio.parent / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "c.blend").touch()
+    (studio / "chars" / "more").symlink_to(elsewhere)
+    assert set(planned(["chars"])) == {"chars/hero.blend", "chars/old/hero.blend", "chars/more/c.blend"}
+
+
 def test_bakes_beside_copies_are_not_inputs(studio):
     for name in ("hero.baked.blend", "half.baked.blend"):
         (studio / "chars" / name).touch()
