@@ -151,7 +151,9 @@ class Bake:
     ) -> None:
         self.frames, self.folder, self.made_folder = frames, folder, not folder.exists()
         self.bakes: list[ShapeKeys | Cache] = []
-        evaluate.set_frame(bpy.context.scene, frames[0])
+        scene = bpy.context.scene
+        before = scene.frame_float
+        evaluate.set_frame(scene, frames[0])
         names: set[str] = set()
         try:
             for obj in meshes:
@@ -165,6 +167,8 @@ class Bake:
         except SinewError:
             self.discard()
             raise
+        finally:
+            evaluate.set_frame(scene, before)
 
     @property
     def what(self) -> str:

@@ -628,6 +628,23 @@ def test_a_library_override_whose_library_keys_visibility(arm, tmp_path):
     assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
 
 
+@pytest.mark.parametrize("kind", core.KINDS)
+def test_the_scene_stays_at_its_frame(arm, tmp_path, kind):
+    obj, _path = arm
+    scene = bpy.context.scene
+    scene.render.frame_map_new = 200
+    scenes.add_sinew(obj, METHOD)
+    scene.frame_set(6, subframe=0.5)
+    started = bake.start([obj], kind, [2, 3, 4], tmp_path / f"arm{SUFFIXES.get(kind, '')}", overwrite=False)
+    assert scene.frame_float == 6.5
+    for _part in started.sample():
+        pass
+    started.place()
+    assert scene.frame_float == 6.5
+    assert (scene.render.frame_map_old, scene.render.frame_map_new) == (100, 200)
+    started.discard()
+
+
 def test_what_is_in_another_scene_is_named(arm, tmp_path):
     _obj, path = arm
     away, rig = scenes.make_arm(name="Away")
