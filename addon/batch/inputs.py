@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..core.bake import BAKED
 from ..core.errors import WrongUse
+from .journal import NAME as JOURNAL
 from .journal import UNFINISHED
 
 STANDARD_INPUT = "-"
@@ -92,9 +93,10 @@ def _fixed_part(pattern: Path) -> Path:
 
 
 def _is_bake(path: Path) -> bool:
-    """Whether a batch baked it beside a copy."""
+    """Whether a batch, whose journal is above, baked it beside a copy."""
     start = path.name.removesuffix(BAKED)
-    return start != path.name and path.with_name(f"{start}.blend").exists()
+    beside_copy = start != path.name and path.with_name(f"{start}.blend").exists()
+    return beside_copy and any((folder / JOURNAL).exists() for folder in path.parents)
 
 
 def _check(jobs: list[Job]) -> None:

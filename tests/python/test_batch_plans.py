@@ -102,6 +102,9 @@ def test_bakes_beside_copies_are_not_inputs(studio):
     for name in ("hero.baked.blend", "half.baked.blend"):
         (studio / "chars" / name).touch()
     found = {"chars/half.baked.blend", "chars/hero.blend", "chars/old/hero.blend"}
+    # Somebody's own, as no batch has been at work there.
+    assert set(planned(["chars"])) == {*found, "chars/hero.baked.blend"}
+    (studio / NAME).touch()
     assert set(planned(["chars"])) == set(planned(["chars/**/*.blend"])) == found
     assert set(planned(["chars/hero.baked.blend"])) == {"chars/hero.baked.blend"}
 
