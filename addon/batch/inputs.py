@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..core.bake import BAKED
 from ..core.errors import WrongUse
+from .journal import NAME as JOURNAL
 from .journal import UNFINISHED
 
 STANDARD_INPUT = "-"
@@ -54,26 +56,47 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
             raise WrongUse("standard input: no paths, expected one a line")
         return Path(os.path.commonpath([p.parent for p in paths])), paths
     if path.is_dir():
-        root, found = path, path.rglob("*.blend")
+        root, found = path, _blend_files_below(path)
     elif glob.has_magic(given) and not path.exists():
-        fixed = Path(*_before_magic(path.parts))
-        root, found = fixed, (Path(p) for p in glob.iglob(str(path), recursive=True))
+        root = _fixed_part(path)
+        pattern = os.path.join(glob.escape(str(root)), path.relative_to(root))
+        found = (Path(p) for p in glob.iglob(pattern, recursive=True))
     else:
         return path.parent, [path]
     # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
     files = [
         p
         for p in sorted(found)
-        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED)
+        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED) and not _is_bake(p)
     ]
     if not files:
         raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
     return root, files
 
 
-def _before_magic(parts: tuple[str, ...]) -> tuple[str, ...]:
-    first = next(index for index, part in enumerate(parts) if glob.has_magic(part))
-    return parts[:first]
+def _blend_files_below(folder: Path) -> Iterator[Path]:
+    """Also in linked folders, but in none that the way there has been through."""
+    for path, folders, names in os.walk(folder, followlinks=True):
+        above = {os.path.realpath(part) for part in (path, *Path(path).parents)}
+        folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
+        yield from (Path(path, name) for name in names if name.endswith(".blend"))
+
+
+def _fixed_part(pattern: Path) -> Path:
+    """The folder that all files of a pattern are below. What is there under that very name is no pattern."""
+    fixed = Path(pattern.anchor)
+    for part in pattern.parts[1:-1]:
+        if glob.has_magic(part) and not (fixed / part).exists():
+            break
+        fixed /= part
+    return fixed
+
+
+def _is_bake(path: Path) -> bool:
+    """Whether a batch, whose journal is above, baked it beside a copy."""
+    start = path.name.removesuffix(BAKED)
+    beside_copy = start != path.name and path.with_name(f"{start}.blend").exists()
+    return beside_copy and any((folder / JOURNAL).exists() for folder in path.parents)
 
 
 def _check(jobs: list[Job]) -> None:

@@ -69,7 +69,7 @@ class Settings:
         """Raises WrongUse where a bake can not have the frames."""
         if self.bake_frames is not None:
             for kind in self.kinds:
-                check_frames(kind, parse_frames(self.bake_frames))
+                check_frames(kind, sorted(set(parse_frames(self.bake_frames))))
 
     def as_task(self) -> dict:
         """What a task takes along, and the journal keeps."""
@@ -93,7 +93,12 @@ class FileRule:
     line: int
 
     def matches(self, path: PurePath) -> bool:
-        return any(path.match(pattern) for pattern in self.match)
+        """Also where a pattern is the end of the very path, which can have brackets."""
+        return any(path.match(pattern) or _ends_with(path, PurePath(pattern)) for pattern in self.match)
+
+
+def _ends_with(path: PurePath, end: PurePath) -> bool:
+    return path.parts[-len(end.parts) :] == end.parts
 
 
 @dataclass(frozen=True)
@@ -118,7 +123,8 @@ class JobFile:
 def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
     """Raises WrongUse, with file and line, for anything that is not as it should be."""
     try:
-        text = path.read_text(encoding="utf-8")
+        # Some editors begin a file with a byte order mark.
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise WrongUse(f"{path}:{line}: is not UTF-8") from None
@@ -159,7 +165,12 @@ class _Reader:
     def _file_rule(self, table: dict, place: Place) -> FileRule:
         self._known_keys(table, place, ("match", *SETTINGS))
         self._required(table, place, "match")
-        return FileRule(self._strings(table, place, "match"), self._settings(table, place), self._line(place))
+        match = self._strings(table, place, "match")
+        if not all(PurePath(pattern).parts for pattern in match):
+            self._fail(
+                (*place, "match"), f"match: expected paths such as hero*.blend, got {table['match']!r}"
+            )
+        return FileRule(match, self._settings(table, place), self._line(place))
 
     def _settings(self, table: dict, place: Place) -> Settings:
         settings = Settings(

@@ -13,8 +13,7 @@ def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
     animation = obj.animation_data
     if animation is None:
         return
-    strips = [strip for track in animation.nla_tracks for strip in track.strips]
-    for player in (animation, *strips):
+    for player in players(animation):
         action = player.action
         if action is None or action.users > 1:
             continue
@@ -41,14 +40,22 @@ def remove(obj: bpy.types.Object) -> None:
 
 
 def animated_paths(obj: bpy.types.Object) -> set[str]:
-    """The data paths that the object's action and drivers set."""
+    """The data paths that the object's actions and drivers set."""
+    return {curve.data_path for curve in curves_of(obj)}
+
+
+def curves_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Those of the object's actions, in strips too, and its drivers."""
     animation = obj.animation_data
     if animation is None:
-        return set()
-    lists = [animation.drivers]
-    if animation.action is not None:
-        lists += actions.curve_lists(animation.action, actions.slot_of(animation))
-    return {curve.data_path for curves in lists for curve in curves}
+        return []
+    played = [actions.all_curves(p.action, actions.slot_of(p)) for p in players(animation)]
+    return [*animation.drivers, *(curve for each in played for curve in each)]
+
+
+def players(animation: bpy.types.AnimData) -> list[bpy.types.AnimData | bpy.types.NlaStrip]:
+    """What plays an action, or could."""
+    return [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
 
 
 def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from ..core import bake
 from ..core.errors import SinewError
 from . import (
-    actions,
+    animation,
     bake_export,
     drive,
     evaluate,
@@ -119,14 +119,15 @@ class Cache:
         modifier.interpolation, modifier.deform_mode, modifier.time_mode = "LINEAR", "OVERWRITE", "FRAME"
         # Blender's own axes, which is no conversion at all.
         modifier.forward_axis, modifier.up_axis = "POS_Y", "POS_Z"
-        if bake.is_even(self.frames, 1):
-            modifier.frame_start = self.frames[0]
+        times = shape_animation.key_times(self.frames)
+        if bake.is_even(times, 1):
+            modifier.frame_start = times[0]
             return
         modifier.play_mode = "CUSTOM"
         path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].eval_frame'
-        for sample, frame in enumerate(self.frames):
+        for sample, time in enumerate(times):
             modifier.eval_frame = sample
-            obj.keyframe_insert(path, frame=frame)
+            obj.keyframe_insert(path, frame=time)
         shape_animation.make_straight(obj, path)
 
     @property
@@ -150,7 +151,9 @@ class Bake:
     ) -> None:
         self.frames, self.folder, self.made_folder = frames, folder, not folder.exists()
         self.bakes: list[ShapeKeys | Cache] = []
-        evaluate.set_frame(bpy.context.scene, frames[0])
+        scene = bpy.context.scene
+        before = scene.frame_float
+        evaluate.set_frame(scene, frames[0])
         names: set[str] = set()
         try:
             for obj in meshes:
@@ -164,6 +167,8 @@ class Bake:
         except SinewError:
             self.discard()
             raise
+        finally:
+            evaluate.set_frame(scene, before)
 
     @property
     def what(self) -> str:
@@ -172,7 +177,7 @@ class Bake:
     def sample(self) -> Iterator[float]:
         """Goes through the frames; how much is done, 0 to 1, after each."""
         scene = bpy.context.scene
-        before = scene.frame_current_final
+        before = scene.frame_float
         try:
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
@@ -233,7 +238,7 @@ def start(
     if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
     if kind in bake_export.SCENES:
-        return bake_export.SceneExport(meshes, kind, frames, target)
+        return bake_export.SceneExport(meshes, kind, frames, target, overwrite)
     if kind == bake_export.GLTF:
         return bake_export.MorphExport(meshes, frames, target)
     return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"), overwrite)
@@ -248,16 +253,17 @@ def _take_off(obj: bpy.types.Object) -> None:
     for name in run:
         modifier = obj.modifiers[name]
         modifier.show_viewport = modifier.show_render = False
-        _mute(obj, f'modifiers["{bpy.utils.escape_identifier(name)}"].show_')
+        if not _mute(obj, f'modifiers["{bpy.utils.escape_identifier(name)}"].show_'):
+            modifier.object = None
 
 
-def _mute(obj: bpy.types.Object, start: str) -> None:
-    animation = obj.animation_data
-    if animation is not None:
-        curves = [*animation.drivers, *actions.all_curves(animation.action, actions.slot_of(animation))]
-        for curve in curves:
-            if curve.data_path.startswith(start):
-                curve.mute = True
+def _mute(obj: bpy.types.Object, start: str) -> bool:
+    """Whether nothing sets those paths any more: curves of a linked action do."""
+    found = [curve for curve in animation.curves_of(obj) if curve.data_path.startswith(start)]
+    for curve in found:
+        if curve.id_data.library is None:
+            curve.mute = True
+    return all(curve.mute for curve in found)
 
 
 def _file_name(obj: bpy.types.Object, taken: set[str]) -> str:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import bpy
@@ -11,6 +10,7 @@ import bpy
 from ..core.bake import EXPORTS, KINDS, bake_path
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
+from ..core.names import fits
 from . import bake, evaluate, files, properties
 
 
@@ -40,12 +40,13 @@ def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
                 path = bake_path(target, kind)
                 names = [obj.name for obj in objects]
                 bakes.append({"to": kind, "objects": names, "frames": len(frames), "file": path.name})
-                one = bake.start(objects, kind, frames, path, overwrite=True)
+                overwrite = task["overwrite"] or bool(task["ours"])
+                one = bake.start(objects, kind, frames, path, overwrite)
                 started.append(one)
-                beside += one.files
                 _check_free(one.files, task)
                 for _part in one.sample():
                     pass
+                beside += one.files
                 if kind not in EXPORTS:
                     in_file.append(one)
         if in_file:
@@ -76,7 +77,7 @@ def _wanted(settings: dict, meshes: set[str]) -> dict[str, list[bpy.types.Object
 
 
 def _kinds_of(obj: bpy.types.Object, settings: dict) -> list[str]:
-    said = [r["bake"] for r in settings["objects"] if "bake" in r and fnmatchcase(obj.name, r["match"])]
+    said = [r["bake"] for r in settings["objects"] if "bake" in r and fits(obj.name, r["match"])]
     return list(said[-1] if said else settings["bake"])
 
 

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..core import bake as core
 from ..core.errors import SinewError
 from ..core.output import remove
-from . import evaluate, files, shape_animation
+from ..core.spaces import transformed
+from . import evaluate, files, shape_animation, usd_textures
 
 
 def _alembic(path: str, first: int, last: int) -> None:
@@ -47,6 +49,7 @@ def _usd(path: str, _first: int, _last: int) -> None:
         export_shapekeys=False,
         export_hair=False,
         export_subdivision="TESSELLATE",
+        **usd_textures.LEFT_WHERE_THEY_ARE,
     )
 
 
@@ -84,18 +87,24 @@ class SceneExport(_Export):
     """Alembic and USD. The exporter goes through the frames itself, and Sinew follows as in a render."""
 
     def __init__(
-        self, meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], path: Path
+        self,
+        meshes: list[bpy.types.Object],
+        kind: str,
+        frames: Sequence[float],
+        path: Path,
+        overwrite: bool,
     ) -> None:
         core.check_frames(kind, frames)
         self.meshes, self.kind, self.path = meshes, kind, path
         self.first, self.last = int(frames[0]), int(frames[-1])
+        self.textures = usd_textures.Textures(meshes if kind == "usd" else (), path, overwrite)
         self.unfinished = _prepare(meshes, frames, path)
 
     def sample(self) -> Iterator[float]:
         scene = bpy.context.scene
-        before = scene.frame_current_final, scene.frame_start, scene.frame_end
+        before = scene.frame_float, scene.frame_start, scene.frame_end
         try:
-            with _selected(self.meshes):
+            with _selected(self.meshes), self.textures.on_disk():
                 scene.frame_start, scene.frame_end = self.first, self.last
                 _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
             for obj in self.meshes:
@@ -108,6 +117,15 @@ class SceneExport(_Export):
             scene.frame_start, scene.frame_end = before[1:]
             evaluate.set_frame(scene, before[0])
 
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        # Textures have their names before the export that looks for them.
+        return [*((path, path) for path in self.textures.written), *super().files]
+
+    def discard(self) -> None:
+        super().discard()
+        self.textures.discard()
+
 
 class MorphExport(_Export):
     """glTF: the final meshes of the first frame, and the others' points as morph targets."""
@@ -118,16 +136,17 @@ class MorphExport(_Export):
         self.unfinished = _prepare(meshes, frames, path)
         self.made: list[bpy.types.Object] = []
         self.samples: dict[bpy.types.Object, list[np.ndarray]] = {obj: [] for obj in meshes}
+        self.spaces: dict[bpy.types.Object, Matrix] = {}
 
     def sample(self) -> Iterator[float]:
         scene = bpy.context.scene
-        before = scene.frame_current_final
+        before = scene.frame_float
         try:
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
                 for obj, samples in self.samples.items():
                     _check_driven(obj)
-                    points = evaluate.final_points(obj)
+                    points = self._in_first_space(obj)
                     if samples and len(points) != len(samples[0]):
                         raise SinewError(
                             f"{obj.name}: {len(samples[0]):,} vertices at first and {len(points):,} at frame "
@@ -137,7 +156,8 @@ class MorphExport(_Export):
                 yield (number + 1) / (len(self.frames) + 1)
             evaluate.set_frame(scene, self.frames[0])
             self._make()
-            with _selected(self.made):
+            with _unstretched(scene), _selected(self.made):
+                self._animate()
                 first, last = scene.frame_start, scene.frame_end
                 scene.frame_start, scene.frame_end = int(self.frames[0]), int(self.frames[-1])
                 try:
@@ -152,16 +172,33 @@ class MorphExport(_Export):
             evaluate.set_frame(scene, before)
         yield 1.0
 
+    def _in_first_space(self, obj: bpy.types.Object) -> np.ndarray:
+        """The final points in the object's space of the first frame: targets are all that moves."""
+        points = evaluate.final_points(obj)
+        world = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
+        first = self.spaces.setdefault(obj, world)
+        if world == first:
+            return points
+        if not first.determinant():
+            raise SinewError(
+                f"{obj.name} is scaled to nothing at the first frame, and not later; begin at another frame"
+            )
+        first_from_now = np.linalg.inv(np.array(first, dtype=np.float64)) @ np.array(world, dtype=np.float64)
+        return transformed(points, first_from_now).astype(np.float32)
+
     def _make(self) -> None:
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for obj, samples in self.samples.items():
+        for obj in self.samples:
             evaluated = obj.evaluated_get(depsgraph)
             mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
             mesh.name = f"{obj.data.name} baked"
             made = bpy.data.objects.new(f"{obj.name} baked", mesh)
-            made.matrix_world = evaluated.matrix_world
+            made.matrix_world = self.spaces[obj]
             bpy.context.scene.collection.objects.link(made)
             self.made.append(made)
+
+    def _animate(self) -> None:
+        for made, samples in zip(self.made, self.samples.values(), strict=True):
             shape_animation.add(made, self.frames, samples)
 
     def _write(self) -> None:
@@ -171,6 +208,8 @@ class MorphExport(_Export):
             export_format="GLB",
             use_selection=True,
             export_animations=True,
+            # All meshes in one animation, which is what players play.
+            export_animation_mode="ACTIVE_ACTIONS",
             export_morph=True,
             export_morph_animation=True,
             export_skins=False,
@@ -217,6 +256,18 @@ def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> Non
         raise SinewError(f"{export.path}: can not be written: {files.telling_line(error)}") from None
     if not export.unfinished.exists():
         raise SinewError(f"{export.path}: can not be written: Blender's exporter made no file")
+
+
+@contextmanager
+def _unstretched(scene: bpy.types.Scene) -> Iterator[None]:
+    """Without the scene's time remapping, of which glTF's exporter knows nothing."""
+    render = scene.render
+    before = render.frame_map_old, render.frame_map_new
+    render.frame_map_old = render.frame_map_new = 100
+    try:
+        yield
+    finally:
+        render.frame_map_old, render.frame_map_new = before
 
 
 @contextmanager

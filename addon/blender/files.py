@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import os
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -48,19 +49,27 @@ def open_file(path: Path, load_ui: bool = False) -> None:
             importer(str(path))
     except RuntimeError as error:
         # Blender names the file again, up to twice.
-        reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ")
+        reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ,")
+        if reason == "not a blend file":
+            # It begins as one does, and older Blenders say no more of what newer ones write.
+            reason += f", or of a Blender newer than {bpy.app.version_string}"
         raise SinewError(f"{path}: Blender can not read it: {reason}") from None
 
 
-def save_copy(source: Path, target: Path) -> None:
-    """Saves the open file as `target`, compressed if `source` was; beside it first, then renamed."""
+def save_copy(source: Path, target: Path, name_others: Callable[[], None] = lambda: None) -> None:
+    """Saves the open file as `target`, compressed if `source` was; beside it first, then renamed.
+
+    name_others  gives the files that it refers to their names, once the copy is whole: where it is, all is
+    """
     unfinished = target.with_name(f".{target.stem}.unfinished.blend")
     save_beside(source, target, unfinished)
     try:
+        name_others()
         os.replace(unfinished, target)
     except OSError as error:
-        remove(unfinished)
         raise SinewError(f"{target}: can not be written: {error.strerror}") from None
+    finally:
+        remove(unfinished)
 
 
 def save_beside(source: Path, target: Path, unfinished: Path) -> None:

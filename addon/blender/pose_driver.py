@@ -24,6 +24,7 @@ from . import node_group, properties, stack
 PATH = "sinew.pose"
 # What the last two variables read.
 ASK_FOR_OBJECT, ASK_FOR_MESH = "sinew.asked", "sinew_asked"
+PLACE = "matrix_world[0][0]"
 _PREFIX = "sinew_"
 
 
@@ -62,7 +63,9 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     if asking:
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
-        variables += [_Variable(each) for each in (*armatures, obj)]
+        variables += [_Variable(each) for each in armatures]
+        # Of the driver's own object Blender waits only for properties, not for its place.
+        variables.append(_Variable(obj, PLACE))
         if obj.data.shape_keys is not None:
             variables.append(_Variable(obj.data.shape_keys, "eval_time"))
         variables += [_Variable(obj, ASK_FOR_OBJECT), _Variable(obj.data, ASK_FOR_MESH)]

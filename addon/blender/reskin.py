@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
+from ..core.names import fits
 from ..core.output import remove
 from ..core.views import seen_extent, whole_view
 from . import bake_copy, comparison, drive, evaluate, files, handlers, properties, render, stack
@@ -164,7 +164,7 @@ def _is_meant(obj: bpy.types.Object, settings: dict) -> bool:
     names = [obj.name, *(c.name for c in bpy.data.collections if obj in c.all_objects[:])]
 
     def is_one_of(patterns: list[str]) -> bool:
-        return any(fnmatchcase(name, pattern) for name in names for pattern in patterns)
+        return any(fits(name, pattern) for name in names for pattern in patterns)
 
     return (not include or is_one_of(include)) and not is_one_of(exclude)
 
@@ -172,7 +172,7 @@ def _is_meant(obj: bpy.types.Object, settings: dict) -> bool:
 def _said_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
     """What the last rule for the object says, or the settings for all."""
     rules = settings["objects"]
-    said = [rule[key] for rule in rules if key in rule and fnmatchcase(obj.name, rule["match"])]
+    said = [rule[key] for rule in rules if key in rule and fits(obj.name, rule["match"])]
     return said[-1] if said else settings[key]
 
 
@@ -201,7 +201,8 @@ def _notes_on_file() -> list[str]:
     notes += [
         f"library {library.filepath} is missing: what it links stays linked, and is not shown"
         for library in bpy.data.libraries
-        if not Path(bpy.path.abspath(library.filepath, library=library.parent)).exists()
+        # All are relative to the open file, also those that a library links.
+        if not Path(bpy.path.abspath(library.filepath)).exists()
     ]
     return notes
 

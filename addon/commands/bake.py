@@ -96,6 +96,10 @@ def _bake(
     meshes = drive.deformed_meshes(list(scene.objects))
     if not meshes:
         raise SinewError(f"{source}: no mesh is deformed by an armature; nothing written")
+    elsewhere = [obj for obj in drive.deformed_meshes(list(bpy.data.objects)) if obj.library is None]
+    outcome.left_out += [
+        f"{obj.name} is not in the scene {scene.name}" for obj in elsewhere if obj not in meshes
+    ]
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # What is hidden is baked as well, and hidden in the copy.
     with evaluate.shown(meshes):
@@ -112,9 +116,10 @@ def _bake(
             raise SinewError(f"{source}: {error}") from None
     try:
         started.place()
-        if args.to not in EXPORTS:
-            files.save_copy(source, target)
-        started.publish()
+        if args.to in EXPORTS:
+            started.publish()
+        else:
+            files.save_copy(source, target, started.publish)
     except BaseException as error:
         started.discard()
         if isinstance(error, SinewError):

@@ -19,11 +19,12 @@ from .output import remove
 IN_FILE = ("shape-keys", "mdd", "pc2")
 EXPORTS = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 KINDS = (*IN_FILE, *EXPORTS)
+BAKED = ".baked.blend"
 
 
 def bake_path(copy: Path, kind: str) -> Path:
     """What a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for all that a .blend plays."""
-    return copy.with_suffix(EXPORTS.get(kind, ".baked.blend"))
+    return copy.with_suffix(EXPORTS.get(kind, BAKED))
 
 
 def mdd_header(frames: Sequence[float], vertices: int, rate: float) -> bytes:
@@ -110,6 +111,8 @@ def check_frames(kind: str, frames: Sequence[float]) -> None:
         raise WrongUse(f"{kind}: Blender exports every frame of a range; give frames such as 1-48")
     if kind in EXPORTS and not is_whole:
         raise WrongUse(f"{kind}: Blender exports whole frames; give frames such as 1,12,40-48")
+    if kind in ("usd", "gltf") and frames[0] < 0:
+        raise WrongUse(f"{kind}: Blender exports no frames before 0; give others, or bake to alembic")
 
 
 def is_even(frames: Sequence[float], step: float | None = None) -> bool:

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import bake, properties
+from sinew_addon.blender import actions, bake, properties
 from sinew_addon.core import bake as core
 from sinew_addon.core.errors import SinewError
 from test_command_line import run_sinew
@@ -382,8 +382,9 @@ def test_a_folder_that_can_not_be_written(arm, locked_folder, kind):
     assert "can not be written" in refused.stderr
 
 
+@pytest.mark.parametrize("in_strip", [False, True])
 @pytest.mark.parametrize("kind", ["mdd", "usd"])
-def test_keyed_visibility(arm, tmp_path, kind):
+def test_keyed_visibility(arm, tmp_path, kind, in_strip):
     """A modifier that keys switch off half-way: the bake has the rest shape from there on."""
     obj, path = arm
     modifier = obj.modifiers["Armature"]
@@ -391,6 +392,9 @@ def test_keyed_visibility(arm, tmp_path, kind):
         for flag in ("show_viewport", "show_render"):
             setattr(modifier, flag, on)
             obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=frame)
+    if in_strip:
+        obj.animation_data.nla_tracks.new().strips.new("Strip", 1, obj.animation_data.action)
+        obj.animation_data.action = None
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     rest = scenes.rest_points(obj)
     expected = shown(obj, FRAMES)
@@ -444,6 +448,215 @@ def test_what_is_hidden_stays_hidden(arm, tmp_path):
     baked = bpy.data.objects["Arm"]
     assert baked.hide_viewport
     assert baked.hide_render
+
+
+SUFFIXES = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
+
+
+def world_shapes(objects, frames):
+    """World points of each object, float64 [frames, vertices, 3], in rising order of names."""
+    found = {obj.name: [] for obj in objects}
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        for obj in objects:
+            world = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+            found[obj.name].append(scenes.final_points(obj) @ world[:3, :3].T + world[:3, 3])
+    return [np.stack(found[name]) for name in sorted(found)]
+
+
+@pytest.mark.parametrize("stretched", [False, True])
+@pytest.mark.parametrize("kind", core.KINDS)
+def test_several_moving_objects(arm, tmp_path, kind, stretched):
+    """Children of a rig that moves as an object, turned and scaled along axes of their own; the scene's time
+    remapped or not."""
+    first, path = arm
+    second, rig = scenes.make_arm(name="Brother")
+    second.location = (0.0, 8.0, 0.0)
+    for obj, parent in ((first, first.modifiers["Armature"].object), (second, rig)):
+        obj.parent, obj.rotation_euler, obj.scale = parent, (0.3, 0.2, 0.1), (1.0, 2.0, 0.5)
+        parent.keyframe_insert("location", frame=1)
+        parent.rotation_euler.z += 1.0
+        parent.location.x += 3.0
+        for what in ("location", "rotation_euler"):
+            parent.keyframe_insert(what, frame=11)
+    scene = bpy.context.scene
+    if stretched:
+        scene.render.frame_map_new = 200
+    scene.frame_start, scene.frame_end = 3, 9
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    frames = [3, 4, 6, 9]
+    for obj in (first, second):
+        scenes.add_sinew(obj, METHOD)
+    wanted = world_shapes([first, second], frames)
+    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / f"arm{SUFFIXES.get(kind, '.blend')}", frames, tmp_path)
+    shapes = [read[name] for name in sorted(read) if name not in ("uvs", "materials")]
+    assert len(shapes) == 2
+    for points, expected in zip(shapes, wanted, strict=True):
+        assert scenes.worst(expected[0], expected[-1]) > 0.5
+        if kind == "gltf":
+            expected = expected[
+                :, np.linalg.norm(points[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
+            ]
+        # World points of float32 matrices, a few units from the origin.
+        assert scenes.worst(points, expected) <= 3e-6 * scenes.diagonal(first)
+
+
+@pytest.mark.parametrize("kind", core.KINDS)
+def test_frames_before_zero(arm, tmp_path, kind):
+    obj, path = arm
+    for curve in actions.all_curves(
+        obj.modifiers["Armature"].object.animation_data.action,
+        actions.slot_of(obj.modifiers["Armature"].object.animation_data),
+    ):
+        for key in curve.keyframe_points:
+            key.co_ui.x -= 11.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    frames = [-5, -3, -1]
+    expected = shown(obj, frames)
+    assert scenes.worst(expected[0], expected[-1]) > 0.1
+    command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", "-5--1", "--out", tmp_path / "out")
+    if kind in ("usd", "gltf"):
+        assert "Blender exports no frames before 0" in run_sinew(*command, status=1).stderr
+        assert not (tmp_path / "out").exists()
+        return
+    run_sinew(*command)
+    read = read_elsewhere(tmp_path / "out" / f"arm{SUFFIXES.get(kind, '.blend')}", frames, tmp_path)
+    (points,) = (read[name] for name in read if name not in ("uvs", "materials"))
+    assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+TEXTURES = """
+import sys, bpy
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+bpy.ops.wm.usd_import(filepath=sys.argv[1])
+for image in bpy.data.images:
+    if image.size[0]:
+        print("PIXEL", bpy.path.basename(image.filepath), *(round(x) for x in image.pixels[:4]))
+"""
+
+
+def textured(folder, colours):
+    """A character with a texture on disk, one that is packed and one that Blender makes."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj, _armature = scenes.make_arm()
+    obj.data.uv_layers.new(name="UVMap")
+    folder.mkdir()
+    for number, (name, colour) in enumerate(colours.items()):
+        image = bpy.data.images.new(name, 4, 4)
+        image.generated_color = colour
+        if name != "made":
+            image.filepath_raw, image.file_format = str(folder / f"{name}.png"), "PNG"
+            image.save()
+            image.reload()
+        if name == "packed":
+            image.pack()
+            (folder / "packed.png").unlink()
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        node = material.node_tree.nodes.new("ShaderNodeTexImage")
+        node.image = image
+        shader = material.node_tree.nodes["Principled BSDF"]
+        material.node_tree.links.new(node.outputs[0], shader.inputs["Base Color"])
+        obj.data.materials.append(material)
+        obj.data.polygons[number].material_index = number
+    path = folder / f"{folder.name}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_textures_of_one_name_do_not_meet(tmp_path):
+    """In USD, whose exporter has one folder for all."""
+    red, green, blue = (1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)
+    characters = {
+        "hero": {"skin": red, "packed": green, "made": blue},
+        "fiend": {"skin": blue, "packed": red, "made": green},
+    }
+    paths = [textured(tmp_path / name, colours) for name, colours in characters.items()]
+    out = tmp_path / "out"
+    run_sinew("bake", *paths, "--method", METHOD, "--to", "usd", "--frames", "1-2", "--out", out)
+    for name, colours in characters.items():
+        command = [sys.executable, "-c", TEXTURES, str(out / f"{name}.usdc")]
+        read = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+        lines = sorted(line for line in read.splitlines() if line.startswith("PIXEL"))
+        assert lines == sorted(
+            f"PIXEL {image}.png {' '.join(map(str, colour))}" for image, colour in colours.items()
+        )
+        assert {p.name for p in (out / f"{name}_textures").iterdir()} == {"packed.png", "made.png"}
+    mine = (out / "hero_textures" / "made.png").read_bytes()
+    (out / "hero.usdc").unlink()
+    again = ("bake", paths[0], "--method", METHOD, "--to", "usd", "--frames", "1-2", "--out", out)
+    assert "made.png: is there already" in run_sinew(*again, status=1).stderr
+    assert (out / "hero_textures" / "made.png").read_bytes() == mine
+    assert not (out / "hero.usdc").exists()
+
+
+def test_a_copy_has_its_name_last(arm, tmp_path):
+    """Where a cache can not get its name, no copy plays one that is not there."""
+    _obj, path = arm
+    out = tmp_path / "out"
+    (out / "arm_cache" / "Arm.mdd" / "mine").mkdir(parents=True)
+    command = ("bake", path, "--method", METHOD, "--to", "mdd", "--frames", "1-2", "--out", out)
+    assert "Arm.mdd: can not be written" in run_sinew(*command, "--overwrite", status=1).stderr
+    assert sorted(p.name for p in out.rglob("*")) == ["Arm.mdd", "arm_cache", "mine"]
+
+
+def test_a_library_override_whose_library_keys_visibility(arm, tmp_path):
+    """Keys that no one can mute here do not switch the Armature modifier on again on top of the bake."""
+    obj, path = arm
+    for flag in ("show_viewport", "show_render"):
+        obj.keyframe_insert(f'modifiers["Armature"].{flag}', frame=1)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    shot = path.with_name("shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    with bpy.data.libraries.load(str(path), link=True, relative=True) as (_, to):
+        to.objects = ["Arm", "Arm Rig"]
+    for linked in list(to.objects):
+        bpy.context.scene.collection.objects.link(linked)
+    for linked in list(to.objects):
+        linked.override_create(remap_local_usages=True)
+    obj = next(o for o in bpy.data.objects if o.override_library and o.type == "MESH")
+    obj.modifiers["Armature"].object = next(
+        o for o in bpy.data.objects if o.override_library and o.type == "ARMATURE"
+    )
+    assert obj.animation_data.action.library is not None
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    expected = shown(obj, FRAMES)
+    run_sinew("bake", shot, "--method", METHOD, "--to", "mdd", "--frames", "1-11", "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / "shot.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("kind", core.KINDS)
+def test_the_scene_stays_at_its_frame(arm, tmp_path, kind):
+    obj, _path = arm
+    scene = bpy.context.scene
+    scene.render.frame_map_new = 200
+    scenes.add_sinew(obj, METHOD)
+    scene.frame_set(6, subframe=0.5)
+    started = bake.start([obj], kind, [2, 3, 4], tmp_path / f"arm{SUFFIXES.get(kind, '')}", overwrite=False)
+    assert scene.frame_float == 6.5
+    for _part in started.sample():
+        pass
+    started.place()
+    assert scene.frame_float == 6.5
+    assert (scene.render.frame_map_old, scene.render.frame_map_new) == (100, 200)
+    started.discard()
+
+
+def test_what_is_in_another_scene_is_named(arm, tmp_path):
+    _obj, path = arm
+    away, rig = scenes.make_arm(name="Away")
+    other = bpy.data.scenes.new("Other")
+    for each in (away, rig):
+        bpy.context.scene.collection.objects.unlink(each)
+        other.collection.objects.link(each)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    out = tmp_path / "out"
+    result = run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", out, status=1)
+    assert "left as it was: Away is not in the scene Scene" in result.stderr
+    assert [p.name for p in (out / "arm_cache").iterdir()] == ["Arm.mdd"]
 
 
 def test_wrong_use(arm, tmp_path):

@@ -507,6 +507,36 @@ def test_links_are_kept_and_reported(tmp_path):
     assert all(libraries.values())
 
 
+def test_libraries_of_libraries_are_found(tmp_path):
+    """In other folders than the file, which all their paths are relative to."""
+    base = tmp_path / "library" / "characters" / "hero.blend"
+    middle = tmp_path / "sets" / "set.blend"
+    shot = tmp_path / "shots" / "deep" / "shot.blend"
+    for path, library in ((base, None), (middle, base), (shot, middle)):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        if path != middle:
+            scenes.make_arm(sides=6, rings=5)
+        path.parent.mkdir(parents=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        content = bpy.data.collections.new(path.stem)
+        bpy.context.scene.collection.children.link(content)
+        if library is None:
+            content.objects.link(bpy.data.objects["Arm"])
+        else:
+            with bpy.data.libraries.load(str(library), link=True, relative=True) as (_, to):
+                to.collections = [library.stem]
+            instance = bpy.data.objects.new("Instance", None)
+            instance.instance_type, instance.instance_collection = "COLLECTION", to.collections[0]
+            content.objects.link(instance)
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    out = tmp_path / "out"
+    run_sinew("reskin", shot, "--method", "dq", "--out", out, *FAST, status=1)
+    assert report_of(out)["shot.blend"]["notes"] == []
+    files.open_file(out / "shot.blend")
+    paths = {os.path.normpath(bpy.path.abspath(library.filepath)) for library in bpy.data.libraries}
+    assert paths == {str(base), str(middle)}
+
+
 @newest_only
 def test_200_files_on_one_machine_and_on_a_cluster(tmp_path):
     folder = tmp_path / "in"

@@ -273,3 +273,28 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
         for name in names:
             assert np.array_equal(scenes.final_points(bpy.data.objects[name]), expected[name]), name
     handlers.session.forget()
+
+
+def test_objects_that_move_beside_their_armatures():
+    """Their places are of the frame when Sinew is asked, whichever thread of Blender's is the first: several
+    objects, which one action moves."""
+    objects = [scenes.make_arm(sides=6, rings=9, name=name)[0] for name in ("One", "Two", "Three")]
+    first = objects[0]
+    first.keyframe_insert("location", frame=1)
+    first.location.x = 2.0
+    first.keyframe_insert("location", frame=11)
+    for obj in objects[1:]:
+        animation = obj.animation_data_create()
+        animation.action = first.animation_data.action
+        if hasattr(animation, "action_slot"):
+            animation.action_slot = first.animation_data.action_slot
+    frames = range(1, 12)
+    wanted = [scenes.modifier_shapes(obj, frames, preserve_volume=False) for obj in objects]
+    for obj in objects:
+        scenes.add_sinew(obj, "lbs")
+    for _again in range(3):
+        for index, frame in enumerate(frames):
+            bpy.context.scene.frame_set(frame)
+            for obj, expected in zip(objects, wanted, strict=True):
+                off = scenes.worst(scenes.final_points(obj), expected[index])
+                assert off <= scenes.TOLERANCE * scenes.diagonal(obj), (obj.name, frame)

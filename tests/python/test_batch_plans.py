@@ -10,6 +10,7 @@ from sinew_addon.batch.inputs import plan_jobs
 from sinew_addon.batch.job_file import Settings, read_job_file
 from sinew_addon.batch.journal import NAME, Journal, stamp
 from sinew_addon.core.errors import SinewError, WrongUse
+from sinew_addon.core.names import fits
 
 METHODS = ("lbs", "dq")
 
@@ -75,6 +76,44 @@ def test_a_list_keeps_the_tree_below_what_its_files_have_in_common(studio):
 def test_a_name_with_brackets_is_a_name_where_it_exists(studio):
     (studio / "b[1].blend").touch()
     assert planned(["b[1].blend"]) == {"b[1].blend": "out/b[1].blend"}
+
+
+def test_a_folder_with_brackets_is_no_pattern(studio, monkeypatch):
+    folder = studio / "take [2]" / "old"
+    folder.mkdir(parents=True)
+    (folder / "b.blend").touch()
+    found = {"take [2]/old/b.blend": "out/b.blend"}
+    assert planned([str(studio / "take [2]" / "old" / "*.blend")]) == found
+    assert planned(["take [2]/**/*.blend"]) == {"take [2]/old/b.blend": "out/old/b.blend"}
+    monkeypatch.chdir(studio / "take [2]")
+    assert planned(["old/*.blend"]) == {"old/b.blend": "out/b.blend"}
+
+
+def test_linked_folders_and_their_circles(studio):
+    (studio / "chars" / "guests").symlink_to(studio)
+    elsewhere = studio.parent / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "c.blend").touch()
+    (studio / "chars" / "more").symlink_to(elsewhere)
+    assert set(planned(["chars"])) == {"chars/hero.blend", "chars/old/hero.blend", "chars/more/c.blend"}
+
+
+def test_bakes_beside_copies_are_not_inputs(studio):
+    for name in ("hero.baked.blend", "half.baked.blend"):
+        (studio / "chars" / name).touch()
+    found = {"chars/half.baked.blend", "chars/hero.blend", "chars/old/hero.blend"}
+    # Somebody's own, as no batch has been at work there.
+    assert set(planned(["chars"])) == {*found, "chars/hero.baked.blend"}
+    (studio / NAME).touch()
+    assert set(planned(["chars"])) == set(planned(["chars/**/*.blend"])) == found
+    assert set(planned(["chars/hero.baked.blend"])) == {"chars/hero.baked.blend"}
+
+
+def test_names_and_patterns_of_names():
+    assert fits("Cape.001", "Cape*")
+    assert fits("Arm[1]", "Arm[1]")
+    assert fits("Arm1", "Arm[1]")
+    assert not fits("cape", "Cape")
 
 
 def test_copies_of_an_earlier_run_are_not_inputs(studio):
@@ -155,6 +194,19 @@ def test_settings_of_files(tmp_path):
     assert job.settings_of(Path("/x/hero.blend"), given).include == ("Body",)
 
 
+def test_names_of_files_with_brackets(tmp_path):
+    job = read(tmp_path, JOB.replace('"hero*.blend", "old/*.blend"', '"take [2]/*.blend", "b[1].blend"'))
+    assert job.settings_of(Path("/x/b[1].blend"), Settings()).method == "dq"
+    assert job.settings_of(Path("/x/b1.blend"), Settings()).method == "dq"
+    assert job.settings_of(Path("/x/b[2].blend"), Settings()).method == "lbs"
+    # As a pattern has it, its first folder is "take 2".
+    assert job.settings_of(Path("/x/take 2/a.blend"), Settings()).method == "dq"
+
+
+def test_a_byte_order_mark_is_no_key(tmp_path):
+    assert read(tmp_path, "\ufeff" + JOB).settings.method == "lbs"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "sentence"),
     [
@@ -166,6 +218,7 @@ def test_settings_of_files(tmp_path):
         ('method = "dq"\nexclude', 'methd = "dq"\nexclude', 15, "methd: no such key"),
         ('match = "Face*"\nmethod = "lbs"', 'match = "Face*"\nmethod = "dqs"', 20, "got 'dqs'"),
         ('match = "Face*"\n', "match = []\n", 19, "match: expected text in quotes"),
+        ('match = ["hero*.blend", "old/*.blend"]', 'match = "."', 14, "match: expected paths such as"),
         (
             "[[files.objects]]",
             "[files.objects]",
@@ -211,6 +264,8 @@ def test_bakes_and_scale_of_files_and_objects(tmp_path):
         {"match": "Cape", "bake": []},
         {"match": "Face", "scale": "4.0", "bake": ["shape-keys"]},
     ]
+    # In any order, as they are sorted.
+    assert read(tmp_path, BAKES.replace('"1-48"', '"3,2,4,2"')).settings.bake_frames == "3,2,4,2"
     # A rule's frames can be wrong for what the whole file bakes.
     job = read(tmp_path, BAKES.replace('"2-5"', '"2,5"'))
     with pytest.raises(WrongUse, match="usd: Blender exports every frame of a range"):
@@ -225,6 +280,7 @@ def test_bakes_and_scale_of_files_and_objects(tmp_path):
         ('"usd", "mdd"', '"pc2", "mdd"', 2, "an object can have one of pc2, mdd"),
         ('"1-48"', '"1-"', 3, "bake_frames: expected frames such as"),
         ('"1-48"', '"1,5"', 3, "usd: Blender exports every frame"),
+        ('"1-48"', '"-3-5"', 3, "usd: Blender exports no frames before 0"),
         ("bake = []\n", "", 5, "nothing is said of these objects"),
         ('bake = "shape-keys"', "bake = 3", 16, "bake: expected a list"),
         ('"4.0"', "4.0", 17, "scale: expected text in quotes, got 4.0"),
