@@ -30,23 +30,20 @@ _PREFIX = "sinew_"
 
 @dataclass(frozen=True)
 class _Variable:
-    """What a variable reads: a property, or where no path is given the place of an object."""
+    """What a variable reads."""
 
     target: bpy.types.ID
-    path: str = ""
+    path: str
 
     def is_read_by(self, variable: bpy.types.DriverVariable) -> bool:
         target = variable.targets[0]
-        kind = "SINGLE_PROP" if self.path else "TRANSFORMS"
-        return variable.type == kind and target.id == self.target and target.data_path == self.path
+        return variable.type == "SINGLE_PROP" and target.id == self.target and target.data_path == self.path
 
     def add_to(self, driver: bpy.types.Driver, name: str) -> None:
         variable = driver.variables.new()
         variable.name = name
-        variable.type = "SINGLE_PROP" if self.path else "TRANSFORMS"
         target = variable.targets[0]
-        if self.path:
-            target.id_type = self.target.id_type
+        target.id_type = self.target.id_type
         target.id = self.target
         target.data_path = self.path
 
@@ -63,9 +60,8 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
     if asking:
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
-        variables += [_Variable(each) for each in armatures]
-        # Of the driver's own object Blender waits only for properties, not for its place.
-        variables.append(_Variable(obj, PLACE))
+        # By a property, as Blender reads the transforms of the driver's own object without waiting for them.
+        variables += [_Variable(each, PLACE) for each in (*armatures, obj)]
         if obj.data.shape_keys is not None:
             variables.append(_Variable(obj.data.shape_keys, "eval_time"))
         variables += [_Variable(obj, ASK_FOR_OBJECT), _Variable(obj.data, ASK_FOR_MESH)]
