@@ -296,6 +296,11 @@ def _frames(
     mode       the depsgraph's
     """
     method, scale_rule = settings.method, settings.scale_rule
+    if not (method and scale_rule):
+        raise SinewError(
+            f"{evaluated.name}: the driver of its method or scale gives a number that stands for none; "
+            f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
+        )
     frames: list[LinkFrame | None] = []
     for link, stand_in, armature, keyed in zip(
         driven.chain.links, settings.stand_ins, armatures, driven.keyed, strict=False

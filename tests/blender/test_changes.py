@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from sinew_addon.blender import drive, evaluate, mesh_io, properties
+from sinew_addon.blender import drive, evaluate, handlers, mesh_io, properties
 from test_editing import assert_follows
 
 
@@ -252,6 +252,22 @@ def test_registered_with_a_driven_file_open():
     bpy.context.scene.frame_set(3)
     bpy.context.scene.frame_set(11)
     assert scenes.worst(shown, scenes.final_points(obj)) <= 1e-6
+
+
+def test_a_driver_that_gives_no_method_is_said_so():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    driver = obj.driver_add("sinew.method").driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.targets[0].id, variable.targets[0].data_path = obj, '["number"]'
+    for number, error in ((1, ""), (7, "the driver of its method")):
+        obj["number"] = number
+        handlers.rebind(obj, bpy.context)
+        bpy.context.scene.frame_set(11)
+        bpy.context.view_layer.update()
+        assert error in properties.of(obj).error
+    assert not properties.of(obj).enabled
 
 
 def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkeypatch):
