@@ -16,7 +16,7 @@ FROM_ATTRIBUTE = "VERTEX"
 
 def sync(driven: Iterable[bpy.types.Object]) -> None:
     """Brings the file and the views in line with which of the driven objects show a heat map."""
-    shown = [obj for obj in driven if properties.of(obj).heat]
+    shown = [obj for obj in driven if properties.of(obj).heat and properties.of(obj).enabled]
     _choose_attributes({obj.data for obj in shown if obj.data.is_editable})
     _choose_colours(bool(shown))
     heat_legend.show(bool(shown))

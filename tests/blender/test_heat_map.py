@@ -265,6 +265,20 @@ def test_switched_off_it_leaves_no_trace(set_up):
     assert whole_file.differences(before_sinew, whole_file.of_open_file()) == []
 
 
+def test_while_sinew_is_off_views_are_as_they_were():
+    obj, types = painted_arm(), color_types()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(6)
+    bpy.ops.sinew.heat_map()
+    colours = shown_colours(obj)
+    properties.of(obj).enabled = False
+    assert color_types() == types
+    assert obj.data.attributes.active_color_name == "Second"
+    properties.of(obj).enabled = True
+    assert set(color_types()) == {"VERTEX"}
+    np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
+
+
 def test_a_saved_file_keeps_it_and_gives_all_back(tmp_path):
     obj = painted_arm()
     types = color_types()
