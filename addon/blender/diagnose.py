@@ -132,11 +132,18 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     mesh.vertices.foreach_get("hide", hidden)
     # What is hidden can not be selected.
     mesh.vertices.foreach_set("hide", hidden & ~chosen)
-    mesh.vertices.foreach_set("select", chosen)
-    for elements in (mesh.edges, mesh.polygons):
-        elements.foreach_set("select", np.zeros(len(elements), dtype=bool))
     context.tool_settings.mesh_select_mode = (True, False, False)
     bpy.ops.object.mode_set(mode="EDIT")
+    # Not by foreach_set before that: Blender 5.0 crashed in it, on edges or faces of a mesh with hidden ones.
+    edited = bmesh.from_edit_mesh(mesh)
+    for elements in (edited.faces, edited.edges, edited.verts):
+        for element in elements:
+            element.select = False
+    edited.verts.ensure_lookup_table()
+    for index in finding.vertices:
+        edited.verts[index].select = True
+    edited.select_flush_mode()
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
     return len(finding.vertices)
 
 
