@@ -138,9 +138,8 @@ def bones_from_model(
     if mesh_world == armature_world:
         return SAME_SPACE
     try:
-        space = np.linalg.inv(np.array(armature_world, dtype=np.float64)) @ np.array(
-            mesh_world, dtype=np.float64
-        )
+        armature_from_world = np.linalg.inv(np.array(armature_world, dtype=np.float64))
+        space = armature_from_world @ np.array(mesh_world, dtype=np.float64)
         np.linalg.inv(space)
     except np.linalg.LinAlgError:
         return None

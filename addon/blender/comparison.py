@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core import side_by_side
 from ..core.errors import SinewError
+from ..core.spaces import transformed
 from . import (
     actions,
     carrier,
@@ -179,7 +180,7 @@ def _remove_left_over() -> None:
 def corners(evaluated: bpy.types.Object) -> np.ndarray:
     """float64 [8, 3]: of the box around an evaluated object, in the world."""
     matrix = np.array(evaluated.matrix_world)
-    return np.array([tuple(corner) for corner in evaluated.bound_box]) @ matrix[:3, :3].T + matrix[:3, 3]
+    return transformed(np.array([tuple(corner) for corner in evaluated.bound_box]), matrix)
 
 
 def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
@@ -187,7 +188,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
-    copy.name = f"{obj.name} {evaluate.method_label(method)}"
+    copy.name = f"{obj.name} {properties.method_label(method)}"
     scale_rule = properties.of(obj).scale_rule if properties.is_driven(obj) else None
     _take_sinew_off(copy)
     for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:

@@ -51,7 +51,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     for method in comparison_state.shown_methods(state):
         copies = groups.get(method, [])
         if copies:
-            found.append((evaluate.method_label(method), tuple(copies[0].color[:3]), copies))
+            found.append((properties.method_label(method), tuple(copies[0].color[:3]), copies))
     depsgraph = context.evaluated_depsgraph_get()
     placed = [(text, colour, _top(objects, context, depsgraph)) for text, colour, objects in found]
     return [label for label in placed if label[2] is not None]
@@ -59,7 +59,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
 
 def _method_label(obj: bpy.types.Object) -> str:
     driven = properties.is_driven(obj) and properties.of(obj).standing_in
-    return evaluate.method_label(properties.of(obj).method if driven else evaluate.BLENDER)
+    return properties.method_label(properties.of(obj).method if driven else evaluate.BLENDER)
 
 
 def _top(

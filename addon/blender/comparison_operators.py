@@ -56,7 +56,7 @@ class SINEW_OT_compare(bpy.types.Operator):
             *((m.name, m.label, m.description) for m in properties.METHODS.values()),
             (
                 evaluate.BLENDER,
-                evaluate.method_label(evaluate.BLENDER),
+                properties.method_label(evaluate.BLENDER),
                 "As it stands in the stack, without Sinew",
             ),
         ],
@@ -134,7 +134,7 @@ class SINEW_OT_flip_comparison(_WhileComparing, bpy.types.Operator):
         else:
             state.shows_second = not state.shows_second
         (shown,) = comparison_state.shown_methods(state)
-        self.report({"INFO"}, evaluate.method_label(shown))
+        self.report({"INFO"}, properties.method_label(shown))
         return {"FINISHED"}
 
 

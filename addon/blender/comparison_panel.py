@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import comparison, comparison_state, evaluate
+from . import comparison, comparison_state, properties
 from .sidebar import Sidebar, draw_text
 
 
@@ -46,7 +46,7 @@ def _draw_arrangement(
         column.prop(state, "second", text="")
         (shown,) = comparison_state.shown_methods(state)
         layout.operator("sinew.flip_comparison", text="Flip", icon="UV_SYNC_SELECT")
-        draw_text(layout, context, f"Shown: {evaluate.method_label(shown)}")
+        draw_text(layout, context, f"Shown: {properties.method_label(shown)}")
 
 
 CLASSES = (SINEW_PT_comparison,)

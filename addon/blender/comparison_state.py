@@ -16,7 +16,9 @@ def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
 
 def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
     names = evaluate.method_names()
-    return [(name, evaluate.method_label(name), "", "NONE", names.index(name)) for name in methods_of(state)]
+    return [
+        (name, properties.method_label(name), "", "NONE", names.index(name)) for name in methods_of(state)
+    ]
 
 
 class SinewComparison(bpy.types.PropertyGroup):

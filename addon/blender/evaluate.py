@@ -15,7 +15,7 @@ from ..core.errors import SinewError, WrongUse
 from ..core.spaces import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from . import animation, drive, handlers, mesh_io, properties
-from .properties import BLENDER, method_label  # noqa: F401
+from .properties import BLENDER
 
 
 def method_names() -> list[str]:

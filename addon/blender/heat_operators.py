@@ -7,23 +7,11 @@ from collections.abc import Iterator
 
 import bpy
 
-from . import evaluate, measures, operators, properties, stepped, worst_frames
+from . import evaluate, measures, properties, stepped, worst_frames
+from .operators import OnDriven, driven_targets
 
 
-def driven_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
-    return [obj for obj in operators.targets(context) if properties.is_driven(obj)]
-
-
-class _OnDriven:
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if driven_targets(context):
-            return True
-        cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
-        return False
-
-
-class SINEW_OT_heat_map(_OnDriven, bpy.types.Operator):
+class SINEW_OT_heat_map(OnDriven, bpy.types.Operator):
     bl_idname = "sinew.heat_map"
     bl_label = "Heat Map"
     bl_description = (
@@ -41,7 +29,7 @@ class SINEW_OT_heat_map(_OnDriven, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class _Scans(_OnDriven, stepped.Stepped):
+class _Scans(OnDriven, stepped.Stepped):
     saying = "Sinew measures frames"
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:

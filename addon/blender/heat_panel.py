@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.metrics import Measured
-from . import handlers, heat_operators, live, measures, properties, redraw, units, worst_frames
+from . import handlers, heat_operators, live, measures, operators, properties, redraw, units, worst_frames
 from .sidebar import Sidebar, draw_text
 
 # What the number is that a frame is bad by.
@@ -18,11 +18,11 @@ class SINEW_PT_measures(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(heat_operators.driven_targets(context))
+        return bool(operators.driven_targets(context))
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, measures.of(context.scene)
-        shown = any(properties.of(obj).heat for obj in heat_operators.driven_targets(context))
+        shown = any(properties.of(obj).heat for obj in operators.driven_targets(context))
         layout.operator("sinew.heat_map", icon="SHADING_RENDERED", depress=shown)
         layout.prop(settings, "quantity", text="")
         draw_text(layout, context, settings.metric.text)
@@ -47,7 +47,7 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
         # Blender asks only what is open and visible to draw itself: elsewhere nothing is measured.
         redraw.wanted = True
         settings = measures.of(context.scene)
-        pairs = handlers.states_of(heat_operators.driven_targets(context))
+        pairs = handlers.states_of(operators.driven_targets(context))
         # As it was evaluated last: while drawing nothing may be evaluated, for that can write.
         depsgraph = context.view_layer.depsgraph
         subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None

@@ -45,7 +45,7 @@ def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return sorted(meshes, key=lambda o: o != active)
 
 
-def _driven_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
+def driven_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in targets(context) if properties.is_driven(obj)]
 
 
@@ -95,23 +95,23 @@ class SINEW_OT_add(bpy.types.Operator):
         return result
 
 
-class _OnDriven:
+class OnDriven:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _driven_targets(context):
+        if driven_targets(context):
             return True
         cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
         return False
 
 
-class SINEW_OT_rebind(_OnDriven, bpy.types.Operator):
+class SINEW_OT_rebind(OnDriven, bpy.types.Operator):
     bl_idname = "sinew.rebind"
     bl_label = "Rebind"
     bl_description = "Read mesh, weights and bones anew, and switch on again after an error"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = _driven_targets(context)
+        objects = driven_targets(context)
         result = _for_each(self, objects, lambda obj: handlers.rebind(obj, context), "Rebound")
         failed = [properties.of(obj).error for obj in objects if properties.of(obj).error]
         if failed:
@@ -120,20 +120,20 @@ class SINEW_OT_rebind(_OnDriven, bpy.types.Operator):
         return result
 
 
-class SINEW_OT_remove(_OnDriven, bpy.types.Operator):
+class SINEW_OT_remove(OnDriven, bpy.types.Operator):
     bl_idname = "sinew.remove"
     bl_label = "Remove"
     bl_description = "Take Sinew off and give the Armature modifier back as it was"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = _driven_targets(context)
+        objects = driven_targets(context)
         result = _for_each(self, objects, drive.remove, "Removed Sinew from")
         handlers.session.forget()
         return result
 
 
-class SINEW_OT_bake(_OnDriven, bpy.types.Operator):
+class SINEW_OT_bake(OnDriven, bpy.types.Operator):
     bl_idname = "sinew.bake"
     bl_label = "Bake"
     bl_description = "Write what Sinew deforms as data that plays without it"
@@ -240,7 +240,7 @@ class SINEW_OT_bake(_OnDriven, bpy.types.Operator):
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
         suffix = bake.suffix_of(self.kind)
         target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
-        return bake.start(_driven_targets(context), self.kind, frames[:: self.step], target, self.overwrite)
+        return bake.start(driven_targets(context), self.kind, frames[:: self.step], target, self.overwrite)
 
     def _finish(self, started: bake.Started) -> set[str]:
         started.publish()

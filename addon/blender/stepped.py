@@ -107,7 +107,7 @@ def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], o
 def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) -> Iterator[None]:
     """Inside, go to any frame; afterwards the scene is at its own, and armatures are posed as they were,
     keyed or not."""
-    frame = scene.frame_current + scene.frame_subframe
+    frame = scene.frame_float
     poses = [(armature, pose_io.read_channels(armature.pose.bones)) for armature in armatures]
     try:
         yield

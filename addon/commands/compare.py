@@ -177,7 +177,7 @@ def _measure(
     args: argparse.Namespace,
     console: Console,
 ) -> Comparison:
-    from ..blender import evaluate, measure
+    from ..blender import evaluate, measure, properties
 
     batches = measure.batches(subject, frames, len(methods) + 1)
     summaries, times, own = ({method: [] for method in methods} for _ in range(3))
@@ -193,7 +193,7 @@ def _measure(
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],
-        {method: evaluate.method_label(method) for method in methods},
+        {method: properties.method_label(method) for method in methods},
         args.reference,
         evaluate.length_unit(subject.scene),
         rest,

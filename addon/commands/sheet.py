@@ -25,7 +25,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     where the methods differ most and the volume against the rest pose."""
     import bpy
 
-    from ..blender import evaluate, files, measure, render
+    from ..blender import evaluate, files, measure, properties, render
 
     require_pillow()
     if args.out.suffix.lower() != ".png":
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
                 pictures.append(Path(folder) / f"{method}-{index}.png")
                 studio.picture(view, pictures[-1])
             note = f"volume {100 * volumes[method] / rest:.1f} % of rest" if rest else "no volume"
-            columns.append(Column(f"{evaluate.method_label(method)} ({method})", note, pictures))
+            columns.append(Column(f"{properties.method_label(method)} ({method})", note, pictures))
         names = ", ".join(obj.name for obj in meshes)
         title = f"{path.name}: {names}, frame {frame}"
         write_sheet(title, columns, [name for name, _view in views], args.out)
