@@ -286,9 +286,9 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 @persistent
 def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     before_update(scene, depsgraph)
-    if session.idle or session.objects is None or not is_allowed():
+    if not any(state.dirtied_by_frames for state in session.driven.values()) or not is_allowed():
         return
-    for obj in session.objects:
+    for obj in session.objects or ():
         state = state_of(obj)
         if state is not None and state.dirtied_by_frames:
             session.gate.close(obj)
