@@ -19,7 +19,8 @@ from ..core.output import remove
 from ..core.views import seen_extent, whole_view
 from . import bake_copy, comparison, drive, evaluate, files, handlers, properties, render, stack
 
-PICTURE_SIZE = 360
+# Twice what the report shows them at.
+PICTURE_SIZE = 720
 # Frames that a comparison looks at where none are named.
 SAMPLES = 9
 
@@ -276,7 +277,7 @@ def _draw(
     view = whole_view([seen_extent(before), seen_extent(evaluate.world_points(objects))])
     stem.parent.mkdir(parents=True, exist_ok=True)
     paths = {name: stem.with_name(f"{stem.name}-{name}.png") for name in ("after", "before")}
-    studio = render.Studio(scene, objects, _engine(), PICTURE_SIZE)
+    studio = render.Studio(scene, objects, _engine(), PICTURE_SIZE, halved=True)
     studio.picture(view, paths["after"])
     evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
     studio.picture(view, paths["before"])

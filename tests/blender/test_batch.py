@@ -327,6 +327,9 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
         for name in ("before", "after")
     )
     assert before[..., 3].std() > 20, "an empty picture"
+    # Drawn at twice the size that the page shows, without smoothing of its own.
+    assert max(before.shape[:2]) == 720
+    assert len(np.unique(before[..., 3])) <= 5
     assert 0.5 < np.abs(before - after).mean() < 100
 
     class Reader(HTMLParser):
@@ -344,6 +347,7 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
     page = Reader()
     page.feed((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
     assert [(tmp_path / "out" / image).exists() for image in page.images] == [True, True]
+    assert "max-width: 360px; max-height: 360px" in page.text
     assert "is not a .blend file" in page.text
     assert "Armature, linear blend → dq" in page.text
 
