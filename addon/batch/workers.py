@@ -14,7 +14,7 @@ import threading
 import uuid
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -22,6 +22,7 @@ from queue import SimpleQueue
 import sinew
 
 from ..core.errors import SinewError
+from ..core.opengl import usual_engine
 from .blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from .journal import UNFINISHED, content_hash, stamp
 
@@ -46,10 +47,15 @@ class _Blenders:
         self._idle: list[BlenderProcess] = []
         self._busy: set[BlenderProcess] = set()
         self._stopped = False
+        self._engine: Future[str] | None = None
 
     def run(self, task: dict, limits: Limits) -> dict:
+        # Found out once for all, while the first ones start.
+        engine = self._look_for_engine() if task["pictures"] is not None else None
         blender = self._take(limits)
         try:
+            if engine is not None:
+                task = {**task, "engine": engine.result()}
             outcome = blender.run(task, limits)
         finally:
             with self._lock:
@@ -60,6 +66,14 @@ class _Blenders:
             with self._lock:
                 self._idle.append(blender)
         return outcome
+
+    def _look_for_engine(self) -> Future[str]:
+        with self._lock:
+            if self._engine is None:
+                aside = ThreadPoolExecutor(1)
+                self._engine = aside.submit(usual_engine)
+                aside.shutdown(wait=False)
+            return self._engine
 
     def _take(self, limits: Limits) -> BlenderProcess:
         with self._lock:

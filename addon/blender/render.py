@@ -7,8 +7,6 @@ looked at.
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -19,29 +17,11 @@ from mathutils import Matrix
 
 from ..core.errors import SinewError, WrongUse
 from ..core.heat import linear
+from ..core.opengl import usual_engine
 from ..core.views import View, camera_axes
 
 CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
-_PROBE = (
-    "import bpy; s = bpy.context.scene; s.render.engine = 'BLENDER_WORKBENCH'; "
-    "s.render.resolution_x = s.render.resolution_y = 8; bpy.ops.render.render()"
-)
-
-
-def has_opengl() -> bool:
-    """Whether Workbench can render here. Tried in a process of its own: without OpenGL, Blender aborts."""
-    if bpy.app.binary_path:
-        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-expr", _PROBE]
-    else:  # bpy as a module
-        command = [sys.executable, "-c", _PROBE]
-    try:
-        probe = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return probe.returncode == 0
 
 
 def check_size(size: int) -> None:
@@ -53,11 +33,10 @@ def chosen_engine(wanted: str) -> str:
     """ "workbench" or "cycles", wanted by name or "auto". Raises SinewError where it can not render here."""
     if wanted == "cycles":
         return wanted
-    if has_opengl():
-        return "workbench"
-    if wanted == "workbench":
+    engine = usual_engine(bpy.app.binary_path)
+    if wanted not in ("auto", engine):
         raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
-    return "cycles"
+    return engine
 
 
 class Studio:
