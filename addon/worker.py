@@ -7,9 +7,14 @@ import json
 import os
 import signal
 import sys
+import tempfile
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
+from .batch.blender_process import DOING
+from .batch.journal import content_hash
 from .core.errors import SinewError
 
 Report = Callable[[str], None]
@@ -17,12 +22,14 @@ Report = Callable[[str], None]
 
 
 def run(task: dict, report: Report) -> dict:
-    """Does one task in this process: what became of it."""
+    """Does one task in this process: what became of it, and the hash of what was read."""
     from .blender import reskin
 
     actions = {"reskin": reskin.reskin, "restore": reskin.restore}
     try:
-        return actions[task["command"]](task, report)
+        # First: what is written to the file afterwards is then known to have changed it.
+        read = {"hash": content_hash(Path(task["source"]))}
+        return actions[task["command"]](task, report) | read
     except SinewError as error:
         return {"error": str(error)}
     except Exception as error:
@@ -44,13 +51,40 @@ def main() -> None:
     try:
         from .prepare import prepare_blender
 
-        prepare_blender()
+        with _only_on({int(number) for number in sys.argv[1:]}):
+            prepare_blender()
     except SinewError as error:
         answer({"refused": str(error)})
         return
     answer({"ready": True})
-    for line in tasks:
-        answer(run(json.loads(line), lambda doing: answer({"doing": doing})))
+    with Path(tempfile.gettempdir(), DOING).open("wb", buffering=0) as doing:
+
+        def report(what: str) -> None:
+            with suppress(OSError):  # as where the disk is full
+                doing.seek(0)
+                # At once, for it is read at any moment; blanks over what was there.
+                doing.write(f"{what:80}".encode())
+
+        for line in tasks:
+            report("starting on it")
+            answer(run(json.loads(line), report))
+
+
+@contextmanager
+def _only_on(processors: Collection[int]) -> Iterator[None]:
+    """A context in which this process has only those processors, if any are named: Blender makes threads for
+    those that it finds when it starts, and keeps to as many."""
+    if not processors:
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, processors)
+    try:
+        yield
+    finally:
+        for thread in os.listdir("/proc/self/task"):
+            with suppress(ProcessLookupError):  # it has ended
+                os.sched_setaffinity(int(thread), before)
 
 
 def _end_with_parent() -> None:

@@ -9,9 +9,9 @@ gets a fresh one.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
-import queue
 import signal
 import subprocess
 import sys
@@ -19,9 +19,12 @@ import tempfile
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..core.errors import SinewError
 
+# A file in the folder of a Blender that says what it is doing, for when it is lost.
+DOING = "doing"
 START_LIMIT = 180.0
 # How often a busy process is looked at.
 INTERVAL = 0.1
@@ -41,50 +44,59 @@ class Limits:
 
     timeout  seconds; 0: any time
     memory   bytes; 0: all there is
+    threads  of Blender at a time, where the system can tell it; 0: as many as there are processors
     verbose  show what Blender prints
     """
 
     timeout: float = 0.0
     memory: int = 0
+    threads: int = 0
     verbose: bool = False
 
 
 class BlenderProcess:
-    """One Blender. Raises SinewError where it can not be started."""
+    """One Blender, for one thread at a time. Raises SinewError where it can not be started."""
 
     def __init__(self, limits: Limits) -> None:
         # Blender keeps a folder there that it leaves behind when it is ended.
         self._folder = tempfile.TemporaryDirectory(prefix="sinew-", ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", __package__.rpartition(".")[0] + ".worker"],
+            [sys.executable, "-m", f"{__package__.rpartition('.')[0]}.worker", *_first_processors(limits)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=None if limits.verbose else subprocess.DEVNULL,
-            env={**os.environ, "TMPDIR": self._folder.name, "TEMP": self._folder.name},
+            env={**_environment(limits), "TMPDIR": self._folder.name, "TEMP": self._folder.name},
             # Ctrl-C in a terminal is for the batch, which ends its Blenders itself.
             start_new_session=True,
         )
-        self._messages: queue.SimpleQueue[dict | None] = queue.SimpleQueue()
-        threading.Thread(target=self._read, daemon=True).start()
-        self._doing = "starting"
-        answer = self._answer(Limits(START_LIMIT))
+        # Of what it is busy with, if it is; why it had to be ended.
+        self._limits: Limits | None = None
+        self._since = 0.0
+        self._excess: str | None = None
+        # Bytes, when it was looked at last.
+        self._size = 0
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+        self._begin(Limits(START_LIMIT))
+        answer = self._answer()
         if "refused" in answer:
             self.end()
             raise SinewError(answer["refused"])
 
     def run(self, task: dict, limits: Limits) -> dict:
         """What became of the file. Raises BlenderLost; the process is of no more use then."""
-        self._doing = "starting on it"
+        self._begin(limits)
         try:
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
         except OSError:
             raise BlenderLost(self._epitaph()) from None
-        return self._answer(limits)
+        return self._answer()
 
-    def has_grown(self, limits: Limits) -> bool:
+    def is_spent(self, limits: Limits) -> bool:
         """Whether the next file had better have a fresh process: what Blender does not give back adds up."""
-        return bool(limits.memory) and self._memory() > limits.memory / 2
+        return self._excess is not None or 0 < limits.memory / 2 < self._size
 
     def end(self) -> None:
         """Ends an idle process by asking, any other by force."""
@@ -93,47 +105,64 @@ class BlenderProcess:
         try:
             self._process.wait(timeout=5)
         except subprocess.TimeoutExpired:
-            self.kill()
-        self._folder.cleanup()
+            self._process.kill()
+        self._bury()
 
     def kill(self) -> None:
         self._process.kill()
-        self._process.wait()
-        self._folder.cleanup()
+        self._bury()
 
-    def _read(self) -> None:
-        for line in self._process.stdout:
-            self._messages.put(json.loads(line))
-        self._messages.put(None)
+    def _begin(self, limits: Limits) -> None:
+        with self._lock:
+            self._limits, self._since = limits, time.monotonic()
 
-    def _answer(self, limits: Limits) -> dict:
-        end = time.monotonic() + limits.timeout if limits.timeout else float("inf")
-        while True:
-            try:
-                message = self._messages.get(timeout=INTERVAL)
-            except queue.Empty:
-                if time.monotonic() > end:
-                    self.kill()
-                    raise BlenderLost(f"no end after {limits.timeout:g} s while {self._doing}") from None
-                if limits.memory and self._memory() > limits.memory:
-                    self.kill()
-                    size = f"{limits.memory / 2**20:,.0f} MiB"
-                    raise BlenderLost(f"needed more than {size} of memory while {self._doing}") from None
-                continue
-            if message is None:
-                raise BlenderLost(self._epitaph())
-            if "doing" not in message:
-                return message
-            self._doing = message["doing"]
+    def _answer(self) -> dict:
+        line = self._process.stdout.readline()
+        with self._lock:
+            self._limits = None
+        if not line.endswith(b"\n"):
+            raise BlenderLost(self._epitaph())
+        return json.loads(line)
+
+    def _watch(self) -> None:
+        """Ends the process where a file takes more than it may."""
+        while not self._ended.wait(INTERVAL):
+            # Either this or the file's end comes first: what was done in time is not lost.
+            with self._lock:
+                if self._limits is not None:
+                    self._excess = self._found_excess(self._limits)
+                if self._excess is not None:
+                    self._process.kill()
+                    return
+
+    def _found_excess(self, limits: Limits) -> str | None:
+        if limits.timeout and time.monotonic() > self._since + limits.timeout:
+            return f"no end after {limits.timeout:g} s while {self._doing()}"
+        if limits.memory:
+            self._size = self._memory()
+        if 0 < limits.memory < self._size:
+            return f"needed more than {limits.memory / 2**20:,.0f} MiB of memory while {self._doing()}"
+        return None
 
     def _epitaph(self) -> str:
         status = self._process.wait()
-        self._folder.cleanup()
         try:
             how = signal.Signals(-status).name
         except ValueError:
             how = f"status {status}"
-        return f"Blender crashed ({how}) while {self._doing}"
+        doing = self._doing()
+        self._bury()
+        return self._excess or f"Blender crashed ({how}) while {doing}"
+
+    def _bury(self) -> None:
+        self._process.wait()
+        self._ended.set()
+        self._folder.cleanup()
+
+    def _doing(self) -> str:
+        with contextlib.suppress(OSError):
+            return Path(self._folder.name, DOING).read_text(encoding="utf-8").strip() or "starting"
+        return "starting"
 
     def _memory(self) -> int:
         import psutil
@@ -142,3 +171,22 @@ class BlenderProcess:
             return psutil.Process(self._process.pid).memory_info().rss
         except psutil.Error:
             return 0
+
+
+_started = itertools.count()
+
+
+def _first_processors(limits: Limits) -> list[str]:
+    """Those to start a Blender on, each on others: it makes a thread for each that it may use then."""
+    if not limits.threads or not hasattr(os, "sched_getaffinity"):
+        return []
+    there = sorted(os.sched_getaffinity(0))
+    first = limits.threads * next(_started)
+    return [str(there[(first + index) % len(there)]) for index in range(min(limits.threads, len(there)))]
+
+
+def _environment(limits: Limits) -> dict[str, str]:
+    """This one's; Mesa's OpenGL without graphics hardware has threads, too: 0 are faster than 1."""
+    if not limits.threads:
+        return dict(os.environ)
+    return {"LP_NUM_THREADS": str(limits.threads if limits.threads > 1 else 0), **os.environ}

@@ -64,10 +64,15 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     else:
         return path.parent, [path]
     # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
+    resolved, resolve = out.resolve(), _Resolver()
+    may_be_below = resolved != root.resolve()
     files = [
         p
         for p in sorted(found)
-        if p.is_file() and not _is_below(p, out, root) and not p.name.endswith(UNFINISHED) and not _is_bake(p)
+        if p.is_file()
+        and not (may_be_below and resolved in resolve(p).parents)
+        and not p.name.endswith(UNFINISHED)
+        and not _is_bake(p)
     ]
     if not files:
         raise WrongUse(f"{given}: no {'.blend files in this folder' if path.is_dir() else 'file matches'}")
@@ -100,10 +105,11 @@ def _is_bake(path: Path) -> bool:
 
 
 def _check(jobs: list[Job]) -> None:
-    sources = {job.source.resolve() for job in jobs}
+    resolve = _Resolver()
+    sources = {resolve(job.source) for job in jobs}
     targets: dict[Path, Path] = {}
     for job in jobs:
-        target = job.target.resolve()
+        target = resolve(job.target)
         if target in sources:
             raise WrongUse(f"{job.target}: the copy would replace an input; choose another --out")
         other = targets.setdefault(target, job.source)
@@ -111,6 +117,16 @@ def _check(jobs: list[Job]) -> None:
             raise WrongUse(f"{other} and {job.source} would both be written to {job.target}")
 
 
-def _is_below(path: Path, out: Path, root: Path) -> bool:
-    out = out.resolve()
-    return out != root.resolve() and out in path.resolve().parents
+class _Resolver:
+    """Path.resolve() for many files in few folders: each folder is looked at once."""
+
+    def __init__(self) -> None:
+        self._resolved: dict[Path, Path] = {}
+
+    def __call__(self, path: Path) -> Path:
+        if path.is_symlink():
+            return path.resolve()
+        folder = path.parent
+        if folder not in self._resolved:
+            self._resolved[folder] = folder.resolve()
+        return self._resolved[folder] / path.name

@@ -8,6 +8,7 @@ in between, the next run only has to rename. A half-written last line is as if i
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 from collections.abc import Iterable
@@ -131,6 +132,17 @@ class Journal:
                 # A machine that lost its power can leave anything: such a file is done again.
                 continue
         return latest
+
+
+def content_hash(path: Path) -> str | None:
+    """Of what is in a file; None where it can not be read, which is for who opens it to say."""
+    try:
+        if not path.is_file():
+            return None
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "blake2b").hexdigest()[:32]
+    except OSError:
+        return None
 
 
 def stamp(path: Path) -> list[int]:

@@ -26,7 +26,7 @@ section { border-top: 1px solid var(--line); padding: 1rem 0; }
 .path { opacity: .7; overflow-wrap: anywhere; } .bad { color: var(--bad); } .note { color: var(--note); }
 .pair { display: flex; flex-wrap: wrap; gap: 1rem; margin-top: .6rem; }
 figure { margin: 0; } figcaption { opacity: .7; }
-img { max-width: 360px; background: #2a2c30; border-radius: 4px; }
+img { max-width: 360px; max-height: 360px; background: #2a2c30; border-radius: 4px; }
 .num { text-align: right; font-variant-numeric: tabular-nums; }
 """
 

@@ -8,21 +8,23 @@ take as much time for a small file as Blender takes to save it (bench/README.md)
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import importlib.metadata
 import logging
 import threading
 import uuid
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from functools import cache
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache, partial
 from pathlib import Path
+from queue import SimpleQueue
 
 import sinew
 
 from ..core.errors import SinewError
+from ..core.opengl import usual_engine
 from .blender_process import BlenderLost, BlenderProcess, Limits, Stopped
-from .journal import UNFINISHED, stamp
+from .journal import UNFINISHED, content_hash, stamp
 
 ATTEMPTS = 2
 CONNECT_LIMIT = 30.0
@@ -38,39 +40,46 @@ def versions() -> dict[str, str]:
 
 
 class _Blenders:
-    """The Blenders of this process, each kept for its next file.
-
-    slots  as many as there may be at a time; there may be one for each thread unless this is set
-    """
+    """The Blenders of this process, one for each thread that asks, each kept for its next file."""
 
     def __init__(self) -> None:
-        self.slots: contextlib.AbstractContextManager = contextlib.nullcontext()
         self._lock = threading.Lock()
         self._idle: list[BlenderProcess] = []
         self._busy: set[BlenderProcess] = set()
         self._stopped = False
+        self._engine: Future[str] | None = None
 
     def run(self, task: dict, limits: Limits) -> dict:
-        with self.slots:
-            return self._run(task, limits)
-
-    def _run(self, task: dict, limits: Limits) -> dict:
+        # Found out once for all, while the first ones start.
+        engine = self._look_for_engine() if task["pictures"] is not None else None
         blender = self._take(limits)
         try:
+            if engine is not None:
+                task = {**task, "engine": engine.result()}
             outcome = blender.run(task, limits)
         finally:
             with self._lock:
                 self._busy.discard(blender)
-        if blender.has_grown(limits):
+        if blender.is_spent(limits):
             blender.end()
         else:
             with self._lock:
                 self._idle.append(blender)
         return outcome
 
+    def _look_for_engine(self) -> Future[str]:
+        with self._lock:
+            if self._engine is None:
+                aside = ThreadPoolExecutor(1)
+                self._engine = aside.submit(usual_engine)
+                aside.shutdown(wait=False)
+            return self._engine
+
     def _take(self, limits: Limits) -> BlenderProcess:
         with self._lock:
-            blender = self._idle.pop() if self._idle and not self._stopped else None
+            if self._stopped:
+                raise Stopped
+            blender = self._idle.pop() if self._idle else None
         blender = blender or BlenderProcess(limits)
         with self._lock:
             self._busy.add(blender)
@@ -120,8 +129,8 @@ def do_task(
     journal.
     """
     source, target = Path(task["source"]), Path(task["target"])
-    facts = {"hash": _hash(source), "versions": versions()}
-    if facts == task["known"]:
+    facts = {"versions": versions()}
+    if task["known"] is not None and task["known"] == {**facts, "hash": content_hash(source)}:
         return {"unchanged": True}
     for attempt in range(1, ATTEMPTS + 1):
         facts["attempts"] = attempt
@@ -167,18 +176,28 @@ def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Ite
     interrupted, is given up.
     """
     versions()
-    _blenders.slots = threading.Semaphore(jobs)
-    # Those without a Blender have a task ready for the next that is free.
-    pool = ThreadPoolExecutor(2 * jobs)
-    task_of = {pool.submit(do_task, task, limits): task for task in tasks}
+    waiting, done = deque(tasks), SimpleQueue()
+
+    def work() -> None:
+        # Nothing else is done here, for as long as it takes a Blender waits.
+        with contextlib.suppress(IndexError):
+            while True:
+                task = waiting.popleft()
+                done.put((task, _outcome(task, partial(do_task, task, limits))))
+
+    # Its threads last until all is done, and must: a Blender ends with the thread that started it.
+    pool = ThreadPoolExecutor(jobs)
+    for _ in range(jobs):
+        pool.submit(work)
     end = _blenders.stop
     try:
-        for future in as_completed(task_of):
-            yield _outcome(task_of[future], future)
+        for _ in tasks:
+            yield done.get()
         end = _blenders.end
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        waiting.clear()
         end()
+        pool.shutdown(wait=False)
 
 
 def run_in_dask(tasks: Sequence[dict], limits: Limits, scheduler: str) -> Iterator[tuple[dict, dict]]:
@@ -201,16 +220,19 @@ def run_in_dask(tasks: Sequence[dict], limits: Limits, scheduler: str) -> Iterat
         try:
             # A worker that was lost has its file done by another; one that takes several along does not.
             for future in distributed.as_completed(futures):
-                yield _outcome(task_of[future.key], future)
+                task = task_of[future.key]
+                yield task, _outcome(task, future.result)
                 future.release()
         finally:
             client.cancel(futures)
             client.run(end_blenders)
 
 
-def _outcome(task: dict, future) -> tuple[dict, dict]:
-    error = future.exception()
-    return task, future.result() if error is None else {"error": f"{task['source']}: {_sentence(error)}"}
+def _outcome(task: dict, result: Callable[[], dict]) -> dict:
+    try:
+        return result()
+    except Exception as error:
+        return {"error": f"{task['source']}: {_sentence(error)}"}
 
 
 def _check_workers(client, scheduler: str) -> None:
@@ -241,14 +263,3 @@ def _sentence(error: BaseException) -> str:
         return "lost with each worker that took it on"
     lines = str(error).strip().splitlines()
     return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
-
-
-def _hash(path: Path) -> str | None:
-    """Of the file's content; None where it can not be read, which is for who opens it to say."""
-    try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "blake2b").hexdigest()[:32]
-    except OSError:
-        return None

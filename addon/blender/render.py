@@ -7,8 +7,6 @@ looked at.
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -19,29 +17,11 @@ from mathutils import Matrix
 
 from ..core.errors import SinewError, WrongUse
 from ..core.heat import linear
+from ..core.opengl import usual_engine
 from ..core.views import View, camera_axes
 
 CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
-_PROBE = (
-    "import bpy; s = bpy.context.scene; s.render.engine = 'BLENDER_WORKBENCH'; "
-    "s.render.resolution_x = s.render.resolution_y = 8; bpy.ops.render.render()"
-)
-
-
-def has_opengl() -> bool:
-    """Whether Workbench can render here. Tried in a process of its own: without OpenGL, Blender aborts."""
-    if bpy.app.binary_path:
-        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-expr", _PROBE]
-    else:  # bpy as a module
-        command = [sys.executable, "-c", _PROBE]
-    try:
-        probe = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return probe.returncode == 0
 
 
 def check_size(size: int) -> None:
@@ -53,20 +33,28 @@ def chosen_engine(wanted: str) -> str:
     """ "workbench" or "cycles", wanted by name or "auto". Raises SinewError where it can not render here."""
     if wanted == "cycles":
         return wanted
-    if has_opengl():
-        return "workbench"
-    if wanted == "workbench":
+    engine = usual_engine(bpy.app.binary_path)
+    if wanted not in ("auto", engine):
         raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
-    return "cycles"
+    return engine
 
 
 class Studio:
     """Renders nothing but some meshes, on a clear background."""
 
     def __init__(
-        self, scene: bpy.types.Scene, meshes: list[bpy.types.Object], engine: str, size: int
+        self,
+        scene: bpy.types.Scene,
+        meshes: list[bpy.types.Object],
+        engine: str,
+        size: int,
+        halved: bool = False,
     ) -> None:
-        """engine  "workbench" or "cycles"; size  pixels of a picture's longer side"""
+        """
+        engine  "workbench" or "cycles"
+        size    pixels of a picture's longer side
+        halved  pictures are shown at half their size, which smooths edges: fewer samples a pixel will do
+        """
         self.scene, self.engine, self._size = scene, engine, size
         for obj in scene.objects:
             obj.hide_render = obj not in meshes
@@ -77,9 +65,12 @@ class Studio:
         scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
         scene.collection.objects.link(scene.camera)
         if engine == "workbench":
-            _prepare_workbench(scene)
+            _prepare_workbench(scene, halved)
         else:
-            self._clay, self._heat = _prepare_cycles(scene)
+            self._clay, self._heat = _prepare_cycles(scene, halved)
+        if halved:
+            # Dither makes a file larger by half.
+            scene.render.dither_intensity = 0.0
         self._show_clay()
 
     def painted(
@@ -205,23 +196,24 @@ def _prepare_png(scene: bpy.types.Scene) -> None:
     settings.color_depth = "8"
 
 
-def _prepare_workbench(scene: bpy.types.Scene) -> None:
+def _prepare_workbench(scene: bpy.types.Scene, halved: bool) -> None:
     scene.render.engine = "BLENDER_WORKBENCH"
-    scene.display.render_aa = "8"
+    scene.display.render_aa = "OFF" if halved else "8"
     shading = scene.display.shading
     shading.type = "SOLID"
     shading.light = "STUDIO"
     shading.single_color = CLAY
-    shading.cavity_type = "BOTH"
+    # World space's is grainy in a single sample.
+    shading.cavity_type = "SCREEN" if halved else "BOTH"
     shading.show_shadows = shading.show_xray = shading.show_object_outline = False
     shading.show_backface_culling = False
 
 
-def _prepare_cycles(scene: bpy.types.Scene) -> tuple[bpy.types.Material, bpy.types.Material]:
+def _prepare_cycles(scene: bpy.types.Scene, halved: bool) -> tuple[bpy.types.Material, bpy.types.Material]:
     """Lights and noise; materials for clay and for heat."""
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
-    scene.cycles.samples = 16
+    scene.cycles.samples = 4 if halved else 16
     scene.cycles.use_denoising = False
     scene.world = bpy.data.worlds.new("Sinew World")
     scene.world.color = (0.25, 0.26, 0.28)

@@ -19,7 +19,8 @@ from ..core.output import remove
 from ..core.views import seen_extent, whole_view
 from . import bake_copy, comparison, drive, evaluate, files, handlers, properties, render, stack
 
-PICTURE_SIZE = 360
+# Twice what the report shows them at.
+PICTURE_SIZE = 720
 # Frames that a comparison looks at where none are named.
 SAMPLES = 9
 
@@ -44,7 +45,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
 
     task    "source", "target" and "unfinished" (where to save): paths; "settings" as of
             batch.job_file.Settings; "frames" to compare at ("auto", "none", or as typed); "pictures": the
-            beginning of two pictures' paths, or None
+            beginning of two pictures' paths, or None; "engine" to draw them, found out where it is missing
 
     Raises SinewError, and saves nothing, where no mesh can be driven.
     """
@@ -233,7 +234,8 @@ def _compare(task: dict, driven: list[tuple[bpy.types.Object, dict]], outcome: d
         )[1]
     if task["pictures"] is not None:
         with clock.doing("drawing"):
-            outcome["pictures"] = _draw(scene, shown, worst, Path(task["pictures"]))
+            engine = task.get("engine") or _engine()
+            outcome["pictures"] = _draw(scene, shown, worst, engine, Path(task["pictures"]))
 
 
 def _deviation(
@@ -244,9 +246,8 @@ def _deviation(
     if any(a.shape != b.shape for a, b in zip(ours, theirs, strict=True)):
         mesh["warnings"].append("a modifier behind changes the number of vertices: not compared")
         return 0.0, frames[0]
-    distances = [
-        float(np.linalg.norm(a - b, axis=1).max(initial=0.0)) for a, b in zip(ours, theirs, strict=True)
-    ]
+    between = [a - b for a, b in zip(ours, theirs, strict=True)]
+    distances = [float(np.sqrt(np.einsum("ij,ij->i", d, d).max(initial=0.0))) for d in between]
     index = int(np.argmax(distances))
     diagonal = float(np.linalg.norm(np.ptp(theirs[index], axis=0))) if len(theirs[index]) else 0.0
     part = distances[index] / diagonal if diagonal else 0.0
@@ -266,7 +267,11 @@ def _points(scene: bpy.types.Scene, objects: list[bpy.types.Object], frame: floa
 
 
 def _draw(
-    scene: bpy.types.Scene, shown: list[tuple[bpy.types.Object, dict]], frame: float, stem: Path
+    scene: bpy.types.Scene,
+    shown: list[tuple[bpy.types.Object, dict]],
+    frame: float,
+    engine: str,
+    stem: Path,
 ) -> dict:
     """Draws the meshes under their Armature modifiers, which are at work, and under Sinew."""
     objects = [obj for obj, _mesh in shown]
@@ -276,7 +281,7 @@ def _draw(
     view = whole_view([seen_extent(before), seen_extent(evaluate.world_points(objects))])
     stem.parent.mkdir(parents=True, exist_ok=True)
     paths = {name: stem.with_name(f"{stem.name}-{name}.png") for name in ("after", "before")}
-    studio = render.Studio(scene, objects, _engine(), PICTURE_SIZE)
+    studio = render.Studio(scene, objects, engine, PICTURE_SIZE, halved=True)
     studio.picture(view, paths["after"])
     evaluate.use_methods([(obj, evaluate.BLENDER) for obj in objects])
     studio.picture(view, paths["before"])

@@ -173,6 +173,8 @@ class _Workers:
         self._limits = Limits(
             timeout=1800.0 if args.timeout is None else args.timeout,
             memory=self._memory(args.memory),
+            # More only wait for each other.
+            threads=0 if args.scheduler is not None else max(1, _processors() // self._jobs),
             verbose=console.verbose,
         )
 
@@ -201,6 +203,11 @@ class _Workers:
             return dask.utils.parse_bytes(text)
         except ValueError:
             raise WrongUse(f"--memory: expected a size such as 4GiB, got {text!r}") from None
+
+
+def _processors() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _needs_python(option: str) -> str:

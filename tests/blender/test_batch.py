@@ -23,6 +23,8 @@ import pytest
 import scenes
 import whole_file
 from program import COMMAND, ENVIRONMENT, run_sinew
+from sinew_addon.batch.blender_process import BlenderProcess, Limits
+from sinew_addon.batch.job_file import Settings
 from sinew_addon.blender import files, properties
 from test_bake import read_elsewhere
 
@@ -327,6 +329,9 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
         for name in ("before", "after")
     )
     assert before[..., 3].std() > 20, "an empty picture"
+    # Drawn at twice the size that the page shows, without smoothing of its own.
+    assert max(before.shape[:2]) == 720
+    assert len(np.unique(before[..., 3])) <= 5
     assert 0.5 < np.abs(before - after).mean() < 100
 
     class Reader(HTMLParser):
@@ -344,6 +349,7 @@ def test_report_has_pictures_of_the_worst_frame(tmp_path):
     page = Reader()
     page.feed((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
     assert [(tmp_path / "out" / image).exists() for image in page.images] == [True, True]
+    assert "max-width: 360px; max-height: 360px" in page.text
     assert "is not a .blend file" in page.text
     assert "Armature, linear blend → dq" in page.text
 
@@ -429,6 +435,34 @@ def test_hang_crash_and_greed_fail_alone(tmp_path):
     assert "Blender crashed (SIGSEGV) while opening it; tried 2 times" in rows["a endless.blend"]["error"]
     assert rows["c good.blend"]["status"] == "unchanged"
     assert unfinished_in(out) == []
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system does not limit threads so")
+def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
+    """As many threads as it may have for its work, and none bound to a processor."""
+    there = os.sched_getaffinity(0)
+    if len(there) < 2:
+        pytest.skip("needs two processors")
+    rig = make_rig(tmp_path / "rig.blend")
+    settings = Settings(method="dq").as_task()
+    paths = {
+        "source": str(rig),
+        "target": str(tmp_path / "out.blend"),
+        "unfinished": str(tmp_path / "u.blend"),
+    }
+    task = {"command": "reskin", "settings": settings, "frames": "auto", "pictures": None, **paths}
+    counts = []
+    for threads in (0, 1):
+        blender = BlenderProcess(Limits(threads=threads))
+        try:
+            assert blender.run(task, Limits())["meshes"]
+            (process,) = psutil.Process().children()
+            own = [thread.id for thread in process.threads()]
+            assert all(os.sched_getaffinity(thread) == there for thread in own)
+        finally:
+            blender.end()
+        counts.append(len(own))
+    assert counts[1] < counts[0]
 
 
 @newest_only

@@ -17,7 +17,7 @@ SIZE = 96
 
 @pytest.fixture(scope="module")
 def figures(tmp_path_factory):
-    engine = "workbench" if render.has_opengl() else "cycles"
+    engine = render.chosen_engine("auto")
     scratch = tmp_path_factory.mktemp("pictures")
     made = report_figures.figures(REPOSITORY / "blend_files", engine, SIZE, scratch, lambda what: None)
     return {figure.number: figure for figure in made}
