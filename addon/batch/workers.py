@@ -85,7 +85,7 @@ class _Blenders:
             self._busy.add(blender)
             if not self._stopped:
                 return blender
-        blender.kill()
+        blender.end()
         raise Stopped
 
     def end(self) -> None:
@@ -102,7 +102,7 @@ class _Blenders:
             everyone = [*self._idle, *self._busy]
             self._idle = []
         for blender in everyone:
-            blender.kill()
+            blender.end()
 
 
 _blenders = _Blenders()
