@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender behind batch/blender_process.py: tasks come in as lines of JSON, outcomes go out."""
+"""The Blender behind blender_process.py: tasks come in as lines of JSON, outcomes go out."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from collections.abc import Callable
 
 from .core.errors import SinewError
 
-Report = Callable[[str], None]
-"""Told what is being done to the file, such as "opening it"."""
+Report = Callable[..., None]
+"""Told what is being done to the file, such as "opening it", and by keyword what else there is to know."""
 
 
 def run(task: dict, report: Report) -> dict:
     """Does one task in this process: what became of it."""
-    from .blender import reskin
+    from .blender import bake_apart, reskin
 
-    actions = {"reskin": reskin.reskin, "restore": reskin.restore}
+    actions = {"reskin": reskin.reskin, "restore": reskin.restore, "export": bake_apart.export}
     try:
         return actions[task["command"]](task, report)
     except SinewError as error:
@@ -50,7 +50,7 @@ def main() -> None:
         return
     answer({"ready": True})
     for line in tasks:
-        answer(run(json.loads(line), lambda doing: answer({"doing": doing})))
+        answer(run(json.loads(line), lambda doing, **more: answer({"doing": doing, **more})))
 
 
 def _end_with_parent() -> None:

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import sinew
 
+from ..blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from ..core.errors import SinewError
-from .blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from .journal import UNFINISHED, stamp
 
 ATTEMPTS = 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender in a process of its own that does one file after the other, watched from here.
+"""A Blender in a process of its own that does one task after the other, watched from here.
 
 Starting Blender takes 0.5 to 2 s, opening a file 10 ms and more: so a process is kept for the next file,
 which replaces all of the last one. One that crashes, hangs or grows too large is ended, and the next file
@@ -18,13 +18,17 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import dropwhile
 
-from ..core.errors import SinewError
+from .core.errors import SinewError
 
 START_LIMIT = 180.0
 # How often a busy process is looked at.
 INTERVAL = 0.1
+# What worker.py says first.
+GREETINGS = (b'{"ready"', b'{"refused"')
 
 
 class BlenderLost(Exception):  # noqa: N818
@@ -50,13 +54,16 @@ class Limits:
 
 
 class BlenderProcess:
-    """One Blender. Raises SinewError where it can not be started."""
+    """One Blender: of this Python, or another of the one that this is inside of.
 
-    def __init__(self, limits: Limits) -> None:
+    wait  until it is there; raises SinewError where it can not be started. Otherwise its first task does
+    """
+
+    def __init__(self, limits: Limits, wait: bool = True) -> None:
         # Blender keeps a folder there that it leaves behind when it is ended.
         self._folder = tempfile.TemporaryDirectory(prefix="sinew-", ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", __package__.rpartition(".")[0] + ".worker"],
+            _command(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=None if limits.verbose else subprocess.DEVNULL,
@@ -67,20 +74,27 @@ class BlenderProcess:
         self._messages: queue.SimpleQueue[dict | None] = queue.SimpleQueue()
         threading.Thread(target=self._read, daemon=True).start()
         self._doing = "starting"
-        answer = self._answer(Limits(START_LIMIT))
-        if "refused" in answer:
-            self.end()
-            raise SinewError(answer["refused"])
+        if wait:
+            next(message for message in self._heard(Limits(START_LIMIT)) if message)
 
     def run(self, task: dict, limits: Limits) -> dict:
         """What became of the file. Raises BlenderLost; the process is of no more use then."""
+        for message in self.follow(task, limits):
+            outcome = message
+        return outcome
+
+    def follow(self, task: dict, limits: Limits) -> Iterator[dict | None]:
+        """What is told of a task, its outcome last; None where INTERVAL passes without. Raises as run()."""
         self._doing = "starting on it"
         try:
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
         except OSError:
             raise BlenderLost(self._epitaph()) from None
-        return self._answer(limits)
+        for message in self._heard(limits):
+            yield message
+            if message is not None and not message.keys() & {"doing", "ready"}:
+                return
 
     def has_grown(self, limits: Limits) -> bool:
         """Whether the next file had better have a fresh process: what Blender does not give back adds up."""
@@ -102,11 +116,13 @@ class BlenderProcess:
         self._folder.cleanup()
 
     def _read(self) -> None:
-        for line in self._process.stdout:
+        # Before the worker is there, Blender and what it runs at its start print what they like.
+        for line in dropwhile(lambda line: not line.startswith(GREETINGS), self._process.stdout):
             self._messages.put(json.loads(line))
         self._messages.put(None)
 
-    def _answer(self, limits: Limits) -> dict:
+    def _heard(self, limits: Limits) -> Iterator[dict | None]:
+        """Each message, and None where there was none for INTERVAL s."""
         end = time.monotonic() + limits.timeout if limits.timeout else float("inf")
         while True:
             try:
@@ -119,12 +135,15 @@ class BlenderProcess:
                     self.kill()
                     size = f"{limits.memory / 2**20:,.0f} MiB"
                     raise BlenderLost(f"needed more than {size} of memory while {self._doing}") from None
+                yield None
                 continue
             if message is None:
                 raise BlenderLost(self._epitaph())
-            if "doing" not in message:
-                return message
-            self._doing = message["doing"]
+            if "refused" in message:
+                self.end()
+                raise SinewError(message["refused"])
+            self._doing = message.get("doing", self._doing)
+            yield message
 
     def _epitaph(self) -> str:
         status = self._process.wait()
@@ -142,3 +161,13 @@ class BlenderProcess:
             return psutil.Process(self._process.pid).memory_info().rss
         except psutil.Error:
             return 0
+
+
+def _command() -> list[str]:
+    bpy, package = sys.modules.get("bpy"), __package__
+    if bpy is None or not bpy.app.binary_path:
+        return [sys.executable, "-m", f"{package}.worker"]
+    as_here = ["--factory-startup"] if bpy.app.factory_startup else []
+    # The user's preferences as saved need not have it on.
+    with_sinew = ["--addons", package, "--python-expr", f"from {package}.worker import main; main()"]
+    return [bpy.app.binary_path, "--background", *as_here, "--python-exit-code", "1", *with_sinew]
