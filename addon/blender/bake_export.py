@@ -108,6 +108,8 @@ class SceneExport(_Export):
         path: Path,
         overwrite: bool,
     ) -> None:
+        if not getattr(bpy.app, kind).supported:
+            raise SinewError(f"This Blender is built without {kind}; bake to another kind")
         core.check_frames(kind, frames)
         self.meshes, self.kind, self.frames, self.path = meshes, kind, frames, path
         self.first, self.last = int(frames[0]), int(frames[-1])
