@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import argparse
 import atexit
-import os
 import re
-import shutil
 import sys
 
 from .core.errors import SinewError, WrongUse
-from .prepare import prepare_blender
+from .prepare import leave_blender, prepare_blender
 
 # The batches have Blenders of their own, or ask for this one; a report without Blender has no pictures.
 WITHOUT_BLENDER = ("methods", "report", "reskin", "restore")
@@ -90,8 +88,7 @@ def run() -> None:
     bpy = sys.modules.get("bpy")
     if bpy is not None and bpy.app.version < (4, 3) and "io_scene_gltf2.io.exp" in sys.modules:
         # Having exported glTF, Blender 4.2 as a module crashes in its own ending, all work done.
-        shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
-        os._exit(status)
+        leave_blender(status)
     sys.exit(status)
 
 

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes a plain Python with bpy ready for the commands."""
+"""Makes a plain Python with bpy ready for the commands, and ends it."""
 
 from __future__ import annotations
+
+import os
+import shutil
+from typing import NoReturn
 
 from .core.errors import SinewError
 
@@ -21,3 +25,11 @@ def prepare_blender() -> None:
     small_meshes.is_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
+
+
+def leave_blender(status: int) -> NoReturn:
+    """Ends the process at once, without Blender's own ending."""
+    import bpy
+
+    shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+    os._exit(status)

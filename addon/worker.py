@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender behind batch/blender_process.py: tasks come in as lines of JSON, outcomes go out."""
+"""The Blender behind blender_process.py: tasks come in as lines of JSON, outcomes go out."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .batch.blender_process import DOING
 from .batch.journal import content_hash
+from .blender_process import DOING, PROCESSORS
 from .core.errors import SinewError
 
-Report = Callable[[str], None]
-"""Told what is being done to the file, such as "opening it"."""
+Report = Callable[..., None]
+"""Told what is being done to the file, such as "opening it", and by keyword what else there is to know."""
 
 
 def run(task: dict, report: Report) -> dict:
     """Does one task in this process: what became of it, and the hash of what was read."""
-    from .blender import reskin
+    from .blender import bake_apart, reskin
 
-    actions = {"reskin": reskin.reskin, "restore": reskin.restore}
+    actions = {"reskin": reskin.reskin, "restore": reskin.restore, "export": bake_apart.export}
     try:
         # First: what is written to the file afterwards is then known to have changed it.
         read = {"hash": content_hash(Path(task["source"]))}
@@ -51,7 +51,7 @@ def main() -> None:
     try:
         from .prepare import prepare_blender
 
-        with _only_on({int(number) for number in sys.argv[1:]}):
+        with _only_on({int(number) for number in os.environ.get(PROCESSORS, "").split()}):
             prepare_blender()
     except SinewError as error:
         answer({"refused": str(error)})
@@ -59,11 +59,11 @@ def main() -> None:
     answer({"ready": True})
     with Path(tempfile.gettempdir(), DOING).open("wb", buffering=0) as doing:
 
-        def report(what: str) -> None:
+        def report(what: str, **more: object) -> None:
             with suppress(OSError):  # as where the disk is full
                 doing.seek(0)
                 # At once, for it is read at any moment; blanks over what was there.
-                doing.write(f"{what:80}".encode())
+                doing.write(json.dumps({"doing": what, **more}).ljust(120).encode())
 
         for line in tasks:
             report("starting on it")

@@ -69,8 +69,9 @@ def photograph(picture: Path) -> None:
     print("PHOTOGRAPHED", flush=True)
 
 
-def run(steps: Iterator[None]) -> None:
-    """One step a timer's tick, so that the window redraws and plays between them; then Blender ends."""
+def run(steps: Iterator[None], seconds: float = 1.0) -> None:
+    """One step a timer's tick, every so many seconds, so that the window redraws and plays between them; then
+    Blender ends."""
 
     def tick() -> float | None:
         try:
@@ -83,7 +84,7 @@ def run(steps: Iterator[None]) -> None:
             sys.stderr.flush()
             bpy.ops.wm.quit_blender()
             return None
-        return 1.0
+        return seconds
 
     bpy.context.preferences.view.show_splash = False
     bpy.app.timers.register(tick, first_interval=2.0, persistent=True)

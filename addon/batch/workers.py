@@ -21,9 +21,9 @@ from queue import SimpleQueue
 
 import sinew
 
+from ..blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from ..core.errors import SinewError
 from ..core.opengl import usual_engine
-from .blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from .journal import UNFINISHED, content_hash, stamp
 
 ATTEMPTS = 2

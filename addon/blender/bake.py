@@ -165,7 +165,7 @@ class Bake:
                     path = folder / f"{_file_name(obj, names)}.{kind}"
                     files.check_free(path, overwrite)
                     self.bakes.append(Cache(obj, frames, path, kind))
-        except SinewError:
+        except BaseException:
             self.discard()
             raise
         finally:

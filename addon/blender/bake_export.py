@@ -7,7 +7,7 @@ Like bake.Bake they go in steps: sample(), place(), publish(), discard().
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import bpy
@@ -55,13 +55,27 @@ def _usd(path: str, _first: int, _last: int) -> None:
 
 SCENES: dict[str, Callable[[str, int, int], None]] = {"alembic": _alembic, "usd": _usd}
 GLTF = "gltf"
+# The share of a glTF export that is done when its frames are read.
+SAMPLED = 0.5
 
 
 class _Export:
     """What ends as one file: written at `unfinished` first, then moved to `path`."""
 
+    kind: str
+    meshes: list[bpy.types.Object]
+    frames: Sequence[float]
     path: Path
     unfinished: Path
+
+    def told(self, share: float) -> None:
+        """Called with how much is done, 0 to 1, where sample() can not yield: within an exporter's one call.
+        Whoever wants to know puts a function here; it must not raise, as Blender goes on all the same."""
+
+    @contextmanager
+    def whole_in_a_copy(self) -> Iterator[None]:
+        """What is saved inside has all that the export takes."""
+        yield
 
     @property
     def what(self) -> str:
@@ -94,8 +108,10 @@ class SceneExport(_Export):
         path: Path,
         overwrite: bool,
     ) -> None:
+        if not getattr(bpy.app, kind).supported:
+            raise SinewError(f"This Blender is built without {kind}; bake to another kind")
         core.check_frames(kind, frames)
-        self.meshes, self.kind, self.path = meshes, kind, path
+        self.meshes, self.kind, self.frames, self.path = meshes, kind, frames, path
         self.first, self.last = int(frames[0]), int(frames[-1])
         self.textures = usd_textures.Textures(meshes if kind == "usd" else (), path, overwrite)
         self.unfinished = _prepare(meshes, frames, path)
@@ -106,7 +122,8 @@ class SceneExport(_Export):
         try:
             with _selected(self.meshes), self.textures.on_disk():
                 scene.frame_start, scene.frame_end = self.first, self.last
-                _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
+                with _told_frames(self, 0.0):
+                    _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
             for obj in self.meshes:
                 _check_driven(obj)
             yield 1.0
@@ -116,6 +133,9 @@ class SceneExport(_Export):
         finally:
             scene.frame_start, scene.frame_end = before[1:]
             evaluate.set_frame(scene, before[0])
+
+    def whole_in_a_copy(self) -> AbstractContextManager[None]:
+        return self.textures.on_disk()
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
@@ -132,7 +152,7 @@ class MorphExport(_Export):
 
     def __init__(self, meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> None:
         core.check_frames(GLTF, frames)
-        self.meshes, self.frames, self.path = meshes, frames, path
+        self.meshes, self.kind, self.frames, self.path = meshes, GLTF, frames, path
         self.unfinished = _prepare(meshes, frames, path)
         self.made: list[bpy.types.Object] = []
         self.samples: dict[bpy.types.Object, list[np.ndarray]] = {obj: [] for obj in meshes}
@@ -153,7 +173,7 @@ class MorphExport(_Export):
                             f"{frame:g}; morph targets need one number, bake to alembic or usd"
                         )
                     samples.append(points)
-                yield (number + 1) / (len(self.frames) + 1)
+                yield SAMPLED * (number + 1) / len(self.frames)
             evaluate.set_frame(scene, self.frames[0])
             self._make()
             with _unstretched(scene), _selected(self.made):
@@ -161,7 +181,8 @@ class MorphExport(_Export):
                 first, last = scene.frame_start, scene.frame_end
                 scene.frame_start, scene.frame_end = int(self.frames[0]), int(self.frames[-1])
                 try:
-                    _export(self._write, self)
+                    with _told_frames(self, SAMPLED):
+                        _export(self._write, self)
                 finally:
                     scene.frame_start, scene.frame_end = first, last
         except BaseException:
@@ -207,6 +228,8 @@ class MorphExport(_Export):
             check_existing=False,
             export_format="GLB",
             use_selection=True,
+            # Others have selections of their own.
+            use_active_scene=True,
             export_animations=True,
             # All meshes in one animation, which is what players play.
             export_animation_mode="ACTIVE_ACTIONS",
@@ -256,6 +279,24 @@ def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> Non
         raise SinewError(f"{export.path}: can not be written: {files.telling_line(error)}") from None
     if not export.unfinished.exists():
         raise SinewError(f"{export.path}: can not be written: Blender's exporter made no file")
+
+
+@contextmanager
+def _told_frames(export: SceneExport | MorphExport, start: float) -> Iterator[None]:
+    """Tells of each frame that an exporter goes to inside, from the share `start` on."""
+    done = 0
+
+    def on_frame(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+        nonlocal done
+        # At its end an exporter goes back to the frame that it came from.
+        done = min(done + 1, len(export.frames))
+        export.told(start + (1.0 - start) * done / len(export.frames))
+
+    bpy.app.handlers.frame_change_post.append(on_frame)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.frame_change_post.remove(on_frame)
 
 
 @contextmanager

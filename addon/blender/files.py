@@ -32,18 +32,19 @@ SKIPPABLE_HEADER = 8
 LAST_BLOCK = (24, 32)
 
 
-def open_file(path: Path, load_ui: bool = False) -> None:
+def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> None:
     """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
 
     load_ui  with the file's own windows and workspaces, which a copy of it is to keep
+    scripts  whether those in the file run
 
-    Raises SinewError where it can not be read. Scripts in the file do not run.
+    Raises SinewError where it can not be read.
     """
     _check_readable(path)
     try:
         importer = IMPORTERS.get(path.suffix.lower())
         if importer is None:
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=False)
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=scripts)
         else:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
@@ -72,12 +73,13 @@ def save_copy(source: Path, target: Path, name_others: Callable[[], None] = lamb
         remove(unfinished)
 
 
-def save_beside(source: Path, target: Path, unfinished: Path) -> None:
+def save_beside(source: Path | None, target: Path, unfinished: Path) -> None:
     """Saves the open file for `target`, compressed if `source` was, under the name `unfinished` beside it."""
+    compress = source is not None and _is_compressed(source)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(
-            filepath=str(unfinished), copy=True, check_existing=False, compress=_is_compressed(source)
+            filepath=str(unfinished), copy=True, check_existing=False, compress=compress
         )
         if not unfinished.exists() or not _is_whole(unfinished):
             raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")

@@ -3,18 +3,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from pathlib import Path
 
 import bpy
 
 from ..core.errors import SinewError
-from ..core.frames import parse_frames
-from . import bake, drive, handlers, inbetween, inbetween_bake, properties
-
-# A bake in the window draws in between: rarely enough to cost little, often enough for Esc.
-SECONDS_BETWEEN_REDRAWS = 0.1
+from . import drive, handlers, inbetween, inbetween_bake, properties
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -133,128 +127,6 @@ class SINEW_OT_remove(OnDriven, bpy.types.Operator):
         return result
 
 
-class SINEW_OT_bake(OnDriven, bpy.types.Operator):
-    bl_idname = "sinew.bake"
-    bl_label = "Bake"
-    bl_description = "Write what Sinew deforms as data that plays without it"
-    bl_options = {"REGISTER", "UNDO"}
-
-    kind: bpy.props.EnumProperty(
-        name="To",
-        items=[
-            ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
-            ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
-            ("pc2", "PC2 Cache", "A point cache and a Mesh Cache modifier, in this file"),
-            ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
-            ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
-            ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),
-        ],
-    )
-    frames: bpy.props.StringProperty(
-        name="Frames", description="Such as 1,12,40-48; empty: the scene's frames", default=""
-    )
-    step: bpy.props.IntProperty(
-        name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
-    )
-    folder: bpy.props.StringProperty(
-        name="Folder",
-        description="Where files go; // is beside this file",
-        default="//",
-        subtype="DIR_PATH",
-        # Without it, newer versions warn of "//"; older ones do not know it.
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
-    )
-    overwrite: bpy.props.BoolProperty(
-        name="Overwrite", description="Replace files that are there already", default=False
-    )
-    in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if not self.in_steps:
-            self.asked = True
-            return context.window_manager.invoke_props_dialog(self)
-        try:
-            self.bake = self._start(context)
-        except SinewError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.steps = self.bake.sample()
-        manager = context.window_manager
-        self.timer = manager.event_timer_add(0.0, window=context.window)
-        manager.progress_begin(0.0, 1.0)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC":
-            self.cancel(context)
-            self.report({"WARNING"}, "Bake stopped; nothing was written")
-            return {"CANCELLED"}
-        # Whatever else is done meanwhile would end up in the bake.
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        try:
-            until = time.perf_counter() + SECONDS_BETWEEN_REDRAWS
-            part = next(self.steps, None)
-            while part is not None and time.perf_counter() < until:
-                part = next(self.steps, None)
-            if part is None:
-                self._end(context)
-                return self._finish(self.bake)
-        except SinewError as error:
-            self._end(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        context.window_manager.progress_update(part)
-        context.workspace.status_text_set(f"Sinew bakes: {part:.0%} (Esc stops)")
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Also when the window closes; not of a dialog."""
-        if self.in_steps:
-            self.steps.close()
-            self._end(context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if getattr(self, "asked", False):
-            # A dialog's operator can not go on in steps itself.
-            names = ("kind", "frames", "step", "folder", "overwrite")
-            bpy.ops.sinew.bake(
-                "INVOKE_DEFAULT", in_steps=True, **{name: getattr(self, name) for name in names}
-            )
-            return {"CANCELLED"}
-        try:
-            started = self._start(context)
-            for _part in started.sample():
-                pass
-            return self._finish(started)
-        except SinewError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-
-    def _start(self, context: bpy.types.Context) -> bake.Started:
-        scene, name = context.scene, Path(bpy.data.filepath).stem
-        if self.kind != bake.SHAPE_KEYS and self.folder.startswith("//") and not name:
-            raise SinewError("Save the file first, or choose a folder that is not beside it")
-        frames = sorted(set(parse_frames(self.frames))) if self.frames.strip() else None
-        frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
-        suffix = bake.suffix_of(self.kind)
-        target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
-        return bake.start(driven_targets(context), self.kind, frames[:: self.step], target, self.overwrite)
-
-    def _finish(self, started: bake.Started) -> set[str]:
-        started.publish()
-        started.place()
-        self.report({"INFO"}, f"Baked {started.what}")
-        return {"FINISHED"}
-
-    def _end(self, context: bpy.types.Context) -> None:
-        manager = context.window_manager
-        manager.event_timer_remove(self.timer)
-        manager.progress_end()
-        context.workspace.status_text_set(None)
-
-
 class SINEW_OT_bake_inbetweens(bpy.types.Operator):
     bl_idname = "sinew.bake_inbetweens"
     bl_label = "Bake In-betweens"
@@ -294,4 +166,4 @@ class SINEW_OT_bake_inbetweens(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove, SINEW_OT_bake, SINEW_OT_bake_inbetweens)
+CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove, SINEW_OT_bake_inbetweens)

@@ -21,6 +21,7 @@ def register() -> None:
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
     from . import (
+        bake_operator,
         comparison_labels,
         comparison_operators,
         comparison_panel,
@@ -36,6 +37,7 @@ def register() -> None:
     )
 
     _register_classes((*properties.CLASSES, *measures.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes(bake_operator.CLASSES)
     _register_classes((*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES))
     _register_classes((*heat_panel.CLASSES, *diagnostics_panel.CLASSES))
     measures.register()

@@ -21,10 +21,15 @@ OVER = [
 
 
 class Stepped:
-    """Has steps(context), which yields the share that is done and may raise SinewError, and finish(context),
-    which takes what it found."""
+    """Has steps(context), which yields the share that is done, and finish(context), which takes what it
+    found. Both may raise SinewError, which is reported.
+
+    saying   what it does, in the status bar
+    stopped  what Esc reports; closing steps() has to leave all as it was
+    """
 
     saying = "Sinew looks at frames"
+    stopped = "Stopped; nothing has changed"
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         raise NotImplementedError
@@ -37,9 +42,8 @@ class Stepped:
             for _share in self.steps(context):
                 pass
         except SinewError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self.finish(context)
+            return self._failed(error)
+        return self._finished(context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
@@ -54,22 +58,21 @@ class Stepped:
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "ESC":
             self.cancel(context)
-            self.report({"WARNING"}, "Stopped; nothing has changed")
+            self.report({"WARNING"}, self.stopped)
             return {"CANCELLED"}
         # Whatever else is done meanwhile would end up in what is found.
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
-        until, share = time.perf_counter() + SECONDS_BETWEEN_REDRAWS, 0.0
+        share = None
         try:
-            while share is not None and time.perf_counter() < until:
-                share = next(self._left, None)
+            share = self._go_on()
         except SinewError as error:
-            self._end(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self._failed(error)
+        finally:
+            if share is None:
+                self._end(context)
         if share is None:
-            self._end(context)
-            return self.finish(context)
+            return self._finished(context)
         context.window_manager.progress_update(share)
         context.workspace.status_text_set(f"{self.saying}: {share:.0%} (Esc stops)")
         return {"RUNNING_MODAL"}
@@ -78,6 +81,23 @@ class Stepped:
         """Also when the window closes."""
         self._left.close()
         self._end(context)
+
+    def _go_on(self) -> float | None:
+        """The share that is done after some steps; None at the end."""
+        until, share = time.perf_counter() + SECONDS_BETWEEN_REDRAWS, 0.0
+        while share is not None and time.perf_counter() < until:
+            share = next(self._left, None)
+        return share
+
+    def _finished(self, context: bpy.types.Context) -> set[str]:
+        try:
+            return self.finish(context)
+        except SinewError as error:
+            return self._failed(error)
+
+    def _failed(self, error: SinewError) -> set[str]:
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
 
     def _end(self, context: bpy.types.Context) -> None:
         manager = context.window_manager

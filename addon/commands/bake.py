@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import argparse
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +14,7 @@ from ..batch.inputs import Job, plan_jobs
 from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
+from ..prepare import leave_blender
 from .console import Console
 from .outcome import Outcome
 
@@ -110,19 +114,62 @@ def _bake(
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:
             started = bake.start(taken, args.to, chosen, target, args.overwrite)
-            for _part in console.progress(started.sample(), len(chosen), what):
-                pass
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
-    try:
+        is_export = args.to in EXPORTS
+        with (
+            _whole_or_nothing(started, source),
+            console.bar(what, len(chosen)) as show,
+            _stoppable(started, is_export, console) as check,
+        ):
+            if is_export:
+                started.told = show
+            for share in started.sample():
+                show(share)
+                check()
+    with _whole_or_nothing(started, source):
         started.place()
-        if args.to in EXPORTS:
+        if is_export:
             started.publish()
         else:
             files.save_copy(source, target, started.publish)
+    outcome.meshes, outcome.frames = len(taken), len(chosen)
+
+
+@contextmanager
+def _whole_or_nothing(started, source: Path) -> Iterator[None]:
+    try:
+        yield
     except BaseException as error:
         started.discard()
         if isinstance(error, SinewError):
             raise SinewError(f"{source}: {error}") from None
         raise
-    outcome.meshes, outcome.frames = len(taken), len(chosen)
+
+
+@contextmanager
+def _stoppable(started, is_export: bool, console: Console) -> Iterator[Callable[[], None]]:
+    """For Ctrl-C. Blender drops a KeyboardInterrupt within its handlers and exporters, and goes on: so it is
+    raised by what this gives, to be called between frames. An exporter takes all frames in one call, and the
+    process ends there."""
+    stopped = False
+
+    def on_interrupt(_signal: int, _frame: object) -> None:
+        nonlocal stopped
+        stopped = True
+        if is_export:
+            started.discard()
+            console.close()
+            console.complain("stopped")
+            leave_blender(130)
+
+    def check() -> None:
+        if stopped:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield check
+    finally:
+        # None was Blender's own, which can not be put back.
+        signal.signal(signal.SIGINT, before or signal.default_int_handler)

@@ -14,12 +14,12 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..batch.blender_process import Limits
 from ..batch.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..batch.job_file import JobFile, Settings, read_job_file
 from ..batch.journal import Journal
 from ..batch.report import PICTURES, write_report
 from ..batch.workers import run_here, run_in_dask, run_on_this_machine
+from ..blender_process import Limits
 from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
 from .console import Console

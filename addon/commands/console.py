@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO, TypeVar
 
@@ -20,6 +20,7 @@ class Console:
         self.err = err
         self.verbose = verbose
         self._has_bar = False
+        self._close_bar: Callable[[], None] | None = None
         try:
             import rich.console
         except ImportError:
@@ -63,13 +64,35 @@ class Console:
 
     def progress(self, items: Iterable[Item], total: int, what: str) -> Iterator[Item]:
         """The items, with a bar on a terminal and one line elsewhere."""
-        if self._rich is not None and self._rich.is_terminal:
-            import rich.progress
+        with self.bar(what, total) as show:
+            for number, item in enumerate(items):
+                yield item
+                show((number + 1) / total)
 
-            yield from rich.progress.track(items, description=what, total=total, console=self._rich)
+    @contextmanager
+    def bar(self, what: str, total: int) -> Iterator[Callable[[float], None]]:
+        """Shows how far a work of `total` parts gets on: call what it gives with the share that is done, 0 to
+        1. A bar on a terminal, one line elsewhere."""
+        if self._rich is None or not self._rich.is_terminal:
+            self.note(f"{what} ({total})")
+            yield lambda _share: None
             return
-        self.note(f"{what} ({total})")
-        yield from items
+        from rich.progress import Progress
+
+        with Progress(console=self._rich) as bar:
+            task = bar.add_task(what, total=1.0)
+            self._close_bar = bar.stop
+            try:
+                yield lambda share: bar.update(task, completed=share)
+            finally:
+                self._close_bar = None
+
+    def close(self) -> None:
+        """Gives the terminal back where the process is about to end at once."""
+        if self._close_bar is not None:
+            self._close_bar()
+        self.out.flush()
+        self.err.flush()
 
     @contextmanager
     def batch(self, what: str, total: int) -> Iterator[BatchProgress]:

@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 import struct
 import subprocess
 import sys
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
 
 import bpy
 import numpy as np
+import program
 import pytest
 import scenes
 from sinew_addon.blender import actions, bake, properties
@@ -670,3 +675,64 @@ def test_wrong_use(arm, tmp_path):
     again = run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o", status=1)
     assert "use --overwrite to replace it" in again.stderr
     run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o", "--overwrite")
+
+
+def start_sinew(*args, **pipes):
+    return subprocess.Popen([*program.COMMAND, *map(str, args)], env=program.ENVIRONMENT, **pipes)
+
+
+# Long enough to be stopped; glTF's exporter takes minutes for as many.
+LONG = {kind: 3000 for kind in core.KINDS} | {"gltf": 200}
+
+
+@pytest.mark.parametrize("kind", core.KINDS)
+def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
+    """Also within an exporter's one call for all frames."""
+    _obj, path = arm
+    out = tmp_path / "out"
+    out.mkdir()
+    command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", f"1-{LONG[kind]}", "--out", out)
+    process = start_sinew(*command, stderr=subprocess.PIPE, text=True)
+    assert f"({LONG[kind]})" in process.stderr.readline()
+    if kind in ("mdd", "pc2", "alembic", "usd"):
+        while not [p for p in out.rglob("*") if p.is_file()]:
+            assert process.poll() is None
+            time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _output, errors = process.communicate(timeout=120)
+    assert process.returncode == 130, errors
+    assert errors == "sinew: stopped\n"
+    assert not [p for p in out.rglob("*") if p.is_file()]
+
+
+@pytest.mark.parametrize("kind", ["alembic", "usd", "gltf"])
+def test_an_export_shows_its_frames(arm, tmp_path, kind):
+    pty = pytest.importorskip("pty", reason="no terminals here")
+    pytest.importorskip("rich", reason="a bar is rich's")
+    _obj, path = arm
+    ours, theirs = pty.openpty()
+    command = (
+        "bake",
+        path,
+        "--method",
+        METHOD,
+        "--to",
+        kind,
+        "--frames",
+        f"1-{LONG[kind]}",
+        "--out",
+        tmp_path,
+    )
+    process = start_sinew(*command, stdout=subprocess.DEVNULL, stderr=theirs)
+    os.close(theirs)
+    shown = b""
+    # Reading from a terminal that nobody writes to any more fails.
+    with suppress(OSError):
+        while part := os.read(ours, 65536):
+            shown += part
+    os.close(ours)
+    assert process.wait(timeout=60) == 0, shown
+    shares = [int(share) for share in re.findall(rb"(\d+)%", shown)]
+    assert shares == sorted(shares)
+    assert shares[-1] == 100
+    assert len({share for share in shares if 0 < share < 100}) > 1, shares

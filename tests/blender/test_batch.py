@@ -23,9 +23,9 @@ import pytest
 import scenes
 import whole_file
 from program import COMMAND, ENVIRONMENT, run_sinew
-from sinew_addon.batch.blender_process import BlenderProcess, Limits
 from sinew_addon.batch.job_file import Settings
 from sinew_addon.blender import files, properties
+from sinew_addon.blender_process import BlenderProcess, Limits
 from test_bake import read_elsewhere
 
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="long: runs with the newest Blender alone")

@@ -11,12 +11,14 @@ import sys
 import sysconfig
 import tomllib
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 import pytest
 import scenes
 from conftest import REPOSITORY
+from sinew_addon.core.bake import EXPORTS, KINDS
 
 INSTALL = """
 import json, sys
@@ -141,23 +143,23 @@ def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tm
 
 @pytest.fixture
 def photographed(package, tmp_path, real_rig):
-    """photographed(script, *pictures): the facts that a script of docs/ prints from a Blender with a window
-    that has Sinew's zip and human.blend."""
+    """photographed(script, *pictures, options=()): the facts that a script prints from a Blender with a
+    window that has Sinew's zip and human.blend."""
     program = os.environ.get("SINEW_FULL_BLENDER")
     if not program:
         pytest.skip("SINEW_FULL_BLENDER is not set: no Blender with a window is tested")
     if bpy.app.version < (5, 2):
         pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
 
-    def run(script: str, *pictures: str) -> dict[str, object]:
+    def run(script: str, *pictures: str, options: Sequence[str] = ()) -> dict[str, object]:
         # The whole Blender sees the temporary folder, not this checkout's neighbours.
         shutil.copy(real_rig("human.blend"), tmp_path / "human.blend")
         shutil.copy(package, tmp_path / "sinew.zip")
-        for name in (script, "window.py"):
-            shutil.copy(REPOSITORY / "docs" / name, tmp_path / name)
-        start = [program, "run", "--factory-startup", "--python-exit-code", "3", "human.blend"]
+        for name in (script, "docs/window.py"):
+            shutil.copy(REPOSITORY / name, tmp_path)
+        start = [program, "run", "--factory-startup", "--python-exit-code", "3", *options, "human.blend"]
         result = subprocess.run(
-            [*start, "--python", script, "--", "sinew.zip", *pictures],
+            [*start, "--python", Path(script).name, "--", "sinew.zip", *pictures],
             cwd=tmp_path,
             capture_output=True,
             text=True,
@@ -176,14 +178,14 @@ def photographed(package, tmp_path, real_rig):
 
 def test_the_panel_in_a_window(photographed):
     """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
-    facts = photographed("photograph_panel.py", "panel.png")
+    facts = photographed("docs/photograph_panel.py", "panel.png")
     assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
     assert facts["error"] == ""
 
 
 def test_a_comparison_in_a_window(photographed):
     """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
-    facts = photographed("photograph_comparison.py", "comparison.png")
+    facts = photographed("docs/photograph_comparison.py", "comparison.png")
     assert facts["played"]
     assert facts["posed"] > 0.01
     for when in ("played", "posed", "overlaid", "after undo", "reopened"):
@@ -195,5 +197,26 @@ def test_a_comparison_in_a_window(photographed):
 
 def test_heat_map_and_diagnostics_in_a_window(photographed):
     """Frames are gone through in steps, the window drawing in between; then the scene is where it was."""
-    facts = photographed("photograph_heat.py", "heat-map.png", "diagnostics.png")
+    facts = photographed("docs/photograph_heat.py", "heat-map.png", "diagnostics.png")
     assert facts == {"scan": ["RUNNING_MODAL"], "frame after the scan": 16, "played": True, "mode": "EDIT"}
+
+
+def test_bakes_in_a_window(photographed):
+    """By the dialog: Esc in the middle of each leaves all as it was, and Ctrl+Z undoes one that is done."""
+    script = "tests/blender/bake_in_window.py"
+    facts = photographed(script, "bake.png", options=["--enable-event-simulate"])
+    stopped, ended = facts["stopped"], facts["ended"]
+    assert stopped.keys() == ended.keys() >= {"shape-keys", "mdd", "gltf"}
+    assert not any(one["changed"] for one in stopped.values()), stopped
+    assert "baked/human_cache/.Human.mdd.unfinished" in stopped["mdd"]["files meanwhile"]
+    for kind in stopped.keys() & {"alembic", "usd", "gltf"}:
+        assert "baked/.human.unfinished.blend" in stopped[kind]["files meanwhile"], kind
+        assert stopped[kind]["blenders meanwhile"] == 1, kind
+        assert f"baked/human{EXPORTS[kind]}" in ended[kind]["files"], kind
+        assert ended[kind]["modifiers"] == ["NODES", "ARMATURE"], kind
+    assert not any(one["not undone"] for one in ended.values()), ended
+    assert (ended["shape-keys"]["keys"], ended["shape-keys"]["modifiers"]) == (True, ["ARMATURE"])
+    assert ended["mdd"]["modifiers"] == ["MESH_CACHE", "ARMATURE"]
+    assert stopped.keys() | facts["refused"].keys() == set(KINDS) - {"pc2"}
+    assert all("built without" in error for error in facts["refused"].values())
+    assert not any(".unfinished" in name for one in ended.values() for name in one["files"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender in a process of its own that does one file after the other, watched from here.
+"""A Blender in a process of its own that does one task after the other, watched from here.
 
 Starting Blender takes 0.5 to 2 s, opening a file 10 ms and more: so a process is kept for the next file,
 which replaces all of the last one. One that crashes, hangs or grows too large is ended, and the next file
@@ -18,16 +18,22 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core.errors import SinewError
+from .core.errors import SinewError
 
-# A file in the folder of a Blender that says what it is doing, for when it is lost.
+# A file in the folder of a Blender that says what it is doing: an object of JSON, and blanks.
 DOING = "doing"
+# Environment variable: the processors to start on, where they are told.
+PROCESSORS = "SINEW_PROCESSORS"
 START_LIMIT = 180.0
 # How often a busy process is looked at.
 INTERVAL = 0.1
+# What worker.py says first.
+GREETINGS = (b'{"ready"', b'{"refused"')
 
 
 class BlenderLost(Exception):  # noqa: N818
@@ -55,13 +61,16 @@ class Limits:
 
 
 class BlenderProcess:
-    """One Blender, for one thread at a time. Raises SinewError where it can not be started."""
+    """One Blender, for one thread at a time: of this Python, or another of the one that this is inside of.
 
-    def __init__(self, limits: Limits) -> None:
+    wait  until it is there; raises SinewError where it can not be started. Otherwise its first task does
+    """
+
+    def __init__(self, limits: Limits, wait: bool = True) -> None:
         # Blender keeps a folder there that it leaves behind when it is ended.
         self._folder = tempfile.TemporaryDirectory(prefix="sinew-", ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", f"{__package__.rpartition('.')[0]}.worker", *_first_processors(limits)],
+            _command(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=None if limits.verbose else subprocess.DEVNULL,
@@ -69,6 +78,7 @@ class BlenderProcess:
             # Ctrl-C in a terminal is for the batch, which ends its Blenders itself.
             start_new_session=True,
         )
+        self._is_there = False
         # Of what it is busy with, if it is; why it had to be ended.
         self._limits: Limits | None = None
         self._since = 0.0
@@ -79,13 +89,13 @@ class BlenderProcess:
         self._ended = threading.Event()
         threading.Thread(target=self._watch, daemon=True).start()
         self._begin(Limits(START_LIMIT))
-        answer = self._answer()
-        if "refused" in answer:
-            self.end()
-            raise SinewError(answer["refused"])
+        if wait:
+            self._greet()
 
     def run(self, task: dict, limits: Limits) -> dict:
         """What became of the file. Raises BlenderLost; the process is of no more use then."""
+        if not self._is_there:
+            self._greet()
         self._begin(limits)
         try:
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
@@ -93,6 +103,20 @@ class BlenderProcess:
         except OSError:
             raise BlenderLost(self._epitaph()) from None
         return self._answer()
+
+    def follow(self, task: dict, limits: Limits) -> Iterator[dict]:
+        """What it says of what it is doing, every INTERVAL s, and at last what run() gives. Raises as that;
+        closed before, it ends the process."""
+        aside = ThreadPoolExecutor(1)
+        outcome = aside.submit(self.run, task, limits)
+        aside.shutdown(wait=False)
+        try:
+            while not wait([outcome], INTERVAL).done:
+                yield self._said()
+        finally:
+            if not outcome.done():
+                self.kill()
+        yield outcome.result()
 
     def is_spent(self, limits: Limits) -> bool:
         """Whether the next file had better have a fresh process: what Blender does not give back adds up."""
@@ -107,8 +131,18 @@ class BlenderProcess:
         with self._lock:
             self._limits, self._since = limits, time.monotonic()
 
+    def _greet(self) -> None:
+        answer = self._answer()
+        self._is_there = True
+        if "refused" in answer:
+            self.end()
+            raise SinewError(answer["refused"])
+
     def _answer(self) -> dict:
         line = self._process.stdout.readline()
+        # Before the worker is there, Blender and what it runs at its start print what they like.
+        while line and not self._is_there and not line.startswith(GREETINGS):
+            line = self._process.stdout.readline()
         with self._lock:
             self._limits = None
         if not line.endswith(b"\n"):
@@ -151,9 +185,13 @@ class BlenderProcess:
         self._folder.cleanup()
 
     def _doing(self) -> str:
-        with contextlib.suppress(OSError):
-            return Path(self._folder.name, DOING).read_text(encoding="utf-8").strip() or "starting"
-        return "starting"
+        return self._said().get("doing", "starting")
+
+    def _said(self) -> dict:
+        """ "doing", and what else there is to know of it; nothing before its first word."""
+        with contextlib.suppress(OSError, ValueError):
+            return json.loads(Path(self._folder.name, DOING).read_bytes())
+        return {}
 
     def _memory(self) -> int:
         import psutil
@@ -167,17 +205,29 @@ class BlenderProcess:
 _started = itertools.count()
 
 
-def _first_processors(limits: Limits) -> list[str]:
-    """Those to start a Blender on, each on others: it makes a thread for each that it may use then."""
-    if not limits.threads or not hasattr(os, "sched_getaffinity"):
-        return []
-    there = sorted(os.sched_getaffinity(0))
-    first = limits.threads * next(_started)
-    return [str(there[(first + index) % len(there)]) for index in range(min(limits.threads, len(there)))]
+def _command() -> list[str]:
+    bpy, package = sys.modules.get("bpy"), __package__
+    if bpy is None or not bpy.app.binary_path:
+        return [sys.executable, "-m", f"{package}.worker"]
+    as_here = ["--factory-startup"] if bpy.app.factory_startup else []
+    # The user's preferences as saved need not have it on.
+    with_sinew = ["--addons", package, "--python-expr", f"from {package}.worker import main; main()"]
+    return [bpy.app.binary_path, "--background", *as_here, "--python-exit-code", "1", *with_sinew]
 
 
 def _environment(limits: Limits) -> dict[str, str]:
-    """This one's; Mesa's OpenGL without graphics hardware has threads, too: 0 are faster than 1."""
+    """This one's, with what `limits` says of threads."""
     if not limits.threads:
         return dict(os.environ)
-    return {"LP_NUM_THREADS": str(limits.threads if limits.threads > 1 else 0), **os.environ}
+    # Mesa's OpenGL without graphics hardware has threads, too: 0 are faster than 1.
+    drawing = {"LP_NUM_THREADS": str(limits.threads if limits.threads > 1 else 0)}
+    return {**drawing, **os.environ, PROCESSORS: " ".join(map(str, _first_processors(limits)))}
+
+
+def _first_processors(limits: Limits) -> list[int]:
+    """Those to start a Blender on, each on others: it makes a thread for each that it may use then."""
+    if not hasattr(os, "sched_getaffinity"):
+        return []
+    there = sorted(os.sched_getaffinity(0))
+    first = limits.threads * next(_started)
+    return [there[(first + index) % len(there)] for index in range(min(limits.threads, len(there)))]

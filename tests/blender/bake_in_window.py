@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes human.blend by the panel's dialog in a Blender with a window: Esc in the middle of each kind, then
+each to its end, and Ctrl+Z. Keys are pressed by simulation: it takes --enable-event-simulate.
+
+    blender --factory-startup OPTION human.blend --python bake_in_window.py -- sinew-0.1.0.zip bake.png
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import window
+
+ZIP, PICTURE = window.arguments()
+FOLDER = PICTURE.parent / "baked"
+# Where Blender keeps what is the user's.
+USER = PICTURE.parent / "user"
+FRAME = 16
+# Long enough to be stopped; glTF's exporter takes minutes for as many.
+LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 500}
+# Some distributions' Blenders lack the others.
+KINDS = [kind for kind in LONG if kind not in ("alembic", "usd") or getattr(bpy.app, kind).supported]
+TICK = 0.1
+PATIENCE = 120.0
+
+
+def press(key: str, **held: bool) -> None:
+    main = bpy.context.window_manager.windows[0]
+    for value in ("PRESS", "RELEASE"):
+        main.event_simulate(type=key, value=value, x=main.width // 2, y=main.height // 2, **held)
+
+
+def is_baking() -> bool:
+    running = bpy.context.window_manager.windows[0].modal_operators
+    return any(operator.bl_idname == "SINEW_OT_bake" for operator in running)
+
+
+def is_done_since(files: list[str]) -> Callable[[], bool]:
+    """Whether a bake is at its end that starts with these files."""
+
+    def is_done() -> bool:
+        now = state()
+        return not is_baking() and (now["keys"] or now["files"] != files)
+
+    return is_done
+
+
+def blenders() -> int:
+    """The processes that this one has started."""
+    found = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            found += int(stat.read_text().rpartition(")")[2].split()[1]) == os.getpid()
+        except OSError:
+            continue
+    return found
+
+
+def state() -> dict[str, object]:
+    """What a bake that is stopped, or undone, must leave as it was."""
+    scene, obj = bpy.context.scene, bpy.data.objects["Human"]
+    return {
+        "frame": [scene.frame_current, scene.frame_subframe, scene.frame_start, scene.frame_end],
+        "objects": sorted(o.name for o in bpy.data.objects),
+        "selected": sorted(o.name for o in bpy.context.selected_objects),
+        "modifiers": [(m.name, m.type, m.show_viewport) for m in obj.modifiers],
+        "keys": obj.data.shape_keys is not None,
+        "meshes": len(bpy.data.meshes),
+        "actions": len(bpy.data.actions),
+        "method": obj.sinew.method,
+        "points": hashlib.sha256(window.final_points(obj)).hexdigest(),
+        "files": sorted(str(p.relative_to(PICTURE.parent)) for p in FOLDER.rglob("*")),
+        "folder": sorted(p.name for p in PICTURE.parent.iterdir() if p not in (PICTURE, USER)),
+        "blenders": blenders(),
+    }
+
+
+def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
+    for _tick in range(round(PATIENCE / TICK)):
+        if wanted():
+            return
+        yield
+    raise AssertionError(f"{what} did not come")
+
+
+def start(kind: str, frames: str) -> Iterator[None]:
+    """By the dialog that the panel's button opens."""
+    with window.in_view3d():
+        bpy.ops.sinew.bake("INVOKE_DEFAULT", kind=kind, frames=frames, folder=str(FOLDER))
+    yield
+    press("RET")
+
+
+def steps() -> Iterator[None]:
+    facts = {"stopped": {}, "ended": {}, "refused": {}}
+    window.install(ZIP)
+    scene, obj = bpy.context.scene, bpy.data.objects["Human"]
+    window.select_only(obj)
+    with window.in_view3d():
+        bpy.ops.sinew.add("INVOKE_DEFAULT")
+    obj.sinew.method = "dq"
+    scene.frame_set(FRAME)
+    FOLDER.mkdir()
+    # Ctrl+Z comes back to here.
+    bpy.ops.ed.undo_push(message="Before")
+    yield
+    before = state()
+    for kind in KINDS:
+        yield from start(kind, f"1-{LONG[kind]}")
+        yield from until(is_baking, f"a bake to {kind}")
+        for _tick in range(20 if kind in ("alembic", "usd", "gltf") else 1):
+            yield
+        middle = state()
+        if kind == "gltf":
+            window.photograph(PICTURE)
+        assert is_baking(), kind
+        press("ESC")
+        yield from until(lambda: not is_baking(), "the end")
+        after = state()
+        facts["stopped"][kind] = {
+            "files meanwhile": [name for name in middle["files"] if name not in before["files"]],
+            "blenders meanwhile": middle["blenders"],
+            "changed": {k: [before[k], after[k]] for k in before if before[k] != after[k]},
+        }
+    for kind in KINDS:
+        is_done = is_done_since(state()["files"])
+        yield from start(kind, "1-24")
+        yield from until(is_done, f"the end of a bake to {kind}")
+        ended = state()
+        press("Z", ctrl=True)
+        for _tick in range(10):
+            yield
+        after = state()
+        left = ("files", "folder")
+        facts["ended"][kind] = {
+            "files": ended["files"],
+            "modifiers": [modifier[1] for modifier in ended["modifiers"]],
+            "keys": ended["keys"],
+            "not undone": {
+                k: [before[k], after[k]] for k in before if before[k] != after[k] and k not in left
+            },
+        }
+    for kind in LONG.keys() - KINDS:
+        try:
+            bpy.ops.sinew.bake(kind=kind, frames="1-24", folder=str(FOLDER))
+        except RuntimeError as error:
+            facts["refused"][kind] = str(error)
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+window.run(steps(), TICK)
