@@ -16,11 +16,13 @@ def prepare_blender() -> None:
         import bpy
     except ImportError as error:
         raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
-    from .blender import native, registration
+    from .blender import native, registration, small_meshes
 
     reason = native.load_error()
     if reason is not None:
         raise SinewError(reason)
+    # What commands compare, save and bake is Sinew's own.
+    small_meshes.is_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
 

@@ -42,7 +42,7 @@ class Case:
 
 
 def cases(quick: bool) -> list[Case]:
-    sizes = [1_080, 13_380, 100_000] if quick else [1_080, 13_380, 100_000, 1_000_000]
+    sizes = [1_080, 5_000, 13_380, 100_000] if quick else [1_080, 5_000, 13_380, 100_000, 1_000_000]
     scenes = [Case(size) for size in sizes]
     scenes += [Case(characters=count, bones=50) for count in (10, 50)]
     folder = os.environ.get("SINEW_RIGS")
@@ -137,11 +137,11 @@ def open_rig(bpy, path: Path) -> list:
 class Worker:
     """One of the two processes."""
 
-    def __init__(self, with_sinew: bool) -> None:
+    def __init__(self, with_sinew: bool, leave_small: bool) -> None:
         import bpy
 
         self.bpy = bpy
-        self.with_sinew = with_sinew
+        self.with_sinew, self.leave_small = with_sinew, leave_small
         self.handler_times: list[float] = []
         if with_sinew:
             import sinew_addon
@@ -186,6 +186,7 @@ class Worker:
                 with bpy.context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
                     bpy.ops.sinew.add()
                 obj.sinew.method = case.method
+                obj.sinew.leave_small = self.leave_small
         vertices = sum(len(obj.data.vertices) for obj in self.meshes)
         return {"vertices": vertices, "points": self.points(FRAMES // 2)}
 
@@ -232,10 +233,10 @@ class Worker:
         return {"moving": common.spread(moving), "staying": common.spread(staying)}
 
 
-def serve(connection: Connection, with_sinew: bool) -> None:
+def serve(connection: Connection, with_sinew: bool, leave_small: bool) -> None:
     # What Blender prints is not ours to show.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    worker = Worker(with_sinew)
+    worker = Worker(with_sinew, leave_small)
     try:
         while (request := connection.recv()) is not None:
             name, *arguments = request
@@ -252,10 +253,10 @@ def serve(connection: Connection, with_sinew: bool) -> None:
 
 
 class Process:
-    def __init__(self, with_sinew: bool) -> None:
+    def __init__(self, with_sinew: bool, leave_small: bool) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, other = context.Pipe()
-        self.process = context.Process(target=serve, args=(other, with_sinew), daemon=True)
+        self.process = context.Process(target=serve, args=(other, with_sinew, leave_small), daemon=True)
         self.process.start()
 
     def ask(self, *request):
@@ -270,8 +271,8 @@ class Process:
         self.process.join(20)
 
 
-def start() -> dict[str, Process]:
-    return {"modifier": Process(False), "sinew": Process(True)}
+def start(leave_small: bool) -> dict[str, Process]:
+    return {"modifier": Process(False, leave_small), "sinew": Process(True, leave_small)}
 
 
 def measure(case: Case, processes: dict[str, Process], seconds: float) -> dict:
@@ -307,6 +308,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="up to 100,000 vertices")
     parser.add_argument("--name", default="frames", help="of the file in bench/results")
+    parser.add_argument(
+        "--all-by-sinew", action="store_true", help="small meshes too, which are left to Blender otherwise"
+    )
     parser.add_argument("-k", default="", help="only cases whose line has this in it")
     arguments = parser.parse_args()
     facts = common.machine() | {"bpy": common.version_of("bpy"), "sinew": common.version_of("sinew-skinning")}
@@ -316,7 +320,8 @@ def main() -> None:
     print("points are from the modifier's, as a part of the mesh's size.\n")
     print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
     results, failed = {}, {}
-    processes = start()
+    leave_small = not arguments.all_by_sinew
+    processes = start(leave_small)
     for case in cases(arguments.quick):
         name = f"{case.name} {case.method}"
         if arguments.k not in name:
@@ -327,7 +332,7 @@ def main() -> None:
             failed[name] = str(error) or "Blender ended"
             print(f"{case.name:38}{case.method:4}  not measured: {failed[name]}", flush=True)
             if not isinstance(error, RuntimeError):
-                processes = start()
+                processes = start(leave_small)
             continue
         results[name] = result
         print(line(case.name, result), flush=True)

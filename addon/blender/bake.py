@@ -20,6 +20,7 @@ from . import (
     animation,
     bake_export,
     drive,
+    driven,
     evaluate,
     files,
     front,
@@ -34,10 +35,10 @@ SHAPE_KEYS = "shape-keys"
 
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
-    state = handlers.state_of(obj)
-    if not properties.of(obj).enabled or state is None or not properties.of(obj).standing_in:
+    pairs = handlers.states_of([obj], bpy.context.evaluated_depsgraph_get())
+    if not pairs or obj.mode in driven.MODES_OF_THE_MODIFIER:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
-    return state.chain.points
+    return pairs[0][1].chain.points
 
 
 class ShapeKeys:
@@ -196,6 +197,8 @@ class Bake:
     def place(self) -> None:
         try:
             for one in self.bakes:
+                # The place in the stack is that of Sinew at work, not left to Blender.
+                drive.switch(one.obj, on=True)
                 one.place()
         except BaseException:
             self.discard()

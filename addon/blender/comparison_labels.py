@@ -11,7 +11,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from . import comparison, comparison_state, evaluate, properties
+from . import comparison, comparison_state, evaluate, handlers, properties
 
 FONT = 0
 # Points at scale 1.
@@ -58,8 +58,9 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
 
 
 def _method_label(obj: bpy.types.Object) -> str:
-    driven = properties.is_driven(obj) and properties.of(obj).standing_in
-    return properties.method_label(properties.of(obj).method if driven else evaluate.BLENDER)
+    settings = properties.of(obj)
+    by_sinew = settings.enabled and handlers.state_of(obj) is not None
+    return properties.method_label(settings.method if by_sinew else evaluate.BLENDER)
 
 
 def _top(

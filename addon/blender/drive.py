@@ -84,17 +84,18 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
     if active is not None:
         obj.modifiers.active = active
     settings.had_animation = obj.animation_data is not None
-    settings.method = method or _method_of(run[0])
+    settings.method = method or method_of(run[0])
     pairs = stand_ins(obj)
     points.arrange(obj)
     switch(obj, on=True)
     # Last, as a change of method deforms the object.
     for modifier, stand_in in pairs:
-        if method is None and _method_of(modifier) != settings.method:
-            stand_in.method = _method_of(modifier)
+        if method is None and method_of(modifier) != settings.method:
+            stand_in.method = method_of(modifier)
 
 
-def _method_of(modifier: bpy.types.ArmatureModifier) -> str:
+def method_of(modifier: bpy.types.ArmatureModifier) -> str:
+    """The one that the modifier itself blends by."""
     return "dq" if modifier.use_deform_preserve_volume else "lbs"
 
 

@@ -13,7 +13,18 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.rig import Bones, RigFacts
 from ..core.session import Binding, Chain, Link, LinkFrame
-from . import animation, armature_io, drive, points, pose_driver, properties, source, stack, survey
+from . import (
+    animation,
+    armature_io,
+    drive,
+    points,
+    pose_driver,
+    properties,
+    small_meshes,
+    source,
+    stack,
+    survey,
+)
 from .changes import Changes
 from .modifier_options import ModifierOptions
 from .source import Source
@@ -35,6 +46,8 @@ class Driven:
     rest_points        of the last frame
     dirtied_by_frames  the last change of frame moved the object or its rest points
     looks              what the artist can change of the object itself
+    left_to            names of the Armature modifiers that a small mesh is left to
+    left_by            what they were set to then
     asking             the driver asks for the points within Blender's evaluation
     attribute          what holds them there
     mesh_users         how many the mesh has; others could read while it is written
@@ -56,6 +69,8 @@ class Driven:
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
     looks: list = field(default_factory=list)
+    left_to: list[str] = field(default_factory=list)
+    left_by: list[str] = field(default_factory=list)
     asking: bool = False
     attribute: str = ""
     mesh_users: int = 0
@@ -74,8 +89,14 @@ class Driven:
         )
 
     def is_answered(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether the last evaluation gave the object its points."""
+        """Whether the last evaluation gave the object its shape."""
+        if self.is_left:
+            return self.left_by == small_meshes.choices(obj, self.left_to)
         return self.answered != 0 and self.answered == obj.data.evaluated_get(depsgraph).as_pointer()
+
+    @property
+    def is_left(self) -> bool:
+        return bool(self.left_to)
 
     @property
     def binding(self) -> Binding:
@@ -105,27 +126,36 @@ def update(
         return None
     answered = driven is not None and driven.is_answered(obj, depsgraph)
     touched = changes.structure or bool(changes.armatures) or obj.session_uid in changes.objects
-    if answered and not (changes.structure or changes.armatures):
+    # What else decides that an object is left comes with no frame.
+    is_left = (answered and driven.is_left and changes.frame) or small_meshes.is_left_to_blender(obj)
+    left_or_taken = driven is not None and is_left != driven.is_left
+    if answered and not (changes.structure or changes.armatures or left_or_taken):
         # Being asked for points touches the object by itself.
         touched = _looks(obj) != driven.looks
         if not touched and driven.mode == mode and obj.data.session_uid not in changes.touched:
             driven.dirtied_by_frames = False
             return driven
+    touched = touched or left_or_taken
     was_on = properties.of(obj).standing_in
     if driven is None or touched or driven.mode != mode:
-        _maintain(obj, changes)
+        _maintain(obj, changes, is_left)
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
         # What is in another scene stays as it is.
         return None if obj.evaluated_get(depsgraph).is_evaluated else driven
     known, known_source = driven, driven and driven.source
     driven = _current(obj, driven, depsgraph, changes, touched)
+    driven.left_to = [modifier.name for modifier, _stand_in in drive.stand_ins(obj)] if is_left else []
+    driven.left_by = small_meshes.choices(obj, driven.left_to)
     if touched or not driven.watched:
         driven.looks = _looks(obj)
         mesh = obj.data.session_uid
         driven.watched = {obj.session_uid, mesh, _uid(properties.of(obj).front), *driven.armatures}
-        hold_pose(obj, driven)
-    if answered and driven is known and driven.source is known_source:
+        if not is_left:
+            hold_pose(obj, driven)
+    if is_left:
+        driven.asking, driven.frames = False, None
+    elif answered and driven is known and driven.source is known_source:
         driven.dirtied_by_frames = False
     else:
         with driven.lock:
@@ -155,7 +185,36 @@ def _deform(
 ) -> None:
     """Writes the points of this evaluation for the next one, where they differ from what is there."""
     # Binding is not part of a frame's time: it happens once.
-    started = time.perf_counter()
+    started, before = time.perf_counter(), driven.rest_points
+    differs = _shape(obj, driven, depsgraph)
+    if differs is None:
+        return
+    if changes.frame:
+        reshaped = before is not None and driven.rest_points is not before
+        driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
+    if differs:
+        points.write(obj, driven.chain.points)
+        driven.milliseconds = 1000.0 * (time.perf_counter() - started)
+    elif _are_lost(obj, driven, changes, touched):
+        points.write(obj, driven.chain.points)
+    else:
+        return
+    driven.is_kept = True
+
+
+def bring_up_to_date(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph) -> None:
+    """What is known of a mesh that is left to Blender becomes that of this evaluation, for those who measure
+    or bake it; of others it is."""
+    if driven.is_left:
+        with driven.lock:
+            _shape(obj, driven, depsgraph)
+
+
+def _shape(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph) -> bool | None:
+    """Brings the chain's points up to this evaluation.
+
+    Whether they differ from the last ones; None where what decides them is unknown, and the last stay.
+    """
     stand_ins = properties.of(obj).stand_ins
     armatures = [s.armature and s.armature.evaluated_get(depsgraph) for s in stand_ins]
     evaluated = obj.evaluated_get(depsgraph)
@@ -163,22 +222,12 @@ def _deform(
     settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
     frames = _frames(evaluated, settings, armatures, driven, depsgraph.mode)
     if frames is None or not all(np.isfinite(frame.pose).all() for frame in frames if frame is not None):
-        return
+        return None
     driven.frames = frames
-    rest_points = source.rest_points(obj, driven.source, depsgraph)
-    if changes.frame:
-        reshaped = driven.rest_points is not None and rest_points is not driven.rest_points
-        driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
-    driven.rest_points = rest_points
-    if driven.chain.deform(rest_points, frames):
-        points.write(obj, driven.chain.points)
-        driven.shapes += 1
-        driven.milliseconds = 1000.0 * (time.perf_counter() - started)
-    elif _are_lost(obj, driven, changes, touched):
-        points.write(obj, driven.chain.points)
-    else:
-        return
-    driven.is_kept = True
+    driven.rest_points = source.rest_points(obj, driven.source, depsgraph)
+    differs = driven.chain.deform(driven.rest_points, frames)
+    driven.shapes += differs
+    return differs
 
 
 def _are_lost(obj: bpy.types.Object, driven: Driven, changes: Changes, touched: bool) -> bool:
@@ -240,7 +289,7 @@ def hold_pose(obj: bpy.types.Object, driven: Driven) -> None:
     pose_driver.ensure(obj, list(dict.fromkeys(poses)), driven.asking)
 
 
-def _maintain(obj: bpy.types.Object, changes: Changes) -> None:
+def _maintain(obj: bpy.types.Object, changes: Changes, is_left: bool) -> None:
     """Brings modifiers, pointers and what holds the points in line with what the artist did.
 
     Raises SinewError where the modifiers that Sinew works with are gone.
@@ -250,9 +299,11 @@ def _maintain(obj: bpy.types.Object, changes: Changes) -> None:
     nodes = stack.sinew_modifier(obj)
     if nodes is None or nodes.node_group is None:
         raise SinewError(f"{obj.name}: its Sinew modifier was deleted; press Remove, then Add Sinew")
-    if not properties.of(obj).standing_in:
-        drive.switch(obj, on=True)
-    if obj.mode in MODES_THAT_NEED_THE_POINTER or _bones_are_edited(obj):
+    if properties.of(obj).standing_in == is_left:
+        drive.switch(obj, on=not is_left)
+    if is_left:
+        drive.adopt_pointers(obj)
+    elif obj.mode in MODES_THAT_NEED_THE_POINTER or _bones_are_edited(obj):
         drive.adopt_pointers(obj)
         drive.give_back_pointers(obj)
     else:
@@ -305,7 +356,7 @@ def _frames(
     for link, stand_in, armature, keyed in zip(
         driven.chain.links, settings.stand_ins, armatures, driven.keyed, strict=False
     ):
-        flags = evaluated.modifiers[stand_in.name] if keyed else stand_in
+        flags = evaluated.modifiers[stand_in.name] if keyed or driven.is_left else stand_in
         if armature is None or armature.mode == "EDIT" or not _takes_part(flags, mode):
             frames.append(None)
             continue
@@ -362,7 +413,9 @@ def _bones_changed(
             continue
         if armature.data.session_uid in changes.armatures or not known.complete:
             bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-            _follow_renamed_bones(obj, known, bones)
+            # Of a mesh that is left to it Blender has renamed them itself.
+            if not driven.is_left:
+                _follow_renamed_bones(obj, known, bones)
             changed |= not bones.equals(known)
     return changed
 

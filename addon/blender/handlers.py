@@ -58,10 +58,18 @@ def state_of(obj: bpy.types.Object) -> Driven | None:
 answers = Answers(state_of)
 
 
-def states_of(objects: Iterable[bpy.types.Object] | None) -> list[tuple[bpy.types.Object, Driven]]:
-    """Those of driven objects that Sinew deforms now."""
+def states_of(
+    objects: Iterable[bpy.types.Object] | None, depsgraph: bpy.types.Depsgraph | None
+) -> list[tuple[bpy.types.Object, Driven]]:
+    """Those of driven objects that Sinew deforms now, or would were they not left to Blender, with what is
+    known of them from this evaluation; none without one."""
+    if depsgraph is None:
+        return []
     pairs = [(obj, state_of(obj)) for obj in objects or () if properties.of(obj).enabled]
-    return [(obj, state) for obj, state in pairs if state is not None and state.frames is not None]
+    known = [(obj, state) for obj, state in pairs if state is not None]
+    for obj, state in known:
+        driven.bring_up_to_date(obj, state, depsgraph)
+    return [(obj, state) for obj, state in known if state.frames is not None]
 
 
 def refresh(context: bpy.types.Context) -> None:
@@ -198,7 +206,8 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     with held():
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
-        heat_map.update(states_of(session.objects), depsgraph)
+        heated = [obj for obj in session.objects or () if properties.of(obj).heat]
+        heat_map.update(states_of(heated, depsgraph), depsgraph)
         redraw.tell()
 
 
@@ -277,9 +286,9 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 @persistent
 def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     before_update(scene, depsgraph)
-    if session.idle or session.objects is None or not is_allowed():
+    if not any(state.dirtied_by_frames for state in session.driven.values()) or not is_allowed():
         return
-    for obj in session.objects:
+    for obj in session.objects or ():
         state = state_of(obj)
         if state is not None and state.dirtied_by_frames:
             session.gate.close(obj)

@@ -15,10 +15,9 @@ from .measures import SinewMeasures
 _last: dict[int, tuple] = {}
 
 
-def update(pairs: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
-    """Colours those of the driven objects that show a heat map in the scene that was evaluated, if anything
+def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
+    """Colours those of the objects with a heat map that are in the scene that was evaluated, if anything
     changed."""
-    heated = [(obj, driven) for obj, driven in pairs if properties.of(obj).heat]
     if not heated:
         if _last:
             live.forget()

@@ -16,7 +16,7 @@ from .node_group import ATTRIBUTE, CARRIER, add_nodes, enabled_socket
 # The colour attribute of evaluated meshes.
 NAME = "Sinew Heat"
 MARK = "sinew_heat"
-_HEAT = {ATTRIBUTE: 5, CARRIER: 4}
+_HEAT = {ATTRIBUTE: 7, CARRIER: 4}
 
 
 def get_or_make(kind: int) -> bpy.types.NodeTree:

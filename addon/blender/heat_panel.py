@@ -47,9 +47,9 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
         # Blender asks only what is open and visible to draw itself: elsewhere nothing is measured.
         redraw.wanted = True
         settings = measures.of(context.scene)
-        pairs = handlers.states_of(operators.driven_targets(context))
         # As it was evaluated last: while drawing nothing may be evaluated, for that can write.
         depsgraph = context.view_layer.depsgraph
+        pairs = handlers.states_of(operators.driven_targets(context), depsgraph)
         subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
         if subject is None:
             draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")

@@ -152,9 +152,7 @@ def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
     """What each Armature modifier would do itself, where that is asked for."""
     if other != properties.BLENDER:
         return ()
-    return tuple(
-        "dq" if modifier.use_deform_preserve_volume else "lbs" for modifier, _kept in drive.stand_ins(obj)
-    )
+    return tuple(drive.method_of(modifier) for modifier, _kept in drive.stand_ins(obj))
 
 
 @dataclass

@@ -8,7 +8,7 @@ import bpy
 # A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
 # where the group finds the points.
 MARK = "sinew_node_group"
-ATTRIBUTE, CARRIER = 3, 2
+ATTRIBUTE, CARRIER = 6, 2
 # An input that no node reads; pose_driver has its driver there.
 POSE = "Pose"
 
@@ -112,11 +112,12 @@ def _make_for_attribute() -> bpy.types.NodeTree:
             POSE: ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points"),
         },
     )
-    source, named, place, result = add_nodes(
+    source, named, place, remove, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeInputNamedAttribute",
         "GeometryNodeSetPosition",
+        "GeometryNodeRemoveAttribute",
         "NodeGroupOutput",
     )
     named.data_type = "FLOAT_VECTOR"
@@ -125,7 +126,10 @@ def _make_for_attribute() -> bpy.types.NodeTree:
     group.links.new(named.outputs["Attribute"], place.inputs["Position"])
     # A mesh without the attribute keeps its shape instead of falling into the origin.
     group.links.new(named.outputs["Exists"], place.inputs["Selection"])
-    group.links.new(place.outputs["Geometry"], result.inputs["Geometry"])
+    # Else a subdivision behind would work it out for each of its vertices, and exports would have it.
+    group.links.new(source.outputs["Points"], remove.inputs["Name"])
+    group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
+    group.links.new(remove.outputs["Geometry"], result.inputs["Geometry"])
     return group
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..core import inbetween as core_inbetween
-from . import drive, driven, handlers, inbetween, inbetween_handlers, operators, properties
+from . import drive, driven, handlers, inbetween, inbetween_handlers, operators, properties, small_meshes
 from .sidebar import Sidebar, draw_text
 
 
@@ -44,7 +44,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
 
 
 def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    settings = properties.of(obj)
+    settings, state = properties.of(obj), handlers.state_of(obj)
     row = layout.row(align=True)
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
@@ -52,12 +52,17 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
         draw_text(layout, context, settings.error, icon="ERROR", alert=True)
     elif settings.enabled and obj.mode in driven.MODES_OF_THE_MODIFIER:
         draw_text(layout, context, "In this mode the Armature modifier shows its own shape", icon="INFO")
+    elif settings.enabled and state is not None and state.is_left:
+        text = "Small: the Armature modifier has the same shape in less time, and deforms it"
+        draw_text(layout, context, text, icon="INFO")
     layout.prop(settings, "method", text="")
     draw_text(layout, context, properties.METHODS[settings.method].description)
     if len(settings.armatures) > 1 or any(s.method != properties.SAME_METHOD for s in settings.stand_ins):
         for stand_in in list(settings.stand_ins)[1:]:
             layout.prop(stand_in, "method", text=stand_in.name)
     layout.prop(settings, "scale_rule")
+    if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
+        layout.prop(settings, "leave_small")
 
 
 def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
@@ -70,8 +75,9 @@ def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy
             ("Vertices", f"{facts.vertices:,}"),
             ("Bones", f"{facts.bones}, {facts.weighted_bones} with weights"),
             ("Influences", f"{facts.mean_influences:.2f} a vertex, at most {facts.most_influences}"),
-            ("Last frame", f"{state.milliseconds:.2f} ms"),
         ]
+        if not state.is_left:
+            rows.append(("Last frame", f"{state.milliseconds:.2f} ms"))
     column = layout.column(align=True)
     for name, value in rows:
         split = column.split(factor=0.4)

@@ -128,6 +128,15 @@ class SinewSettings(bpy.types.PropertyGroup):
         update=_heat_changed,
         override=OVERRIDABLE,
     )
+    leave_small: bpy.props.BoolProperty(
+        name="Leave to Blender Where Faster",
+        description="Have the Armature modifier deform this mesh where it gives the same shape and, as the "
+        "mesh is small, takes less time",
+        default=True,
+        options=set(),
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
     stand_ins: bpy.props.CollectionProperty(
         type=SinewStandIn, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )

@@ -66,7 +66,7 @@ def scan(
         for number, frame in enumerate(frames):
             evaluate.set_frame(scene, frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            subject = live.measure(handlers.states_of(objects), other, depsgraph)
+            subject = live.measure(handlers.states_of(objects, depsgraph), other, depsgraph)
             if subject is None:
                 raise SinewError(
                     f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes"

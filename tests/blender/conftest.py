@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
+from sinew_addon.blender import small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
@@ -46,6 +47,12 @@ def registered():
 @pytest.fixture(autouse=True)
 def empty_file():
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture(autouse=True)
+def none_left_to_blender(monkeypatch):
+    """The meshes of tests are small, and what is tested is Sinew."""
+    monkeypatch.setattr(small_meshes, "is_used", False)
 
 
 @pytest.fixture

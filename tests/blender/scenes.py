@@ -122,6 +122,11 @@ def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
     handlers.refresh(bpy.context)
 
 
+def states_of(obj: bpy.types.Object) -> list:
+    """A driven object with what is known of it at this frame, for measuring."""
+    return handlers.states_of([obj], bpy.context.evaluated_depsgraph_get())
+
+
 def worst(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a.astype(np.float64) - b).max())
 

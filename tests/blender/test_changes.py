@@ -143,6 +143,19 @@ def test_weight_painting_finds_the_armature():
     assert obj.modifiers["Armature"].object is None
 
 
+def test_the_final_mesh_has_no_attribute_of_sinews():
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Subdivision", "SUBSURF")
+    obj.data.attributes.new("own", "FLOAT", "POINT")
+    scenes.add_sinew(obj)
+    scenes.shapes(obj, [1, 6])
+    final = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert len(final.vertices) > len(obj.data.vertices)
+    names = set(final.attributes.keys())
+    assert "own" in names
+    assert not any(name.startswith("sinew") for name in names)
+
+
 def test_a_deleted_attribute_is_written_again():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)

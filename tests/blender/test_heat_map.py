@@ -106,7 +106,7 @@ def test_the_modifier_compared_with_is_blenders():
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(11)
-    states = handlers.states_of([obj])
+    states = scenes.states_of(obj)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     assert live.measure(states, "blender", depsgraph).measured.entry("distance_max") < 1e-5
     assert live.measure(states, "lbs", depsgraph).measured.entry("distance_max") > 0.02
@@ -439,7 +439,7 @@ def test_numbers_are_those_that_compare_writes(tmp_path):
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(9)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    measured = live.measure(handlers.states_of([obj]), "blender", depsgraph).measured
+    measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
     entries = measured.summary().__dict__
     assert len(entries) == 16
     for name, value in entries.items():

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import handlers, heat_map, heat_panel, live, measures, pose_io, stepped, worst_frames
+from sinew_addon.blender import heat_map, heat_panel, live, measures, pose_io, stepped, worst_frames
 from sinew_addon.core.comparison import peaks
 from sinew_addon.core.metrics import METRICS
 
@@ -40,7 +40,7 @@ def test_finds_the_peaks_worst_first(quantity):
     for frame, value in worst:
         bpy.context.scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        measured = live.measure(handlers.states_of([obj]), "blender", depsgraph).measured
+        measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
         assert measured.summary().__dict__ | {"bulge_worst": measured.summary().bulge_worst}
         assert measured.entry(METRICS[quantity].worst) == pytest.approx(value, rel=1e-6)
 
@@ -100,9 +100,7 @@ def test_a_range_fitted_to_frames_holds_all_their_values():
     largest = 0.0
     for frame in range(1, 31):
         scene.frame_set(frame)
-        subject = live.measure(
-            handlers.states_of([obj]), settings.other, bpy.context.evaluated_depsgraph_get()
-        )
+        subject = live.measure(scenes.states_of(obj), settings.other, bpy.context.evaluated_depsgraph_get())
         values = subject.measured.field("bulge")
         largest = max(largest, np.abs(values).max())
         scale = heat_map.scale_of(settings, subject.measured, values)
@@ -141,7 +139,7 @@ def test_numbers_have_units_and_say_what_they_are():
     scene = bpy.context.scene
     scene.unit_settings.system = "METRIC"
     scene.frame_set(15)
-    measured = live.measure(handlers.states_of([obj]), "lbs", bpy.context.evaluated_depsgraph_get()).measured
+    measured = live.measure(scenes.states_of(obj), "lbs", bpy.context.evaluated_depsgraph_get()).measured
     rows = dict(heat_panel.rows(scene, measured))
     summary = measured.summary()
     assert rows["Volume"] == f"{100 * summary.volume_change:+.3g} %"
@@ -157,27 +155,27 @@ def test_measuring_twice_measures_once():
     obj, _armature = waving_arm()
     scenes.add_sinew(obj, "dq")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    first = live.measure(handlers.states_of([obj]), "lbs", depsgraph).measured
-    assert live.measure(handlers.states_of([obj]), "lbs", depsgraph).measured is first
+    first = live.measure(scenes.states_of(obj), "lbs", depsgraph).measured
+    assert live.measure(scenes.states_of(obj), "lbs", depsgraph).measured is first
     bpy.context.scene.frame_set(9)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    second = live.measure(handlers.states_of([obj]), "lbs", depsgraph)
+    second = live.measure(scenes.states_of(obj), "lbs", depsgraph)
     assert second.measured is not first
     gauge = second.gauge
     bpy.context.scene.frame_set(10)
-    assert live.measure(handlers.states_of([obj]), "lbs", depsgraph).gauge is gauge
+    assert live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge is gauge
 
 
 def test_topology_edited_is_measured_anew():
     obj, _armature = waving_arm()
     scenes.add_sinew(obj, "dq")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    before = live.measure(handlers.states_of([obj]), "lbs", depsgraph).gauge.surface
+    before = live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge.surface
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.quads_convert_to_tris(quad_method="FIXED_ALTERNATE", ngon_method="CLIP")
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.scene.frame_set(9)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    after = live.measure(handlers.states_of([obj]), "lbs", depsgraph).gauge.surface
+    after = live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge.surface
     assert len(after.edges) == len(obj.data.edges) > len(before.edges)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small meshes, which are left to their Armature modifiers where those give the same shape as Sinew: for few
+vertices they take less time than asking Sinew for points does by itself.
+
+Sinew stays on, with all that it measures, bakes and compares; only who deforms from frame to frame differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+
+from ..core.scale_rule import BLENDER_4
+from . import animation, drive, front, pose_driver, properties
+
+# Below as many vertices an Armature modifier is the faster one (bench/README.md), by method.
+VERTICES = {"lbs": 6_000, "dq": 4_000}
+# Commands compare Sinew with the modifier, and save files in which Sinew is at work.
+is_used = True
+
+
+def is_left_to_blender(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifiers of a driven object, as they are set, have its shape in less time."""
+    settings = properties.of(obj)
+    return (
+        is_used
+        and settings.leave_small
+        and len(obj.data.vertices) < VERTICES.get(settings.method, 0)
+        and settings.scale_rule == BLENDER_4.name
+        # Its colours need the points.
+        and not settings.heat
+        and all(_blends_alike(obj, *pair) for pair in drive.stand_ins(obj))
+        and not front.is_needed(obj)
+        and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animation.animated_paths(obj))
+    )
+
+
+def choices(obj: bpy.types.Object, modifiers: Sequence[str]) -> list[str]:
+    """Of what decides that, what scripts and animation can set between two frames without any other event.
+
+    modifiers  names of the object's Armature modifiers
+    """
+    settings = properties.of(obj)
+    found = [obj.modifiers.get(name) for name in modifiers]
+    methods = [drive.method_of(m) if m is not None else "" for m in found]
+    return [settings.method, settings.scale_rule, *methods]
+
+
+def _blends_alike(
+    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, stand_in: properties.SinewStandIn
+) -> bool:
+    own = properties.of(obj).method if stand_in.method == properties.SAME_METHOD else stand_in.method
+    return own == drive.method_of(modifier)

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small meshes are left to their Armature modifiers while these give the same shape, and Sinew stays on."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import whole_file
+from program import run_sinew
+from sinew_addon.blender import drive, handlers, live, properties, small_meshes, stack
+from sinew_addon.core.scale_rule import IGNORED
+
+FRAMES = [1, 6, 11]
+
+
+@pytest.fixture(autouse=True)
+def left_where_faster(none_left_to_blender, monkeypatch):
+    monkeypatch.setattr(small_meshes, "is_used", True)
+
+
+@pytest.fixture
+def arm():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    return obj, armature
+
+
+def deformer(obj: bpy.types.Object) -> str:
+    """Whose modifier deforms the object; that it is one, that frames show its shape and what Sinew knows of
+    it, is checked."""
+    own, sinews = obj.modifiers["Armature"], stack.sinew_modifier(obj)
+    by_blender = own.show_viewport and own.show_render and own.object is not None
+    by_sinew = sinews.show_viewport and sinews.show_render
+    assert by_blender != by_sinew
+    settings, state = properties.of(obj), handlers.state_of(obj)
+    assert (settings.enabled, settings.error) == (True, "")
+    assert state.is_left == by_blender
+    drivers = obj.animation_data.drivers if obj.animation_data else []
+    assert (len(drivers) == 0) == by_blender
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        ((_obj, known),) = scenes.states_of(obj)
+        assert scenes.worst(known.chain.points, scenes.final_points(obj)) <= 1e-5 * scenes.diagonal(obj)
+    return "blender" if by_blender else "sinew"
+
+
+@pytest.mark.parametrize(("preserve_volume", "method"), [(False, "lbs"), (True, "dq")])
+def test_left_where_the_modifier_blends_alike(preserve_volume, method):
+    obj, _armature = scenes.make_arm()
+    obj.modifiers[0].use_deform_preserve_volume = preserve_volume
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj, method)
+    assert deformer(obj) == "blender"
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+    properties.of(obj).method = "qv"
+    assert deformer(obj) == "sinew"
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) > 1e-3
+    properties.of(obj).method = "lbs" if preserve_volume else "dq"
+    assert deformer(obj) == "sinew"
+    properties.of(obj).method = method
+    assert deformer(obj) == "blender"
+
+
+def test_taken_up_and_left_by_what_the_artist_does(arm, monkeypatch):
+    obj, _armature = arm
+    settings = properties.of(obj)
+    for name, value in (("leave_small", False), ("scale_rule", IGNORED.name), ("heat", True)):
+        before = getattr(settings, name)
+        assert deformer(obj) == "blender"
+        setattr(settings, name, value)
+        assert deformer(obj) == "sinew", name
+        setattr(settings, name, before)
+    assert deformer(obj) == "blender"
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "sinew"
+    obj.modifiers["Armature"].use_deform_preserve_volume = False
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "blender"
+    settings.keyframe_insert("method", frame=1)
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "sinew"
+    settings.keyframe_delete("method", frame=1)
+    obj.update_tag()
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "blender"
+    monkeypatch.setitem(small_meshes.VERTICES, "lbs", len(obj.data.vertices))
+    bpy.ops.sinew.rebind()
+    assert deformer(obj) == "sinew"
+
+
+def test_a_flag_changed_between_frames(arm):
+    obj, _armature = arm
+    expected = scenes.shapes(obj, FRAMES)
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    got = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(got, expected) <= 1e-5 * scenes.diagonal(obj)
+    assert deformer(obj) == "sinew"
+
+
+def test_a_method_keyed_between_frames(arm):
+    obj, _armature = arm
+    settings = properties.of(obj)
+    settings.method = "qv"
+    expected = scenes.shapes(obj, FRAMES)
+    settings.method = "lbs"
+    assert deformer(obj) == "blender"
+    settings.keyframe_insert("method", frame=1)
+    settings["method"] = properties.METHODS["qv"].number
+    settings.keyframe_insert("method", frame=6)
+    settings.method = "lbs"
+    assert scenes.worst(scenes.shapes(obj, FRAMES)[1:], expected[1:]) <= 1e-5 * scenes.diagonal(obj)
+
+
+def test_something_in_front_is_taken_up(arm):
+    obj, _armature = arm
+    mirror = obj.modifiers.new("Mirror", "MIRROR")
+    obj.modifiers.move(2, 0)
+    bpy.context.view_layer.update()
+    assert not handlers.state_of(obj).is_left
+    expected = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5 * scenes.diagonal(obj)
+    properties.of(obj).enabled = True
+    obj.modifiers.remove(mirror)
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "blender"
+
+
+def test_edits_are_followed(arm):
+    obj, armature = arm
+    obj.vertex_groups[0].add(list(range(100, 140)), 1.0, "REPLACE")
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "blender"
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert deformer(obj) == "blender"
+    other = armature.copy()
+    other.data = armature.data.copy()
+    bpy.context.scene.collection.objects.link(other)
+    scenes.bend(other, 30.0)
+    obj.modifiers["Armature"].object = other
+    assert deformer(obj) == "blender"
+    assert properties.of(obj).armature == other
+    bpy.context.view_layer.objects.active = other
+    bpy.ops.object.mode_set(mode="EDIT")
+    other.data.edit_bones["bone.0"].name = "new"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [group.name for group in obj.vertex_groups] == ["new", "bone.1"]
+    assert deformer(obj) == "blender"
+
+
+def test_a_file_saved_and_opened(arm, tmp_path):
+    expected = scenes.shapes(arm[0], FRAMES)
+    path = str(tmp_path / "arm.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = bpy.data.objects["Arm"]
+    assert deformer(obj) == "blender"
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+
+
+def test_on_and_off_and_removed(tmp_path):
+    obj, _armature = scenes.make_arm()
+    obj.modifiers[0].show_expanded = False
+    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    before = whole_file.of_open_file()
+    scenes.add_sinew(obj)
+    properties.of(obj).method = "qv"
+    properties.of(obj).method = "lbs"
+    properties.of(obj).enabled = False
+    assert scenes.states_of(obj) == []
+    properties.of(obj).enabled = True
+    assert deformer(obj) == "blender"
+    bpy.context.scene.frame_set(1)
+    drive.remove(obj)
+    handlers.refresh(bpy.context)
+    assert whole_file.differences(before, whole_file.of_open_file()) == []
+
+
+def test_frames_cost_nothing_of_sinews(arm, monkeypatch):
+    scenes.shapes(arm[0], FRAMES)
+    looked_at = []
+    monkeypatch.setattr(handlers.driven, "update", lambda *arguments: looked_at.append(arguments))
+    scenes.shapes(arm[0], FRAMES)
+    assert looked_at == []
+
+
+def test_chained_modifiers_each_by_its_own():
+    obj, armature = scenes.make_arm()
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object, second.use_deform_preserve_volume = armature, True
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj)
+    assert handlers.state_of(obj).is_left
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+    properties.of(obj).stand_ins[1].method = "SAME"
+    assert not handlers.state_of(obj).is_left
+
+
+def test_numbers_are_those_of_sinew(arm):
+    obj, _armature = arm
+    measured = []
+    for leave in (True, False):
+        properties.of(obj).leave_small = leave
+        bpy.context.scene.frame_set(6)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        result = live.measure(scenes.states_of(obj), "dq", depsgraph).measured
+        measured.append((result.entry("volume_change"), result.field("distance").copy()))
+    assert measured[0][0] == pytest.approx(measured[1][0], abs=1e-6)
+    assert measured[0][1] == pytest.approx(measured[1][1], abs=1e-6)
+    assert measured[0][1].max() > 1e-3
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
+def test_baked(arm, tmp_path, kind):
+    obj, _armature = arm
+    expected = scenes.shapes(obj, FRAMES)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
+    assert not properties.is_driven(obj)
+    assert not any(m.show_viewport for m in obj.modifiers if m.type == "ARMATURE")
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
+
+
+def test_commands_save_sinew_at_work(arm, tmp_path):
+    path, out = tmp_path / "arm.blend", tmp_path / "out"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    run_sinew("reskin", path, "--method", "lbs", "--out", out, "--no-pictures")
+    with handlers.held():
+        bpy.ops.wm.open_mainfile(filepath=str(out / "arm.blend"))
+        assert properties.of(bpy.data.objects["Arm"]).standing_in
+    handlers.on_loaded()
+    assert deformer(bpy.data.objects["Arm"]) == "blender"
