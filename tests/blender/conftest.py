@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
+import scenes
 import sinew_addon
 from sinew_addon.blender import small_meshes
 
@@ -67,3 +69,17 @@ def real_rig():
         return path
 
     return find
+
+
+@pytest.fixture
+def arm(tmp_path):
+    """A saved arm with UVs and a material: object and file."""
+    obj, _armature = scenes.make_arm()
+    uv = obj.data.uv_layers.new(name="UVMap")
+    spread = np.linspace(0.0, 1.0, 2 * len(uv.data), dtype=np.float32)
+    uv.data.foreach_set("uv", spread)
+    obj.data.materials.append(bpy.data.materials.new("Skin"))
+    path = tmp_path / "in" / "arm.blend"
+    path.parent.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return obj, path

@@ -70,20 +70,6 @@ def read_elsewhere(path, frames, tmp_path, hidden=()):
         return dict(arrays)
 
 
-@pytest.fixture
-def arm(tmp_path):
-    """A saved arm with UVs and a material: object, file, and what Sinew shows of it at FRAMES."""
-    obj, _armature = scenes.make_arm()
-    uv = obj.data.uv_layers.new(name="UVMap")
-    spread = np.linspace(0.0, 1.0, 2 * len(uv.data), dtype=np.float32)
-    uv.data.foreach_set("uv", spread)
-    obj.data.materials.append(bpy.data.materials.new("Skin"))
-    path = tmp_path / "in" / "arm.blend"
-    path.parent.mkdir()
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return obj, path
-
-
 def shown(obj, frames, method=METHOD):
     scenes.add_sinew(obj, method)
     return scenes.shapes(obj, frames)

@@ -12,7 +12,7 @@ import scenes
 from sinew_addon.blender import bake, bake_apart
 from sinew_addon.core.bake import EXPORTS
 from sinew_addon.core.errors import SinewError
-from test_bake import FRAMES, METHOD, arm, read_elsewhere  # noqa: F401 (arm is a fixture)
+from test_bake import FRAMES, METHOD, read_elsewhere
 
 KINDS = list(EXPORTS)
 
@@ -43,7 +43,7 @@ def shape_of_scene():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_same_as_in_this_blender(arm, tmp_path, kind):  # noqa: F811
+def test_the_same_as_in_this_blender(arm, tmp_path, kind):
     """With what is in no file yet: a pose, an object's place, another scene with a view layer of its own."""
     obj, _path = arm
     scenes.add_sinew(obj, METHOD)
@@ -79,7 +79,7 @@ def test_the_same_as_in_this_blender(arm, tmp_path, kind):  # noqa: F811
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("when", ["starting", "exporting"])
-def test_stopped_nothing_is_left(arm, tmp_path, kind, when):  # noqa: F811
+def test_stopped_nothing_is_left(arm, tmp_path, kind, when):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
     image = bpy.data.images.new("Dots", 4, 4)
@@ -100,7 +100,7 @@ def test_stopped_nothing_is_left(arm, tmp_path, kind, when):  # noqa: F811
     assert (shape_of_scene(), path.read_bytes(), below(path.parent)) == before
 
 
-def test_one_that_crashes_is_told(arm, tmp_path):  # noqa: F811
+def test_one_that_crashes_is_told(arm, tmp_path):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
     before = below(path.parent)
@@ -114,7 +114,7 @@ def test_one_that_crashes_is_told(arm, tmp_path):  # noqa: F811
     assert below(path.parent) == before
 
 
-def test_what_only_it_finds_wrong_is_told(arm, tmp_path):  # noqa: F811
+def test_what_only_it_finds_wrong_is_told(arm, tmp_path):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
     weld = obj.modifiers.new("Weld", "WELD")
@@ -128,7 +128,7 @@ def test_what_only_it_finds_wrong_is_told(arm, tmp_path):  # noqa: F811
     assert below(path.parent) == before
 
 
-def test_painted_textures_are_saved_first(arm, tmp_path):  # noqa: F811
+def test_painted_textures_are_saved_first(arm, tmp_path):
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
     image = bpy.data.images.new("Skin Colour", 4, 4)
@@ -140,7 +140,7 @@ def test_painted_textures_are_saved_first(arm, tmp_path):  # noqa: F811
     assert bake_to(path.parent, "usd", apart=True) == {"FINISHED"}
 
 
-def test_simulations_keep_their_caches_on_disk(arm, tmp_path):  # noqa: F811
+def test_simulations_keep_their_caches_on_disk(arm, tmp_path):
     """Without its cache, a cloth is simulated anew: here under another gravity."""
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
