@@ -115,7 +115,7 @@ class BlenderProcess:
                 yield self._said()
         finally:
             if not outcome.done():
-                self.kill()
+                self.end()
         yield outcome.result()
 
     def is_spent(self, limits: Limits) -> bool:

@@ -38,7 +38,7 @@ def sample(started: Export) -> Iterator[float]:
                     yield share
             finally:
                 # Its work is done or not wanted.
-                blender.kill()
+                blender.end()
         if "error" in outcome:
             raise SinewError(outcome["error"])
     except BlenderLost as lost:
