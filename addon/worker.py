@@ -23,7 +23,8 @@ Report = Callable[..., None]
 
 def run(task: dict, report: Report) -> dict:
     """Does one task in this process: what became of it, and the hash of what was read."""
-    from .blender import bake_apart, reskin
+    from .blender import reskin
+    from .blender.bake import bake_apart
 
     actions = {"reskin": reskin.reskin, "restore": reskin.restore, "export": bake_apart.export}
     try:

@@ -14,7 +14,8 @@ import time
 import bpy
 import numpy as np
 import sinew_addon
-from sinew_addon.blender import drive, handlers, measures
+from sinew_addon.blender import drive, handlers
+from sinew_addon.blender.heat import measures
 from sinew_addon.core.metrics import METRICS
 
 SIDES, RINGS, ROUNDS, FRAMES = 200, 500, 8, range(2, 12)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from . import animation, front, heat_view, points, pose_driver, properties, stack
+from . import animation, front, points, pose_driver, properties, stack
+from .heat import heat_view
 from .stack import armature_modifier, sinew_modifier
 
 

@@ -12,10 +12,11 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, heat_map, heat_view, measures, overrides, points, properties, redraw
+from . import drive, driven, overrides, points, properties, redraw
 from .changes import Changes
 from .driven import Driven
 from .gate import Gate, is_allowed
+from .heat import heat_map, heat_view, measures
 from .in_evaluation import Answers
 
 log = logging.getLogger("sinew")

@@ -8,7 +8,8 @@ from collections.abc import Callable
 import bpy
 
 from ..core.errors import SinewError
-from . import drive, handlers, inbetween, inbetween_bake, properties
+from . import drive, handlers, properties
+from .inbetween import inbetween, inbetween_bake
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:

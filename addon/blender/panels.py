@@ -6,7 +6,8 @@ from __future__ import annotations
 import bpy
 
 from ..core import inbetween as core_inbetween
-from . import drive, driven, handlers, inbetween, inbetween_handlers, operators, properties, small_meshes
+from . import drive, driven, handlers, operators, properties, small_meshes
+from .inbetween import inbetween, inbetween_handlers
 from .sidebar import Sidebar, draw_text
 
 

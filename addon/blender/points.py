@@ -7,7 +7,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import carrier, front, heat_nodes, mesh_io, node_group, pose_driver, properties, stack
+from . import carrier, front, mesh_io, node_group, pose_driver, properties, stack
+from .heat import heat_nodes
 
 ATTRIBUTE = "sinew_points"
 # Beside them, while a heat map is shown: the colour of each vertex.

@@ -20,21 +20,12 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from . import (
-        bake_operator,
-        comparison_labels,
-        comparison_operators,
-        comparison_panel,
-        comparison_state,
-        diagnostics_panel,
-        handlers,
-        heat_panel,
-        inbetween_handlers,
-        measures,
-        operators,
-        panels,
-        properties,
-    )
+    from . import handlers, operators, panels, properties
+    from .bake import bake_operator
+    from .comparison import comparison_labels, comparison_operators, comparison_panel, comparison_state
+    from .diagnostics import diagnostics_panel
+    from .heat import heat_panel, measures
+    from .inbetween import inbetween_handlers
 
     _register_classes((*properties.CLASSES, *measures.CLASSES, *operators.CLASSES, *panels.CLASSES))
     _register_classes(bake_operator.CLASSES)
@@ -63,16 +54,11 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import (
-            comparison_labels,
-            diagnostics_panel,
-            drive,
-            handlers,
-            heat_legend,
-            inbetween_handlers,
-            measures,
-            properties,
-        )
+        from . import drive, handlers, properties
+        from .comparison import comparison_labels
+        from .diagnostics import diagnostics_panel
+        from .heat import heat_legend, measures
+        from .inbetween import inbetween_handlers
 
         atexit.unregister(unregister)
         comparison_labels.unregister()

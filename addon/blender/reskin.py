@@ -17,7 +17,10 @@ from ..core.frames import parse_frames
 from ..core.names import fits
 from ..core.output import remove
 from ..core.views import seen_extent, whole_view
-from . import bake_copy, comparison, drive, evaluate, files, handlers, properties, render, stack
+from . import drive, evaluate, files, handlers, properties, stack
+from .bake import bake_copy
+from .comparison import comparison
+from .pages import render
 
 # Twice what the report shows them at.
 PICTURE_SIZE = 720

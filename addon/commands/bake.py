@@ -90,7 +90,8 @@ def _bake(
 ) -> None:
     import bpy
 
-    from ..blender import bake, drive, evaluate, files
+    from ..blender import drive, evaluate, files
+    from ..blender.bake import bake
 
     source, target = outcome.job.source, outcome.job.target
     if target.exists() and not args.overwrite:

@@ -19,8 +19,8 @@ from . import sheet
 from .console import Console
 
 if TYPE_CHECKING:
-    from ..blender.measure import Subject
-    from ..blender.render import Studio
+    from ..blender.pages.measure import Subject
+    from ..blender.pages.render import Studio
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
@@ -75,7 +75,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..blender import evaluate, render, video
+    from ..blender import evaluate
+    from ..blender.pages import render, video
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     evaluate.check_methods([*methods, args.reference])
@@ -123,7 +124,8 @@ def _compare(
     """Writes one file's page; false where a mesh was left out."""
     import bpy
 
-    from ..blender import evaluate, files, illustrate, measure, render
+    from ..blender import evaluate, files
+    from ..blender.pages import illustrate, measure, render
 
     files.open_file(path)
     scene = bpy.context.scene
@@ -159,7 +161,7 @@ def _compare(
 def _write_video(
     subject: Subject, comparison: Comparison, studio: Studio, path: Path, console: Console
 ) -> None:
-    from ..blender import illustrate, video
+    from ..blender.pages import illustrate, video
 
     render = subject.scene.render
     with tempfile.TemporaryDirectory() as folder:
@@ -177,7 +179,8 @@ def _measure(
     args: argparse.Namespace,
     console: Console,
 ) -> Comparison:
-    from ..blender import evaluate, measure, properties
+    from ..blender import evaluate, properties
+    from ..blender.pages import measure
 
     batches = measure.batches(subject, frames, len(methods) + 1)
     summaries, times, own = ({method: [] for method in methods} for _ in range(3))

@@ -82,7 +82,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _inbetween(job: Job, args: argparse.Namespace) -> Inbetweened:
     import bpy
 
-    from ..blender import actions, files, inbetween, inbetween_bake, inbetween_handlers
+    from ..blender import actions, files
+    from ..blender.inbetween import inbetween, inbetween_bake, inbetween_handlers
     from ..core import inbetween as core
 
     outcome = Inbetweened(job)

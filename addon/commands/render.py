@@ -106,7 +106,8 @@ def _draw(
 ) -> RenderSettings:
     import bpy
 
-    from ..blender import evaluate, files, render
+    from ..blender import evaluate, files
+    from ..blender.pages import render
 
     size = args.size or (golden.size if golden else 640)
     render.check_size(size)
@@ -137,7 +138,7 @@ def _draw(
 
 def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> int:
     """Compares pictures, shows a table, draws what differs; exit status."""
-    from ..blender import pictures
+    from ..blender.pages import pictures
 
     rows, failures = [], 0
     for frame in frames:

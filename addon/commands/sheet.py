@@ -25,7 +25,8 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     where the methods differ most and the volume against the rest pose."""
     import bpy
 
-    from ..blender import evaluate, files, measure, properties, render
+    from ..blender import evaluate, files, properties
+    from ..blender.pages import measure, render
 
     require_pillow()
     if args.out.suffix.lower() != ".png":

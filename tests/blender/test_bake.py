@@ -17,7 +17,8 @@ import numpy as np
 import program
 import pytest
 import scenes
-from sinew_addon.blender import actions, bake, properties
+from sinew_addon.blender import actions, properties
+from sinew_addon.blender.bake import bake
 from sinew_addon.core import bake as core
 from sinew_addon.core.errors import SinewError
 from test_command_line import run_sinew

@@ -9,7 +9,7 @@ import numpy as np
 import psutil
 import pytest
 import scenes
-from sinew_addon.blender import bake, bake_apart
+from sinew_addon.blender.bake import bake, bake_apart
 from sinew_addon.core.bake import EXPORTS
 from sinew_addon.core.errors import SinewError
 from test_bake import FRAMES, METHOD, read_elsewhere

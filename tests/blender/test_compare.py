@@ -19,7 +19,7 @@ import pytest
 import scenes
 import trimesh
 from conftest import REPOSITORY
-from sinew_addon.blender import pictures, video
+from sinew_addon.blender.pages import pictures, video
 from sinew_addon.commands import compare, render
 from sinew_addon.commands.console import Console
 from sinew_addon.core.errors import SinewError

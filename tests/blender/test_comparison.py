@@ -12,16 +12,8 @@ import test_restore
 import whole_file
 from conftest import BLEND_FILES
 from program import run_sinew
-from sinew_addon.blender import (
-    comparison_labels,
-    comparison_state,
-    drive,
-    evaluate,
-    files,
-    handlers,
-    operators,
-    properties,
-)
+from sinew_addon.blender import drive, evaluate, files, handlers, operators, properties
+from sinew_addon.blender.comparison import comparison_labels, comparison_state
 
 METHODS = evaluate.method_names()
 # The copies' coordinates are larger than the original's by the offset.

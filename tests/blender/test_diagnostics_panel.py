@@ -10,7 +10,8 @@ import bpy
 import pytest
 import scenes
 from mathutils import Quaternion
-from sinew_addon.blender import diagnose, drive
+from sinew_addon.blender import drive
+from sinew_addon.blender.diagnostics import diagnose
 
 # Vertices of the planted faults; the tube's rings have twelve.
 UNWEIGHTED = [3, 4, 5]

@@ -13,17 +13,9 @@ import scenes
 import snapshot
 import test_linked_data
 import whole_file
-from sinew_addon.blender import (
-    drive,
-    evaluate,
-    handlers,
-    heat_legend,
-    heat_nodes,
-    live,
-    measure,
-    measures,
-    properties,
-)
+from sinew_addon.blender import drive, evaluate, handlers, properties
+from sinew_addon.blender.heat import heat_legend, heat_nodes, live, measures
+from sinew_addon.blender.pages import measure
 from sinew_addon.commands import compare
 from sinew_addon.commands.console import Console
 from sinew_addon.core.heat import HeatScale, linear

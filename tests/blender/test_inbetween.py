@@ -15,7 +15,8 @@ import sinew
 import sinew_addon
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import Rotation
-from sinew_addon.blender import actions, files, inbetween, inbetween_bake, inbetween_handlers
+from sinew_addon.blender import actions, files
+from sinew_addon.blender.inbetween import inbetween, inbetween_bake, inbetween_handlers
 from sinew_addon.core import inbetween as core
 from test_render import prepare, render_animation
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY
 from PIL import Image
-from sinew_addon.blender import render, report_figures
+from sinew_addon.blender.pages import render, report_figures
 from sinew_addon.core.report import meshes
 
 SIZE = 96

@@ -9,7 +9,8 @@ import pytest
 import scenes
 import whole_file
 from program import run_sinew
-from sinew_addon.blender import drive, handlers, live, properties, small_meshes, stack
+from sinew_addon.blender import drive, handlers, properties, small_meshes, stack
+from sinew_addon.blender.heat import live
 from sinew_addon.core.scale_rule import IGNORED
 
 FRAMES = [1, 6, 11]

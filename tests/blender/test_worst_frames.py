@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import heat_map, heat_panel, live, measures, pose_io, stepped, worst_frames
+from sinew_addon.blender import pose_io, stepped
+from sinew_addon.blender.heat import heat_map, heat_panel, live, measures, worst_frames
 from sinew_addon.core.comparison import peaks
 from sinew_addon.core.metrics import METRICS
 
