@@ -99,6 +99,14 @@ def blenders_of(process: subprocess.Popen) -> list[psutil.Process]:
     return psutil.Process(process.pid).children()
 
 
+def command_of(process: psutil.Process) -> list[str]:
+    """Nothing of one that has just ended."""
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
+
+
 def wait_for_work(process: subprocess.Popen, but: int | None = None, seconds: float = 3.0) -> psutil.Process:
     """The first Blender, not that with the id `but`, that has been busy for so long: starting takes less."""
     end = time.monotonic() + 120
@@ -852,7 +860,7 @@ class Cluster:
             child
             for keeper in self._processes[1:]
             for child in psutil.Process(keeper.pid).children()
-            if "spawn_main" in " ".join(child.cmdline())
+            if "spawn_main" in " ".join(command_of(child))
         ]
 
     def blenders(self) -> list[psutil.Process]:
@@ -860,7 +868,7 @@ class Cluster:
             child
             for worker in self.workers()
             for child in worker.children()
-            if any(part.endswith(".worker") for part in child.cmdline())
+            if any(part.endswith(".worker") for part in command_of(child))
         ]
 
     def _start(self, *arguments: str) -> None:
