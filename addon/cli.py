@@ -8,6 +8,7 @@ import atexit
 import re
 import sys
 
+from .core import interrupt
 from .core.errors import SinewError, WrongUse
 from .prepare import leave_blender, prepare_blender
 
@@ -59,7 +60,8 @@ def main(argv: list[str]) -> int:
     try:
         if args.command not in WITHOUT_BLENDER:
             prepare_blender()
-        return modules[args.command].run(args, output)
+        with interrupt.heard():
+            return modules[args.command].run(args, output)
     except SinewError as error:
         output.complain(error)
         return 2 if isinstance(error, WrongUse) else 1

@@ -11,6 +11,7 @@ from types import MappingProxyType
 import bpy
 import numpy as np
 
+from ..core import interrupt
 from ..core.errors import SinewError, WrongUse
 from ..core.spaces import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
@@ -177,6 +178,7 @@ def length_unit(scene: bpy.types.Scene) -> str:
 def set_frame(scene: bpy.types.Scene, frame: float) -> None:
     whole = int(np.floor(frame))
     scene.frame_set(whole, subframe=float(frame - whole))
+    interrupt.check()
 
 
 def whole_views(

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -121,13 +121,12 @@ def _bake(
         with (
             _whole_or_nothing(started, source),
             console.bar(what, len(chosen)) as show,
-            _stoppable(started, is_export, console) as check,
+            _ended_by_interrupt(started, console) if is_export else nullcontext(),
         ):
             if is_export:
                 started.told = show
             for share in started.sample():
                 show(share)
-                check()
     with _whole_or_nothing(started, source):
         started.place()
         if is_export:
@@ -149,28 +148,17 @@ def _whole_or_nothing(started, source: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _stoppable(started, is_export: bool, console: Console) -> Iterator[Callable[[], None]]:
-    """For Ctrl-C. Blender drops a KeyboardInterrupt within its handlers and exporters, and goes on: so it is
-    raised by what this gives, to be called between frames. An exporter takes all frames in one call, and the
-    process ends there."""
-    stopped = False
+def _ended_by_interrupt(started, console: Console) -> Iterator[None]:
+    """An exporter takes all frames in one call, which drops a KeyboardInterrupt: the process ends there."""
 
     def on_interrupt(_signal: int, _frame: object) -> None:
-        nonlocal stopped
-        stopped = True
-        if is_export:
-            started.discard()
-            console.close()
-            console.complain("stopped")
-            leave_blender(130)
-
-    def check() -> None:
-        if stopped:
-            raise KeyboardInterrupt
+        started.discard()
+        console.close()
+        console.complain("stopped")
+        leave_blender(130)
 
     before = signal.signal(signal.SIGINT, on_interrupt)
     try:
-        yield check
+        yield
     finally:
-        # None was Blender's own, which can not be put back.
-        signal.signal(signal.SIGINT, before or signal.default_int_handler)
+        signal.signal(signal.SIGINT, before)

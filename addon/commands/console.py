@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO, TypeVar
 
+from ..core import interrupt
+
 Item = TypeVar("Item")
 
 
@@ -67,6 +69,7 @@ class Console:
         with self.bar(what, total) as show:
             for number, item in enumerate(items):
                 yield item
+                interrupt.check()
                 show((number + 1) / total)
 
     @contextmanager

@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
+import subprocess
+import time
 
 import bpy
 import numpy as np
+import program
 import pytest
 import scenes
 import sinew
@@ -250,6 +254,25 @@ def test_compare_draws_a_sheet(tmp_path, engine):
         assert column.std() > 5, "an empty picture"
     assert np.abs(columns[0] - columns[1]).mean() < 1.0, "lbs is not the Armature modifier"
     assert np.abs(columns[1] - columns[2]).mean() > 3.0, "the methods look the same"
+
+
+@pytest.mark.parametrize("round", range(4))
+def test_ctrl_c_stops_what_goes_through_frames(arm_file, tmp_path, round):
+    """Wherever it comes: Blender drops it within its handlers."""
+    path, _shapes = arm_file
+    folder = tmp_path / "page"
+    command = ("compare", path, "--frames", "1-20000", "--pictures", "0", "--out", folder)
+    process = subprocess.Popen(
+        [*program.COMMAND, *map(str, command)], env=program.ENVIRONMENT, stderr=subprocess.PIPE, text=True
+    )
+    assert "Measuring" in process.stderr.readline()
+    time.sleep(0.3 * round)
+    process.send_signal(signal.SIGINT)
+    _output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert "stopped" in errors
+    assert not folder.exists() or not any(folder.iterdir())
 
 
 def test_glb_files_are_read(real_rig, tmp_path):
