@@ -116,7 +116,7 @@ def test_select_selects_exactly_those(name, start):
     obj.select_set(True)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
-    bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+    bpy.context.scene.tool_settings.mesh_select_mode = (False, False, True)
     bpy.ops.object.mode_set(mode="OBJECT")
     scenes.add_sinew(obj, "dq")
     bpy.ops.sinew.check()
@@ -131,7 +131,7 @@ def test_select_selects_exactly_those(name, start):
     assert bpy.context.object == obj
     assert selected(obj) == expected
     assert other.mode == "OBJECT"
-    assert tuple(bpy.context.tool_settings.mesh_select_mode) == (True, False, False)
+    assert tuple(bpy.context.scene.tool_settings.mesh_select_mode) == (True, False, False)
 
 
 def test_select_shows_what_is_hidden_and_no_more():

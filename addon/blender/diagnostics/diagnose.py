@@ -133,7 +133,8 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     mesh.vertices.foreach_get("hide", hidden)
     # What is hidden can not be selected.
     mesh.vertices.foreach_set("hide", hidden & ~chosen)
-    context.tool_settings.mesh_select_mode = (True, False, False)
+    # Not of the context: asked for that, Blender 4.2 keeps the scene with the context and crashes without it.
+    context.scene.tool_settings.mesh_select_mode = (True, False, False)
     bpy.ops.object.mode_set(mode="EDIT")
     # Not by foreach_set before that: Blender 5.0 crashed in it, on edges or faces of a mesh with hidden ones.
     edited = bmesh.from_edit_mesh(mesh)
