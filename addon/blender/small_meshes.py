@@ -15,7 +15,7 @@ from ..core.scale_rule import BLENDER_4
 from . import animation, drive, front, pose_driver, properties
 
 # Below as many vertices an Armature modifier is the faster one (bench/README.md), by method.
-VERTICES = {"lbs": 6_000, "dq": 4_000}
+VERTICES = {"lbs": 10_000, "dq": 6_000}
 # Commands compare Sinew with the modifier, and save files in which Sinew is at work.
 is_used = True
 
