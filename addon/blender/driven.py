@@ -46,8 +46,8 @@ class Driven:
     rest_points        of the last frame
     dirtied_by_frames  the last change of frame moved the object or its rest points
     looks              what the artist can change of the object itself
-    left_to            names of the Armature modifiers that a small mesh is left to
-    left_by            what they were set to then
+    left_by            what had a small mesh left to its Armature modifiers, as small_meshes.choices(); empty
+                       where it is not
     asking             the driver asks for the points within Blender's evaluation
     attribute          what holds them there
     mesh_users         how many the mesh has; others could read while it is written
@@ -69,7 +69,6 @@ class Driven:
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
     looks: list = field(default_factory=list)
-    left_to: list[str] = field(default_factory=list)
     left_by: list[str] = field(default_factory=list)
     asking: bool = False
     attribute: str = ""
@@ -91,12 +90,12 @@ class Driven:
     def is_answered(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""
         if self.is_left:
-            return self.left_by == small_meshes.choices(obj, self.left_to)
+            return self.left_by == small_meshes.choices(obj)
         return self.answered != 0 and self.answered == obj.data.evaluated_get(depsgraph).as_pointer()
 
     @property
     def is_left(self) -> bool:
-        return bool(self.left_to)
+        return bool(self.left_by)
 
     @property
     def binding(self) -> Binding:
@@ -145,8 +144,7 @@ def update(
         return None if obj.evaluated_get(depsgraph).is_evaluated else driven
     known, known_source = driven, driven and driven.source
     driven = _current(obj, driven, depsgraph, changes, touched)
-    driven.left_to = [modifier.name for modifier, _stand_in in drive.stand_ins(obj)] if is_left else []
-    driven.left_by = small_meshes.choices(obj, driven.left_to)
+    driven.left_by = small_meshes.choices(obj) if is_left else []
     if touched or not driven.watched:
         driven.looks = _looks(obj)
         mesh = obj.data.session_uid
@@ -365,9 +363,8 @@ def _frames(
             # An armature scaled to nothing for a moment.
             return None
         pose = armature_io.read_pose(armature, link.binding.bones)
-        # The first link's is the object's.
-        own = stand_in.method if frames else properties.SAME_METHOD
-        frames.append(LinkFrame(method if own == properties.SAME_METHOD else own, pose, space, scale_rule))
+        own = properties.method_of_link(method, stand_in.method, is_first=not frames)
+        frames.append(LinkFrame(own, pose, space, scale_rule))
     return frames
 
 

@@ -69,6 +69,15 @@ OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 SAME_METHOD = "SAME"
 
 
+def method_of_link(method: str, own: str, is_first: bool) -> str:
+    """What one of an object's Armature modifiers blends by; the first has the object's.
+
+    method  the object's
+    own     the stand-in's
+    """
+    return method if is_first or own == SAME_METHOD else own
+
+
 class SinewStandIn(bpy.types.PropertyGroup):
     """What Sinew keeps of an Armature modifier that it stands in for, called `name`."""
 

@@ -7,8 +7,6 @@ Sinew stays on, with all that it measures, bakes and compares; only who deforms 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import bpy
 
 from ..core.scale_rule import BLENDER_4
@@ -30,25 +28,24 @@ def is_left_to_blender(obj: bpy.types.Object) -> bool:
         and settings.scale_rule == BLENDER_4.name
         # Its colours need the points.
         and not settings.heat
-        and all(_blends_alike(obj, *pair) for pair in drive.stand_ins(obj))
+        and _blend_alike(obj)
         and not front.is_needed(obj)
         and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animation.animated_paths(obj))
     )
 
 
-def choices(obj: bpy.types.Object, modifiers: Sequence[str]) -> list[str]:
-    """Of what decides that, what scripts and animation can set between two frames without any other event.
-
-    modifiers  names of the object's Armature modifiers
-    """
+def choices(obj: bpy.types.Object) -> list[str]:
+    """Of what decides that, what scripts and animation can set between two frames without any other event."""
     settings = properties.of(obj)
-    found = [obj.modifiers.get(name) for name in modifiers]
-    methods = [drive.method_of(m) if m is not None else "" for m in found]
+    modifiers = [obj.modifiers.get(stand_in.name) for stand_in in settings.stand_ins]
+    methods = [drive.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
     return [settings.method, settings.scale_rule, *methods]
 
 
-def _blends_alike(
-    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, stand_in: properties.SinewStandIn
-) -> bool:
-    own = properties.of(obj).method if stand_in.method == properties.SAME_METHOD else stand_in.method
-    return own == drive.method_of(modifier)
+def _blend_alike(obj: bpy.types.Object) -> bool:
+    """Whether each Armature modifier by itself blends as Sinew does in its place."""
+    method = properties.of(obj).method
+    return all(
+        drive.method_of(modifier) == properties.method_of_link(method, stand_in.method, is_first=number == 0)
+        for number, (modifier, stand_in) in enumerate(drive.stand_ins(obj))
+    )
