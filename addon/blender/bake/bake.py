@@ -24,7 +24,8 @@ SHAPE_KEYS = "shape-keys"
 
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
-    pairs = handlers.states_of([obj], bpy.context.evaluated_depsgraph_get())
+    # As it was evaluated with the frame: what Sinew wrote since would be evaluated for nothing.
+    pairs = handlers.states_of([obj], bpy.context.view_layer.depsgraph)
     if not pairs or obj.mode in driven.MODES_OF_THE_MODIFIER:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
     return pairs[0][1].chain.points
