@@ -19,7 +19,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent import futures
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -107,11 +107,11 @@ class BlenderProcess:
     def follow(self, task: dict, limits: Limits) -> Iterator[dict]:
         """What it says of what it is doing, every INTERVAL s, and at last what run() gives. Raises as that;
         closed before, it ends the process."""
-        aside = ThreadPoolExecutor(1)
+        aside = futures.ThreadPoolExecutor(1)
         outcome = aside.submit(self.run, task, limits)
         aside.shutdown(wait=False)
         try:
-            while not wait([outcome], INTERVAL).done:
+            while not futures.wait([outcome], INTERVAL).done:
                 yield self._said()
         finally:
             if not outcome.done():

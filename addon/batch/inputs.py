@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from ..core.bake import BAKED
@@ -64,7 +65,7 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     else:
         return path.parent, [path]
     # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
-    resolved, resolve = out.resolve(), _Resolver()
+    resolved, resolve = out.resolve(), _resolver()
     may_be_below = resolved != root.resolve()
     files = [
         p
@@ -105,7 +106,7 @@ def _is_bake(path: Path) -> bool:
 
 
 def _check(jobs: list[Job]) -> None:
-    resolve = _Resolver()
+    resolve = _resolver()
     sources = {resolve(job.source) for job in jobs}
     targets: dict[Path, Path] = {}
     for job in jobs:
@@ -117,16 +118,7 @@ def _check(jobs: list[Job]) -> None:
             raise WrongUse(f"{other} and {job.source} would both be written to {job.target}")
 
 
-class _Resolver:
+def _resolver() -> Callable[[Path], Path]:
     """Path.resolve() for many files in few folders: each folder is looked at once."""
-
-    def __init__(self) -> None:
-        self._resolved: dict[Path, Path] = {}
-
-    def __call__(self, path: Path) -> Path:
-        if path.is_symlink():
-            return path.resolve()
-        folder = path.parent
-        if folder not in self._resolved:
-            self._resolved[folder] = folder.resolve()
-        return self._resolved[folder] / path.name
+    folder = cache(Path.resolve)
+    return lambda path: path.resolve() if path.is_symlink() else folder(path.parent) / path.name
