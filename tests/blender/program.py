@@ -11,6 +11,11 @@ COMMAND = [sys.executable, "-c", "from sinew_addon.cli import run; run()"]
 ENVIRONMENT = {**os.environ, "PYTHONIOENCODING": "utf-8"}
 
 
+def start_sinew(*args: object, **options: object) -> subprocess.Popen:
+    """options  of subprocess.Popen, such as its pipes"""
+    return subprocess.Popen([*COMMAND, *map(str, args)], env=ENVIRONMENT, **options)
+
+
 def run_sinew(*args: object, status: int = 0) -> subprocess.CompletedProcess:
     result = subprocess.run(
         [*COMMAND, *map(str, args)],

@@ -664,10 +664,6 @@ def test_wrong_use(arm, tmp_path):
     run_sinew("bake", path, "--method", METHOD, "--to", "pc2", "--out", tmp_path / "o", "--overwrite")
 
 
-def start_sinew(*args, **pipes):
-    return subprocess.Popen([*program.COMMAND, *map(str, args)], env=program.ENVIRONMENT, **pipes)
-
-
 # Long enough to be stopped; glTF's exporter takes minutes for as many.
 LONG = {kind: 3000 for kind in core.KINDS} | {"gltf": 200}
 
@@ -679,7 +675,7 @@ def test_ctrl_c_leaves_nothing_behind(arm, tmp_path, kind):
     out = tmp_path / "out"
     out.mkdir()
     command = ("bake", path, "--method", METHOD, "--to", kind, "--frames", f"1-{LONG[kind]}", "--out", out)
-    process = start_sinew(*command, stderr=subprocess.PIPE, text=True)
+    process = program.start_sinew(*command, stderr=subprocess.PIPE, text=True)
     assert f"({LONG[kind]})" in process.stderr.readline()
     if kind in ("mdd", "pc2", "alembic", "usd"):
         while not [p for p in out.rglob("*") if p.is_file()]:
@@ -710,7 +706,7 @@ def test_an_export_shows_its_frames(arm, tmp_path, kind):
         "--out",
         tmp_path,
     )
-    process = start_sinew(*command, stdout=subprocess.DEVNULL, stderr=theirs)
+    process = program.start_sinew(*command, stdout=subprocess.DEVNULL, stderr=theirs)
     os.close(theirs)
     shown = b""
     # Reading from a terminal that nobody writes to any more fails.

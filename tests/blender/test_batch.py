@@ -18,11 +18,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import program
 import psutil
 import pytest
 import scenes
 import whole_file
-from program import COMMAND, ENVIRONMENT, run_sinew
+from program import ENVIRONMENT, run_sinew
 from sinew_addon.batch.job_file import Settings
 from sinew_addon.blender import files, properties
 from sinew_addon.blender_process import BlenderProcess, Limits
@@ -82,14 +83,13 @@ def make_work(path: Path, vertices: int, iterations: int) -> Path:
 
 
 def start_sinew(*args: object, **options: object) -> subprocess.Popen:
-    return subprocess.Popen(
-        [*COMMAND, *map(str, args)],
+    return program.start_sinew(
+        *args,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         encoding="utf-8",
-        env=ENVIRONMENT,
         **options,
     )
 

@@ -262,9 +262,7 @@ def test_ctrl_c_stops_what_goes_through_frames(arm_file, tmp_path, round):
     path, _shapes = arm_file
     folder = tmp_path / "page"
     command = ("compare", path, "--frames", "1-20000", "--pictures", "0", "--out", folder)
-    process = subprocess.Popen(
-        [*program.COMMAND, *map(str, command)], env=program.ENVIRONMENT, stderr=subprocess.PIPE, text=True
-    )
+    process = program.start_sinew(*command, stderr=subprocess.PIPE, text=True)
     assert "Measuring" in process.stderr.readline()
     time.sleep(0.3 * round)
     process.send_signal(signal.SIGINT)
