@@ -87,9 +87,7 @@ def _with_signed_frames(argv: list[str]) -> list[str]:
 def run() -> None:
     """Entry point of the program in plain Python."""
     status = main(sys.argv[1:])
-    bpy = sys.modules.get("bpy")
-    if bpy is not None and bpy.app.version < (4, 3) and "io_scene_gltf2.io.exp" in sys.modules:
-        # Having exported glTF, Blender 4.2 as a module crashes in its own ending, all work done.
+    if "bpy" in sys.modules:
         leave_blender(status)
     sys.exit(status)
 
