@@ -28,8 +28,8 @@ def prepare_blender() -> None:
 
 
 def leave_blender(status: int) -> NoReturn:
-    """Ends the process at once, all work done, without the ending of Blender as a module: having exported glTF,
-    4.2 crashes there, and 4.5 can hang."""
+    """Ends the process at once, all work done, without the ending of Blender as a module: having exported
+    glTF, 4.2 crashes there, and 4.5 can hang."""
     import bpy
 
     shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
