@@ -34,11 +34,28 @@ class Changes:
     complete: bool = False
 
     @staticmethod
-    def are_motion_only(depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether nothing changed but what animation moves: all that an artist changes of an object or of its
-        data makes Blender list the mesh, the armature or the scene, too (seen on 4.2 and 5.2)."""
+    def are_of_meshes_only(depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether nothing changed but meshes, and what animation moves: all that an artist changes of an
+        object or of its data makes Blender list the mesh, the armature or the scene, too (seen on 4.2 and
+        5.2)."""
         changed = depsgraph.id_type_updated
-        return not (changed("MESH") or changed("ARMATURE") or changed("SCENE") or changed("COLLECTION"))
+        return not (changed("ARMATURE") or changed("SCENE") or changed("COLLECTION"))
+
+    @staticmethod
+    def are_motion_only(depsgraph: bpy.types.Depsgraph) -> bool:
+        return not depsgraph.id_type_updated("MESH") and Changes.are_of_meshes_only(depsgraph)
+
+    @staticmethod
+    def meshes_in(depsgraph: bpy.types.Depsgraph) -> set[int] | None:
+        """Those whose geometry was touched, by session_uid, without reading all the rest; None where no mesh
+        was touched in any way."""
+        if not depsgraph.id_type_updated("MESH"):
+            return None
+        return {
+            update.id.original.session_uid
+            for update in depsgraph.updates
+            if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh)
+        }
 
     @classmethod
     def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:

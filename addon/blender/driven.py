@@ -53,6 +53,8 @@ class Driven:
     mesh_users         how many the mesh has; others could read while it is written
     answered           the address of the evaluated mesh that was given points in the last evaluation, or 0
     is_kept            the mesh itself holds the last points too, not only the evaluated one
+    is_suspect         the mesh may have changed since it was read: left to Blender, it is looked at when
+                       somebody asks
     lock               held while the chain works: a render may ask from a thread of its own
     shapes             how many have been written
     """
@@ -75,6 +77,7 @@ class Driven:
     mesh_users: int = 0
     answered: int = 0
     is_kept: bool = True
+    is_suspect: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
     milliseconds: float = 0.0
     shapes: int = 0
@@ -92,6 +95,21 @@ class Driven:
         if self.is_left:
             return self.left_by == small_meshes.choices(obj)
         return self.answered != 0 and self.answered == obj.data.evaluated_get(depsgraph).as_pointer()
+
+    def is_untouched_by_frame(self, obj: bpy.types.Object, meshes: set[int] | None) -> bool:
+        """Whether a change of frame, whose Changes.meshes_in() these are and which changed nothing else, left
+        what the shape is made of as it was. What is left to Blender has its shape in any case."""
+        if meshes is None:
+            return True
+        if self.is_left:
+            self.is_suspect = True
+            return True
+        if obj.data.session_uid in meshes:
+            keys = obj.data.shape_keys
+            # Animated ones touch their mesh on each frame.
+            if keys is None or keys.animation_data is None:
+                return False
+        return self.mode == obj.mode and self.looks == _looks(obj)
 
     @property
     def is_left(self) -> bool:
@@ -118,6 +136,9 @@ def update(
             "override to use Sinew here"
         )
     mode = obj.mode
+    if driven is not None and driven.is_suspect:
+        changes.meshes.add(obj.data.session_uid)
+        changes.touched.add(obj.data.session_uid)
     if driven is not None and driven.mode == mode and driven.is_untouched_by(changes):
         return driven
     if mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
@@ -145,6 +166,7 @@ def update(
     known, known_source = driven, driven and driven.source
     driven = _current(obj, driven, depsgraph, changes, touched)
     driven.left_by = small_meshes.choices(obj) if is_left else []
+    driven.is_suspect = False
     if touched or not driven.watched:
         driven.looks = _looks(obj)
         mesh = obj.data.session_uid

@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, overrides, points, properties, redraw
+from . import drive, driven, events, overrides, points, properties, redraw
 from .changes import Changes
 from .driven import Driven
 from .gate import Gate, is_allowed
@@ -35,6 +35,7 @@ class Session:
     gate: Gate = field(default_factory=Gate)
     updating: bool = False
     settling: bool = False  # what Sinew itself changed is evaluated, and nothing else
+    all_left: bool = False  # to Blender, and nothing but what they are told of can change that
 
     @property
     def idle(self) -> bool:
@@ -43,6 +44,7 @@ class Session:
 
     def forget(self) -> None:
         self.objects = None
+        hear_frames()
         self.depsgraph = 0
         self.waiting = set()
         self.driven.clear()
@@ -66,8 +68,12 @@ def states_of(
     known of them from this evaluation; none without one."""
     if depsgraph is None:
         return []
-    pairs = [(obj, state_of(obj)) for obj in objects or () if properties.of(obj).enabled]
-    known = [(obj, state) for obj, state in pairs if state is not None]
+    at_work = [obj for obj in objects or () if properties.of(obj).enabled]
+    for obj in at_work:
+        state = state_of(obj)
+        if state is not None and state.is_suspect:
+            _update_or_turn_off(obj, depsgraph, Changes())
+    known = [(obj, state) for obj in at_work if (state := state_of(obj)) is not None]
     for obj, state in known:
         driven.bring_up_to_date(obj, state, depsgraph)
     return [(obj, state) for obj, state in known if state.frames is not None]
@@ -81,6 +87,7 @@ def refresh(context: bpy.types.Context) -> None:
     session.objects = None
     depsgraph = context.evaluated_depsgraph_get()
     _update(depsgraph, Changes())
+    _ignore_frames()
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
         # Where all is known, only what was just written is new: weights need not be read again for that.
@@ -207,6 +214,8 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     with held():
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
+        session.all_left = _are_all_left()
+        _hear_needed_frames()
         heated = [obj for obj in session.objects or () if properties.of(obj).heat]
         heat_map.update(states_of(heated, depsgraph), depsgraph)
         redraw.tell()
@@ -257,25 +266,63 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
     return Changes.read(depsgraph, frame, complete=same)
 
 
+def _are_all_left() -> bool:
+    """Whether frames have nothing for Sinew, as long as nothing but poses changes."""
+    try:
+        at_work = [obj for obj in session.objects or () if properties.of(obj).enabled]
+        return all(
+            (state := state_of(obj)) is not None and state.is_left and obj.animation_data is None
+            for obj in at_work
+        )
+    except ReferenceError:
+        return False
+
+
 def _are_all_answered(depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the evaluation gave all driven objects their points, and there is nothing else to look at."""
     objects, known = session.objects, session.driven
     if (
         objects is None
         or session.depsgraph != depsgraph.as_pointer()
-        or not Changes.are_motion_only(depsgraph)
+        or not Changes.are_of_meshes_only(depsgraph)
     ):
         return False
+    # What is left does not ask which they are, and they take long to list.
+    meshes = set() if session.all_left else Changes.meshes_in(depsgraph)
     try:
         for obj in objects:
             state = known.get(obj.session_uid)
-            if state is None or not state.is_answered(obj, depsgraph):
+            if state is None:
+                if properties.of(obj).enabled:
+                    return False
+            elif not (state.is_answered(obj, depsgraph) and state.is_untouched_by_frame(obj, meshes)):
                 return False
     except ReferenceError:
         # Deleted since the objects were listed.
         return False
     redraw.tell()
     return True
+
+
+def hear_frames() -> None:
+    """Blender calls at each change of frame, until it is known that there is nothing to do."""
+    session.all_left = False
+    events.hear_all(_FRAME_HANDLERS)
+
+
+def _hear_needed_frames() -> None:
+    if session.objects:
+        events.hear("frame_change_post", on_frame_change)
+    if not session.all_left:
+        events.hear("frame_change_pre", before_frame_change)
+
+
+def _ignore_frames() -> None:
+    """Leaves out what is not needed: a function of Python's takes 3 to 10 us of a frame in any case."""
+    if session.idle and events.IMPORTS_ARE_TOLD:
+        events.ignore_all(_FRAME_HANDLERS)
+    elif session.all_left:
+        events.ignore("frame_change_pre", before_frame_change)
 
 
 @persistent
@@ -297,6 +344,9 @@ def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if session.all_left and Changes.are_motion_only(depsgraph):
+        redraw.tell()
+        return
     gated = session.gate.open()
     if session.idle or _are_all_answered(depsgraph):
         return
@@ -316,13 +366,17 @@ def _follow(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if session.idle or session.updating:
+    if session.updating:
+        return
+    if session.idle:
+        _ignore_frames()
         return
     changes = _read_changes(depsgraph, frame=False)
     if session.settling:
         # Settings touch the meshes. Nobody changed weights, and they take long to read.
         changes.meshes.clear()
     _follow(depsgraph, changes)
+    _ignore_frames()
 
 
 @persistent
@@ -336,6 +390,12 @@ def on_loaded(*_args: object) -> None:
     session.forget()
     overrides.take_back()
     refresh(bpy.context)
+
+
+@persistent
+def on_imported(*_args: object) -> None:
+    """Scripts can go to another frame without any other event."""
+    hear_frames()
 
 
 @persistent
@@ -356,21 +416,22 @@ def on_saved(*_args: object) -> None:
         bpy.context.view_layer.update()
 
 
+_FRAME_HANDLERS = {"frame_change_pre": before_frame_change, "frame_change_post": on_frame_change}
 _HANDLERS = {
-    "frame_change_pre": [before_frame_change],
-    "frame_change_post": [on_frame_change],
-    "depsgraph_update_pre": [before_update],
-    "depsgraph_update_post": [on_depsgraph_update],
-    "undo_pre": [on_data_replaced],
-    "undo_post": [on_data_replaced],
-    "redo_pre": [on_data_replaced],
-    "redo_post": [on_data_replaced],
-    "load_pre": [on_data_replaced],
-    "load_post": [on_loaded],
-    "save_pre": [on_save],
-    "save_post": [on_saved],
-    "save_post_fail": [on_saved],
+    "depsgraph_update_pre": before_update,
+    "depsgraph_update_post": on_depsgraph_update,
+    "undo_pre": on_data_replaced,
+    "undo_post": on_data_replaced,
+    "redo_pre": on_data_replaced,
+    "redo_post": on_data_replaced,
+    "load_pre": on_data_replaced,
+    "load_post": on_loaded,
+    "save_pre": on_save,
+    "save_post": on_saved,
+    "save_post_fail": on_saved,
 }
+if events.IMPORTS_ARE_TOLD:
+    _HANDLERS["blend_import_post"] = on_imported
 
 
 def register() -> None:
@@ -381,8 +442,7 @@ def register() -> None:
     properties.listeners.mesh_asked = answers.mesh_asked
     properties.listeners.heat_changed = _heat_changed
     measures.Listener.changed = refresh
-    for event, functions in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).extend(functions)
+    events.hear_all(_HANDLERS)
 
 
 def adopt_open_file() -> None:
@@ -393,9 +453,5 @@ def adopt_open_file() -> None:
 
 
 def unregister() -> None:
-    for event, functions in _HANDLERS.items():
-        registered = getattr(bpy.app.handlers, event)
-        for function in functions:
-            if function in registered:
-                registered.remove(function)
     session.forget()
+    events.ignore_all({**_HANDLERS, **_FRAME_HANDLERS})

@@ -9,8 +9,9 @@ import pytest
 import scenes
 import whole_file
 from program import run_sinew
-from sinew_addon.blender import drive, handlers, properties, small_meshes, stack
+from sinew_addon.blender import drive, events, handlers, properties, small_meshes, stack
 from sinew_addon.blender.heat import live
+from sinew_addon.blender.inbetween import inbetween_handlers
 from sinew_addon.core.scale_rule import IGNORED
 
 FRAMES = [1, 6, 11]
@@ -188,6 +189,93 @@ def test_frames_cost_nothing_of_sinews(arm, monkeypatch):
     monkeypatch.setattr(handlers.driven, "update", lambda *arguments: looked_at.append(arguments))
     scenes.shapes(arm[0], FRAMES)
     assert looked_at == []
+
+
+def add_keyed_mesh():
+    """Another mesh of the scene, which its shape keys move from frame to frame."""
+    mesh = bpy.data.meshes.new("Keyed")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    obj = bpy.data.objects.new("Keyed", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    key_shape(obj)
+
+
+def key_shape(obj):
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Up")
+    for point in key.data:
+        point.co.z += 0.2
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+
+
+@pytest.mark.parametrize("leave", [True, False])
+@pytest.mark.parametrize("beside", ["keyed mesh", "own keys", "one that is off"])
+def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, beside):
+    obj, _armature = scenes.make_arm()
+    if beside == "keyed mesh":
+        add_keyed_mesh()
+    elif beside == "own keys":
+        key_shape(obj)
+    else:
+        other, _rig = scenes.make_arm(name="Other")
+        scenes.add_sinew(other)
+        properties.of(other).enabled = False
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj)
+    properties.of(obj).leave_small = leave
+    scenes.shapes(obj, FRAMES)
+    looked_at = []
+    monkeypatch.setattr(handlers.driven, "update", lambda *arguments: looked_at.append(arguments))
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
+    assert looked_at == []
+
+
+def test_blender_calls_at_frames_only_for_what_sinew_has_to_do(arm, tmp_path):
+    obj, _armature = arm
+    ours = [
+        (bpy.app.handlers.frame_change_pre, inbetween_handlers.on_frame_change),
+        (bpy.app.handlers.frame_change_pre, handlers.before_frame_change),
+        (bpy.app.handlers.frame_change_post, handlers.on_frame_change),
+    ]
+
+    def heard():
+        return [function in functions for functions, function in ours]
+
+    # Blender 4.2 does not tell of what comes from other files.
+    told = events.IMPORTS_ARE_TOLD
+    assert heard() == [not told, False, True]
+    properties.of(obj).method = "qv"
+    assert heard() == [not told, True, True]
+    of_qv = scenes.shapes(obj, FRAMES)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.view_layer.update()
+    assert heard() == [not told, False, not told]
+    with bpy.data.libraries.load(str(tmp_path / "arm.blend")) as (_, to):
+        to.objects = ["Arm", "Arm Rig"]
+    assert heard() == [True, told, True]
+    for appended in to.objects:
+        bpy.context.scene.collection.objects.link(appended)
+    obj, armature = to.objects
+    assert scenes.worst(scenes.shapes(obj, FRAMES), of_qv) <= 1e-5 * scenes.diagonal(obj)
+    properties.of(obj).method = "lbs"
+    bpy.context.view_layer.update()
+    assert heard() == [not told, False, True]
+    armature.sinew_inbetween = "sclerp"
+    assert heard() == [True, False, True]
+    armature.sinew_inbetween = "blender"
+    assert heard() == [not told, False, True]
+
+
+def test_weights_that_a_script_changed_between_frames_are_in_the_numbers(arm):
+    obj, _armature = arm
+    bpy.context.scene.frame_set(11)
+    obj.vertex_groups["bone.0"].add(list(range(100, 200)), 1.0, "REPLACE")
+    obj.vertex_groups["bone.1"].add(list(range(100, 200)), 0.0, "REPLACE")
+    bpy.context.scene.frame_set(6)
+    assert deformer(obj) == "blender"
 
 
 def test_chained_modifiers_each_by_its_own():

@@ -17,7 +17,7 @@ from ...core.errors import SinewError
 from ...core.influences import GroupWeights
 from ...core.quaternions import rotations_of
 from ...core.rig import Bones, Weighting
-from .. import armature_io, drive, evaluate, handlers, mesh_io, stepped
+from .. import armature_io, drive, evaluate, events, handlers, mesh_io, stepped
 from ..pages import measure
 
 
@@ -252,12 +252,9 @@ _HANDLERS = {
 
 
 def register() -> None:
-    for event, function in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).append(function)
+    events.hear_all(_HANDLERS)
 
 
 def unregister() -> None:
-    for event, function in _HANDLERS.items():
-        if function in getattr(bpy.app.handlers, event):
-            getattr(bpy.app.handlers, event).remove(function)
+    events.ignore_all(_HANDLERS)
     _checks.clear()

@@ -16,7 +16,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core.inbetween import BLENDER
-from .. import actions, pose_io, properties
+from .. import actions, events, pose_io, properties
 from . import inbetween, keyed_poses
 
 log = logging.getLogger("sinew")
@@ -74,6 +74,7 @@ class Session:
         self.players = None
         self.stamps = []
         self.errors = {}
+        hear_frames()
 
 
 session = Session()
@@ -97,6 +98,7 @@ def refresh(scene: bpy.types.Scene) -> None:
         _play(scene)
 
     _guarded(work)
+    _ignore_frames()
 
 
 def let_go() -> None:
@@ -219,6 +221,19 @@ def _changed(_armature: bpy.types.Object, context: bpy.types.Context) -> None:
     refresh(context.scene)
 
 
+def hear_frames() -> None:
+    """Blender calls before each frame, until it is known that there is nothing to do."""
+    events.hear(*_BEFORE_FRAMES)
+
+
+def _ignore_frames() -> None:
+    """Ends that where nothing plays: a function of Python's takes 3 to 10 us of a frame in any case."""
+    if session.idle and events.IMPORTS_ARE_TOLD:
+        events.ignore(*_BEFORE_FRAMES)
+    else:
+        hear_frames()
+
+
 @persistent
 def on_frame_change(scene: bpy.types.Scene, *_args: object) -> None:
     if session.idle:
@@ -237,6 +252,7 @@ def on_frame_change(scene: bpy.types.Scene, *_args: object) -> None:
 @persistent
 def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if session.idle:
+        _ignore_frames()
         return
 
     def work() -> None:
@@ -248,6 +264,7 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
             _play(scene, acted)
 
     _guarded(work)
+    _ignore_frames()
 
 
 @persistent
@@ -263,6 +280,12 @@ def on_data_new(*_args: object) -> None:
 
 
 @persistent
+def on_imported(*_args: object) -> None:
+    """Scripts can go to another frame without any other event."""
+    hear_frames()
+
+
+@persistent
 def on_save(*_args: object) -> None:
     """A saved file has its curves as the artist left them: without Sinew it plays them."""
     let_go()
@@ -273,8 +296,8 @@ def on_saved(*_args: object) -> None:
     _guarded(_settle)
 
 
+_BEFORE_FRAMES = ("frame_change_pre", on_frame_change)
 _HANDLERS = {
-    "frame_change_pre": on_frame_change,
     "depsgraph_update_post": on_depsgraph_update,
     "undo_pre": on_data_replaced,
     "undo_post": on_data_new,
@@ -286,13 +309,14 @@ _HANDLERS = {
     "save_post": on_saved,
     "save_post_fail": on_saved,
 }
+if events.IMPORTS_ARE_TOLD:
+    _HANDLERS["blend_import_post"] = on_imported
 
 
 def register() -> None:
     session.forget()
     properties.listeners.inbetween_changed = _changed
-    for event, function in _HANDLERS.items():
-        getattr(bpy.app.handlers, event).append(function)
+    events.hear_all(_HANDLERS)
 
 
 def adopt_open_file() -> None:
@@ -302,9 +326,7 @@ def adopt_open_file() -> None:
 
 
 def unregister() -> None:
-    for event, function in _HANDLERS.items():
-        registered = getattr(bpy.app.handlers, event)
-        if function in registered:
-            registered.remove(function)
     let_go()
     session.forget()
+    events.ignore_all(_HANDLERS)
+    events.ignore(*_BEFORE_FRAMES)

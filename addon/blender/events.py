@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender calls at its events: the lists of bpy.app.handlers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import bpy
+
+# Blender 4.2 does not tell that objects came from another file: there each frame has to be looked at.
+IMPORTS_ARE_TOLD = hasattr(bpy.app.handlers, "blend_import_post")
+
+
+def hear(event: str, function: Callable) -> None:
+    """Has Blender call the function; once, however often this is."""
+    functions = getattr(bpy.app.handlers, event)
+    if function not in functions:
+        functions.append(function)
+
+
+def ignore(event: str, function: Callable) -> None:
+    """Not to be called while Blender goes through the event's functions: it would leave one out."""
+    functions = getattr(bpy.app.handlers, event)
+    if function in functions:
+        functions.remove(function)
+
+
+def hear_all(handlers: Mapping[str, Callable]) -> None:
+    for event, function in handlers.items():
+        hear(event, function)
+
+
+def ignore_all(handlers: Mapping[str, Callable]) -> None:
+    for event, function in handlers.items():
+        ignore(event, function)
