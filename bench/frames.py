@@ -142,30 +142,13 @@ class Worker:
 
         self.bpy = bpy
         self.with_sinew, self.leave_small = with_sinew, leave_small
-        self.handler_times: list[float] = []
         if with_sinew:
             import sinew_addon
 
             sinew_addon.register()
             self.end = sinew_addon.unregister
-            self._time_handlers()
         else:
             self.end = lambda: None
-
-    def _time_handlers(self) -> None:
-        handlers = self.bpy.app.handlers.frame_change_post
-        for index, function in enumerate(handlers):
-            if not function.__module__.startswith("sinew_addon"):
-                continue
-
-            def timed(*arguments, function=function):
-                start = time.perf_counter()
-                function(*arguments)
-                self.handler_times.append(time.perf_counter() - start)
-
-            # Blender takes handlers off at the next file without this mark.
-            self.bpy.app.handlers.persistent(timed)
-            handlers[index] = timed
 
     def open(self, case: Case) -> dict:
         bpy = self.bpy
@@ -221,16 +204,29 @@ class Worker:
 
     def handler(self) -> dict:
         """Seconds in Sinew's handler for each object, at frames that change it and where it stays."""
-        count = len(self.meshes)
-        self.handler_times.clear()
-        self.run([1 + number * 7 % FRAMES for number in range(30)])
-        moving = [t / count for t in self.handler_times]
-        self.handler_times.clear()
-        self.run([FRAMES // 2] * 31)
-        staying = [t / count for t in self.handler_times[1:]]
-        if not moving or not staying:
+        moving = self._handler_times([1 + number * 7 % FRAMES for number in range(30)])
+        staying = self._handler_times([FRAMES // 2] * 31)[1:]
+        if not self.with_sinew:
             return {}
         return {"moving": common.spread(moving), "staying": common.spread(staying)}
+
+    def _handler_times(self, numbers: list[int]) -> list[float]:
+        """Between two functions of ours, one before and one behind Sinew's."""
+        functions = self.bpy.app.handlers.frame_change_post
+        times: list[float] = []
+
+        def before(*_arguments) -> None:
+            times.append(-time.perf_counter())
+
+        def behind(*_arguments) -> None:
+            times[-1] += time.perf_counter()
+
+        functions.insert(0, before)
+        functions.append(behind)
+        self.run(numbers)
+        functions.remove(before)
+        functions.remove(behind)
+        return [seconds / len(self.meshes) for seconds in times]
 
 
 def serve(connection: Connection, with_sinew: bool, leave_small: bool) -> None:
