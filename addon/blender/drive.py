@@ -199,6 +199,39 @@ def stand_ins(
     return [(modifier, _stand_in(obj, modifier)) for modifier in stack.armature_modifiers(obj)]
 
 
+def follow_stack(obj: bpy.types.Object) -> None:
+    """Brings Sinew's modifier and what it keeps of the Armature modifiers in line with how the artist moved,
+    renamed and deleted modifiers. Each keeps its method; one that no longer follows the first without a gap
+    deforms by itself again."""
+    run, nodes, settings = stack.armature_modifiers(obj), sinew_modifier(obj), properties.of(obj)
+    modifiers = list(obj.modifiers)
+    own, first = modifiers.index(nodes), modifiers.index(run[0])
+    if own + 1 != first:
+        obj.modifiers.move(own, first if own > first else first - 1)
+    kept = settings.stand_ins
+    names = [stand_in.name for _modifier, stand_in in stand_ins(obj)]
+    if [stand_in.name for stand_in in kept] == names:
+        return
+    methods = {
+        stand_in.name: properties.method_of_link(settings.method, stand_in.method, is_first=number == 0)
+        for number, stand_in in enumerate(kept)
+    }
+    for name in methods.keys() - set(names):
+        modifier = obj.modifiers.get(name)
+        if settings.standing_in and modifier is not None and modifier.type == "ARMATURE":
+            _give_back_pointer(modifier, kept[name])
+            _show(modifier, kept[name].show_viewport, kept[name].show_render)
+        kept.remove(kept.find(name))
+    for place, name in enumerate(names):
+        kept.move(kept.find(name), place)
+    if "sinew.method" not in animation.animated_paths(obj):
+        settings.method = methods[names[0]]
+    for number, stand_in in enumerate(kept):
+        now = properties.method_of_link(settings.method, stand_in.method, is_first=number == 0)
+        if now != methods[stand_in.name]:
+            stand_in.method = methods[stand_in.name]
+
+
 def adopt_pointers(obj: bpy.types.Object) -> None:
     """Takes over armatures that the artist chose in the Armature modifiers."""
     for modifier, stand_in in stand_ins(obj):
@@ -217,8 +250,12 @@ def clear_pointers(obj: bpy.types.Object) -> None:
 def give_back_pointers(obj: bpy.types.Object) -> None:
     """The Armature modifiers point to their armatures again."""
     for modifier, stand_in in stand_ins(obj):
-        if modifier.object is None and stand_in.armature is not None:
-            modifier.object = stand_in.armature
+        _give_back_pointer(modifier, stand_in)
+
+
+def _give_back_pointer(modifier: bpy.types.ArmatureModifier, stand_in: properties.SinewStandIn) -> None:
+    if modifier.object is None and stand_in.armature is not None:
+        modifier.object = stand_in.armature
 
 
 def give_back(obj: bpy.types.Object) -> None:

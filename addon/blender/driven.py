@@ -238,8 +238,11 @@ def _shape(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph
     stand_ins = properties.of(obj).stand_ins
     armatures = [s.armature and s.armature.evaluated_get(depsgraph) for s in stand_ins]
     evaluated = obj.evaluated_get(depsgraph)
-    # What Sinew was put on since Blender evaluated it has its settings, not animated yet, in the original.
-    settings = properties.of(evaluated if properties.is_driven(evaluated) else obj)
+    settings = properties.of(evaluated)
+    if [stand_in.name for stand_in in settings.stand_ins] != [stand_in.name for stand_in in stand_ins]:
+        # Sinew was put on, or modifiers moved, since Blender evaluated it: what animation makes of the
+        # settings comes with the next time.
+        settings = properties.of(obj)
     frames = _frames(evaluated, settings, armatures, driven, depsgraph.mode)
     if frames is None or not all(np.isfinite(frame.pose).all() for frame in frames if frame is not None):
         return None
@@ -319,6 +322,7 @@ def _maintain(obj: bpy.types.Object, changes: Changes, is_left: bool) -> None:
     nodes = stack.sinew_modifier(obj)
     if nodes is None or nodes.node_group is None:
         raise SinewError(f"{obj.name}: its Sinew modifier was deleted; press Remove, then Add Sinew")
+    drive.follow_stack(obj)
     if properties.of(obj).standing_in == is_left:
         drive.switch(obj, on=not is_left)
     if is_left:

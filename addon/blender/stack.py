@@ -23,36 +23,40 @@ def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:
-    """The first Armature modifier that Sinew stands in for, or would: the first one with an armature, those
-    that are switched off last."""
-    if not properties.is_driven(obj):
-        candidates = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object is not None]
-        return min(candidates, key=lambda m: not is_on(m), default=None)
-    modifier = obj.modifiers.get(properties.of(obj).stand_ins[0].name)
-    if modifier is not None and modifier.type == "ARMATURE":
-        return modifier
-    # Renamed: ours is the one right behind our own modifier.
-    return next(iter(_run(obj, _index(obj, sinew_modifier(obj)) + 1)), None)
+    """The first Armature modifier that Sinew stands in for, or would."""
+    return next(iter(armature_modifiers(obj)), None)
 
 
 def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
     """The Armature modifiers that Sinew stands in for, or would: the first and those right behind it, which
     Blender may chain as Multi Modifiers."""
-    first = armature_modifier(obj)
-    return _run(obj, _index(obj, first)) if first is not None else []
+    own, run = sinew_modifier(obj), []
+    for modifier in list(obj.modifiers)[_start(obj) :]:
+        if modifier.type == "ARMATURE":
+            run.append(modifier)
+        elif modifier != own:
+            break
+    return run
+
+
+def _start(obj: bpy.types.Object) -> int:
+    """The place of the first Armature modifier that Sinew stands in for; of the first one with an armature,
+    those that are switched off last, where it would."""
+    modifiers = list(obj.modifiers)
+    if not properties.is_driven(obj):
+        candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
+        return _index(obj, min(candidates, key=lambda m: not is_on(m), default=None))
+    behind_own = _index(obj, sinew_modifier(obj)) + 1
+    names = {stand_in.name for stand_in in properties.of(obj).stand_ins}
+    known = (i for i, m in enumerate(modifiers) if m.type == "ARMATURE" and m.name in names)
+    start = next(known, behind_own)
+    # Renamed, or new: between our own modifier and the first that is known.
+    between = modifiers[behind_own:start]
+    return behind_own if all(m.type == "ARMATURE" for m in between) and between else start
 
 
 def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
     return next((i for i, m in enumerate(obj.modifiers) if m == modifier), len(obj.modifiers))
-
-
-def _run(obj: bpy.types.Object, start: int) -> list[bpy.types.ArmatureModifier]:
-    run = []
-    for modifier in list(obj.modifiers)[start:]:
-        if modifier.type != "ARMATURE":
-            break
-        run.append(modifier)
-    return run
 
 
 def in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Modifiers that are moved, added and deleted while Sinew is on, against Blender's own modifiers alone."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+import scenes
+from sinew_addon.blender import drive, handlers, properties, small_meshes
+
+FRAMES = [1, 6, 11]
+
+
+def make_chained(first_keeps_volume, second_keeps_volume):
+    """An arm with two Armature modifiers, each with an armature of its own."""
+    obj, _armature = scenes.make_arm()
+    _other, armature = scenes.make_arm(name="Other")
+    scenes.key_pose(armature, 40.0)
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object = armature
+    obj.modifiers["Armature"].use_deform_preserve_volume = first_keeps_volume
+    second.use_deform_preserve_volume = second_keeps_volume
+    return obj
+
+
+def names(obj):
+    return [modifier.name for modifier in obj.modifiers]
+
+
+def put(obj, name, ahead_of):
+    """As dragging in the stack does."""
+    place = names(obj).index(name)
+    target = names(obj).index(ahead_of)
+    obj.modifiers.move(place, target - (place < target))
+    bpy.context.view_layer.update()
+
+
+def check(obj, expected):
+    got = scenes.shapes(obj, FRAMES)
+    assert properties.of(obj).error == ""
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("is_used", [False, True])
+@pytest.mark.parametrize("volume", [(False, False), (False, True), (True, False)])
+@pytest.mark.parametrize("over_sinew", [False, True])
+def test_chained_modifiers_in_another_order(monkeypatch, is_used, volume, over_sinew):
+    monkeypatch.setattr(small_meshes, "is_used", is_used)
+    obj = make_chained(*volume)
+    before = scenes.shapes(obj, FRAMES)
+    put(obj, "Second", "Armature")
+    swapped = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(swapped, before) > 0.1
+    put(obj, "Armature", "Second")
+    scenes.add_sinew(obj)
+    check(obj, before)
+    put(obj, "Second", "Sinew" if over_sinew else "Armature")
+    check(obj, swapped)
+    assert names(obj) == ["Sinew", "Second", "Armature"]
+    assert [stand_in.name for stand_in in properties.of(obj).stand_ins] == ["Second", "Armature"]
+    put(obj, "Armature", "Sinew" if over_sinew else "Second")
+    check(obj, before)
+    drive.remove(obj)
+    handlers.refresh(bpy.context)
+    assert names(obj) == ["Armature", "Second"]
+    check(obj, before)
+
+
+@pytest.mark.parametrize("is_used", [False, True])
+@pytest.mark.parametrize("deleted", ["Armature", "Second"])
+def test_one_of_two_deleted(monkeypatch, is_used, deleted):
+    monkeypatch.setattr(small_meshes, "is_used", is_used)
+    obj = make_chained(False, True)
+    obj.modifiers[deleted].show_viewport = False
+    expected = scenes.shapes(obj, FRAMES)
+    obj.modifiers[deleted].show_viewport = True
+    scenes.add_sinew(obj)
+    obj.modifiers.remove(obj.modifiers[deleted])
+    bpy.context.view_layer.update()
+    check(obj, expected)
+    assert len(properties.of(obj).stand_ins) == 1
+
+
+def test_a_third_added():
+    obj = make_chained(False, False)
+    scenes.add_sinew(obj)
+    third = obj.modifiers.new("Third", "ARMATURE")
+    third.object = properties.of(obj).armatures[1]
+    bpy.context.view_layer.update()
+    got = scenes.shapes(obj, FRAMES)
+    assert third.object is None
+    drive.remove(obj)
+    handlers.refresh(bpy.context)
+    assert third.object is not None
+    assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("moved", ["Subdivision", "Second"])
+@pytest.mark.parametrize("place", ["Sinew", "Armature", "Second"])
+def test_something_moved_between(moved, place):
+    """What no longer follows the first Armature modifier without a gap deforms by itself."""
+    if moved == place:
+        pytest.skip("moved ahead of itself")
+    obj = make_chained(False, False)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    if moved == "Second":
+        put(obj, "Subdivision", "Armature")
+    scenes.add_sinew(obj)
+    before = scenes.shapes(obj, FRAMES)
+    put(obj, moved, place)
+    got = scenes.shapes(obj, FRAMES)
+    assert properties.of(obj).error == ""
+    order = names(obj)
+    drive.remove(obj)
+    handlers.refresh(bpy.context)
+    assert names(obj) == [name for name in order if name != "Sinew"]
+    expected = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert expected.shape == before.shape
