@@ -222,12 +222,22 @@ def _deform(
     driven.is_kept = True
 
 
-def bring_up_to_date(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph) -> None:
+def bring_up_to_date(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph) -> Driven:
     """What is known of a mesh that is left to Blender becomes that of this evaluation, for those who measure
-    or bake it; of others it is."""
-    if driven.is_left:
-        with driven.lock:
-            _shape(obj, driven, depsgraph)
+    or bake it; of others it is. Changes nothing in Blender.
+
+    Raises SinewError where the mesh has become one that can not be driven.
+    """
+    if not driven.is_left:
+        return driven
+    current = driven
+    if driven.is_suspect:
+        current = _current(obj, driven, depsgraph, Changes(meshes={obj.data.session_uid}), touched=False)
+        current.left_by, current.looks, current.watched = driven.left_by, driven.looks, driven.watched
+        current.is_suspect = False
+    with current.lock:
+        _shape(obj, current, depsgraph)
+    return current
 
 
 def _shape(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph) -> bool | None:

@@ -68,14 +68,14 @@ def states_of(
     known of them from this evaluation; none without one."""
     if depsgraph is None:
         return []
-    at_work = [obj for obj in objects or () if properties.of(obj).enabled]
-    for obj in at_work:
-        state = state_of(obj)
-        if state is not None and state.is_suspect:
-            _update_or_turn_off(obj, depsgraph, Changes())
-    known = [(obj, state) for obj in at_work if (state := state_of(obj)) is not None]
-    for obj, state in known:
-        driven.bring_up_to_date(obj, state, depsgraph)
+    known = []
+    for obj in objects or ():
+        state = state_of(obj) if properties.of(obj).enabled else None
+        if state is None:
+            continue
+        with contextlib.suppress(SinewError):
+            session.driven[obj.session_uid] = driven.bring_up_to_date(obj, state, depsgraph)
+            known.append((obj, session.driven[obj.session_uid]))
     return [(obj, state) for obj, state in known if state.frames is not None]
 
 
