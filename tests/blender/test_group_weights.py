@@ -104,3 +104,22 @@ def test_mesh_in_edit_mode_is_read_as_it_was():
     bpy.ops.object.mode_set(mode="EDIT")
     assert read_alike(obj.data).equals(before)
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("levels", [1, 3])
+def test_no_bmesh_is_made_where_it_would_read_beyond_the_shape_keys(monkeypatch, levels):
+    """Of an evaluated mesh whose modifiers made more vertices than its keys have: Blender reads rubbish
+    there, or crashes."""
+    obj = a_grid()
+    weigh_at_random(obj, 4, 5)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = levels
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    expected = read_alike(obj.evaluated_get(depsgraph).data)
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Key")
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    if evaluated.shape_keys is not None:
+        monkeypatch.setattr(mesh_io, "bmesh", None)
+    assert read_alike(evaluated).equals(expected)
+    monkeypatch.undo()
+    assert read_alike(obj.data).counts.shape == (len(obj.data.vertices),)
