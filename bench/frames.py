@@ -206,8 +206,6 @@ class Worker:
         """Seconds in Sinew's handler for each object, at frames that change it and where it stays."""
         moving = self._handler_times([1 + number * 7 % FRAMES for number in range(30)])
         staying = self._handler_times([FRAMES // 2] * 31)[1:]
-        if not self.with_sinew:
-            return {}
         return {"moving": common.spread(moving), "staying": common.spread(staying)}
 
     def _handler_times(self, numbers: list[int]) -> list[float]:
@@ -293,11 +291,8 @@ def measure(case: Case, processes: dict[str, Process], seconds: float) -> dict:
 def line(name: str, result: dict) -> str:
     modifier, sinew = result["modifier"]["median"], result["sinew"]["median"]
     text = f"{name:38}{result['method']:4}{modifier * 1e3:9.2f}{sinew * 1e3:9.2f}{modifier / sinew:8.2f} x"
-    handler = result["handler"]
-    if handler:
-        moving, staying = handler["moving"]["median"], handler["staying"]["median"]
-        text += f"{moving * 1e6:10.0f}{staying * 1e6:10.1f}"
-    return text + f"{result['away']:10.0e}"
+    moving, staying = (result["handler"][when]["median"] for when in ("moving", "staying"))
+    return text + f"{moving * 1e6:10.0f}{staying * 1e6:10.1f}{result['away']:10.0e}"
 
 
 def main() -> None:

@@ -212,10 +212,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
     names = [stand_in.name for _modifier, stand_in in stand_ins(obj)]
     if [stand_in.name for stand_in in kept] == names:
         return
-    methods = {
-        stand_in.name: properties.method_of_link(settings.method, stand_in.method, is_first=number == 0)
-        for number, stand_in in enumerate(kept)
-    }
+    methods = _methods(settings)
     for name in methods.keys() - set(names):
         modifier = obj.modifiers.get(name)
         if settings.standing_in and modifier is not None and modifier.type == "ARMATURE":
@@ -226,10 +223,17 @@ def follow_stack(obj: bpy.types.Object) -> None:
         kept.move(kept.find(name), place)
     if "sinew.method" not in animation.animated_paths(obj):
         settings.method = methods[names[0]]
-    for number, stand_in in enumerate(kept):
-        now = properties.method_of_link(settings.method, stand_in.method, is_first=number == 0)
-        if now != methods[stand_in.name]:
-            stand_in.method = methods[stand_in.name]
+    for name, method in _methods(settings).items():
+        if method != methods[name]:
+            kept[name].method = methods[name]
+
+
+def _methods(settings: properties.SinewSettings) -> dict[str, str]:
+    """What each Armature modifier that Sinew stands in for blends by, by its name."""
+    return {
+        stand_in.name: properties.method_of_link(settings.method, stand_in.method, is_first=number == 0)
+        for number, stand_in in enumerate(settings.stand_ins)
+    }
 
 
 def adopt_pointers(obj: bpy.types.Object) -> None:

@@ -74,8 +74,9 @@ def states_of(
         if state is None:
             continue
         with contextlib.suppress(SinewError):
-            session.driven[obj.session_uid] = driven.bring_up_to_date(obj, state, depsgraph)
-            known.append((obj, session.driven[obj.session_uid]))
+            current = driven.bring_up_to_date(obj, state, depsgraph)
+            session.driven[obj.session_uid] = current
+            known.append((obj, current))
     return [(obj, state) for obj, state in known if state.frames is not None]
 
 

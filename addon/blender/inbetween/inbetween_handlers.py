@@ -98,7 +98,7 @@ def refresh(scene: bpy.types.Scene) -> None:
         _play(scene)
 
     _guarded(work)
-    _ignore_frames()
+    _hear_needed_frames()
 
 
 def let_go() -> None:
@@ -226,8 +226,8 @@ def hear_frames() -> None:
     events.hear(*_BEFORE_FRAMES)
 
 
-def _ignore_frames() -> None:
-    """Ends that where nothing plays: a function of Python's takes 3 to 10 us of a frame in any case."""
+def _hear_needed_frames() -> None:
+    """Only where something plays: a function of Python's takes 3 to 10 us of a frame in any case."""
     if session.idle and events.IMPORTS_ARE_TOLD:
         events.ignore(*_BEFORE_FRAMES)
     else:
@@ -252,7 +252,7 @@ def on_frame_change(scene: bpy.types.Scene, *_args: object) -> None:
 @persistent
 def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if session.idle:
-        _ignore_frames()
+        _hear_needed_frames()
         return
 
     def work() -> None:
@@ -264,7 +264,7 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
             _play(scene, acted)
 
     _guarded(work)
-    _ignore_frames()
+    _hear_needed_frames()
 
 
 @persistent
