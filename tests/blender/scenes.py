@@ -78,6 +78,17 @@ def key_pose(armature: bpy.types.Object, degrees: float = 100.0) -> None:
         bone.keyframe_insert("rotation_quaternion", frame=11)
 
 
+def key_shape(obj: bpy.types.Object) -> None:
+    """A first shape key that lifts all vertices, keyed: off at frame 1, on at frame 11."""
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Key")
+    for point in key.data:
+        point.co.z += 0.2
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+
+
 def final_points(obj: bpy.types.Object) -> np.ndarray:
     """float32 [vertices, 3]: the final evaluated mesh, object space."""
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data

@@ -108,13 +108,7 @@ def test_number_of_vertices_that_changes_in_front():
 
 def test_shape_keys_before_a_modifier_in_front():
     obj = arm_with("SUBSURF")
-    obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Key")
-    for point in key.data:
-        point.co.z += 0.2
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
+    scenes.key_shape(obj)
     assert_equal_to_modifier(obj, FRAMES)
 
 

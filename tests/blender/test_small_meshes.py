@@ -197,17 +197,7 @@ def add_keyed_mesh():
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     obj = bpy.data.objects.new("Keyed", mesh)
     bpy.context.scene.collection.objects.link(obj)
-    key_shape(obj)
-
-
-def key_shape(obj):
-    obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Up")
-    for point in key.data:
-        point.co.z += 0.2
-    for frame, value in ((1, 0.0), (11, 1.0)):
-        key.value = value
-        key.keyframe_insert("value", frame=frame)
+    scenes.key_shape(obj)
 
 
 @pytest.mark.parametrize("leave", [True, False])
@@ -217,7 +207,7 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
     if beside == "keyed mesh":
         add_keyed_mesh()
     elif beside == "own keys":
-        key_shape(obj)
+        scenes.key_shape(obj)
     else:
         other, _rig = scenes.make_arm(name="Other")
         scenes.add_sinew(other)
