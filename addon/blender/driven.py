@@ -17,6 +17,7 @@ from . import (
     animation,
     armature_io,
     drive,
+    mesh_io,
     points,
     pose_driver,
     properties,
@@ -114,6 +115,12 @@ class Driven:
     @property
     def is_left(self) -> bool:
         return bool(self.left_by)
+
+    @property
+    def points(self) -> np.ndarray:
+        """The shape of the last frame, float32 [vertices, 3], object space; the chain's own."""
+        with self.lock:
+            return self.chain.points
 
     @property
     def binding(self) -> Binding:
@@ -268,7 +275,7 @@ def _are_lost(obj: bpy.types.Object, driven: Driven, changes: Changes, touched: 
     if not driven.is_kept and (not changes.complete or obj.data.session_uid in changes.touched):
         # It was made anew of the mesh itself.
         return True
-    return touched and not points.are_written(obj, len(driven.chain.points))
+    return touched and not points.are_written(obj, len(driven.rest_points))
 
 
 def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: Driven) -> None:
@@ -292,8 +299,11 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
         if frames is None:
             return
         driven.rest_points = source.keyed_points(obj, mesh, driven.source)
-        driven.chain.deform(driven.rest_points, frames, anew=True)
-        attribute.data.foreach_set("vector", driven.chain.points.ravel())
+        shown = mesh_io.points_in(attribute)
+        out = np.empty_like(driven.rest_points) if shown is None else shown
+        driven.chain.deform(driven.rest_points, frames, out)
+        if shown is None:
+            attribute.data.foreach_set("vector", out.ravel())
         driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
         driven.dirtied_by_frames = False
         driven.shapes += 1

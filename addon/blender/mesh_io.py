@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from itertools import chain
 from operator import itemgetter
 
@@ -18,6 +19,7 @@ from ..core.surface import Surface, same_places
 # The attribute that holds a mesh's vertices: read and written as a whole, where "co" of the vertices takes a
 # hundred times as long.
 POSITION = "position"
+_VECTOR_BYTES = 3 * np.dtype(np.float32).itemsize
 
 
 def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -136,6 +138,20 @@ def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
     evaluate the mesh."""
     store_points(mesh, name, points)
     mesh.update_tag()
+
+
+def points_in(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray | None:
+    """The memory of a vector attribute itself, float32 [elements, 3], which Blender then does not share with
+    another mesh; None where it is not in one piece. Valid until the mesh is evaluated again or changed."""
+    values = attribute.data
+    count = len(values)
+    if count == 0:
+        return None
+    first, last = values[0].as_pointer(), values[count - 1].as_pointer()
+    if last - first != (count - 1) * _VECTOR_BYTES:
+        return None
+    numbers = (ctypes.c_float * (3 * count)).from_address(first)
+    return np.frombuffer(numbers, dtype=np.float32).reshape(count, 3)
 
 
 def store_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:

@@ -45,6 +45,7 @@ class Binding:
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
+        self._is_elsewhere = False
 
     @property
     def moving_bones(self) -> list[str]:
@@ -61,17 +62,28 @@ class Binding:
 
     @property
     def points(self) -> np.ndarray:
-        """The result of the last call of deform, float32 [vertices, 3]."""
+        """The shape of the last frame, float32 [vertices, 3], object space."""
+        if self._is_elsewhere:
+            self._shape(self._last, self._points)
+            self._is_elsewhere = False
         return self._points
 
-    def deform(self, frame: Frame, anew: bool = False) -> bool:
-        """Brings `points` up to date, object space; false where the frame equals the last one.
+    def deform(self, frame: Frame, out: np.ndarray | None = None) -> bool:
+        """Brings `points` up to date; false where the frame equals the last one.
 
-        anew  without looking whether it does
+        out   float32 [vertices, 3], C-contiguous: written instead, without looking whether anything differs.
+              `points` are then worked out where they are asked for
+
+        Raises ValueError where `out` has another shape.
         """
         last = self._last
-        if not anew and last is not None and _same(last, frame):
+        if out is None and last is not None and _same(last, frame):
             return False
+        self._shape(frame, self._points if out is None else out)
+        self._last, self._is_elsewhere = frame, out is not None
+        return True
+
+    def _shape(self, frame: Frame, out: np.ndarray) -> None:
         rest_points, bones, rest_inverses = frame.rest_points, frame.pose, self._rest_from_armature
         if self._spread_anew(frame):
             self._bound.clear()
@@ -85,9 +97,7 @@ class Binding:
                 scale = split.scale.astype(np.float32)
                 self._deform("scale", LINEAR, frame, frame.rest_points, scale, None, rest_points)
                 bones, rest_inverses = split.rigid.astype(np.float32), None
-        self._deform("motion", frame.method, frame, rest_points, bones, rest_inverses, self._points)
-        self._last = frame
-        return True
+        self._deform("motion", frame.method, frame, rest_points, bones, rest_inverses, out)
 
     def _deform(
         self,
@@ -176,30 +186,47 @@ class Chain:
 
     def __init__(self, links: Sequence[Link]) -> None:
         self.links = links
-        self.points: np.ndarray | None = None
+        # The last link that took part, where all of its deformation counts: its points are the result.
+        self._end: Binding | None = None
+        self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
         self._active: tuple[bool, ...] = ()
 
-    def deform(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None], anew: bool = False) -> bool:
+    @property
+    def points(self) -> np.ndarray | None:
+        """The shape of the last frame, float32 [vertices, 3], object space; None before the first."""
+        return self._points if self._end is None else self._end.points
+
+    def deform(
+        self,
+        rest_points: np.ndarray,
+        frames: Sequence[LinkFrame | None],
+        out: np.ndarray | None = None,
+    ) -> bool:
         """Brings `points` up to date; false where nothing differs from the last call.
 
         rest_points  float32 [vertices, 3], object space
         frames       one for each link, None for one that is switched off or has no pose
-        anew         without looking whether anything differs
+        out          see Binding.deform
         """
         active = tuple(frame is not None for frame in frames)
-        changed = self.points is None or active != self._active
-        if not any(active):
-            changed = changed or not _equal(rest_points, self._rest_points)
-            self.points = rest_points
+        changed = self._rest_points is None or active != self._active
+        if any(active):
+            changed |= self._run(rest_points, frames, out)
         else:
-            changed |= self._run(rest_points, frames, anew)
+            changed = changed or not _equal(rest_points, self._rest_points)
+            self._end, self._points = None, rest_points
+        if self._end is None and out is not None:
+            out[:] = self._points
         self._active, self._rest_points = active, rest_points
         return changed
 
-    def _run(self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None], anew: bool) -> bool:
+    def _run(
+        self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None], out: np.ndarray | None
+    ) -> bool:
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
+        last = max(number for number, frame in enumerate(frames) if frame is not None)
         for number, (link, frame) in enumerate(zip(self.links, frames, strict=True)):
             if frame is None:
                 continue
@@ -209,15 +236,17 @@ class Chain:
                     break
                 starts[behind] = result
             start = starts.get(number, result)
+            self._end = link.binding if number == last and link.mask is None else None
             changed |= link.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule), anew
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule),
+                None if self._end is None else out,
             )
-            posed = link.binding.points
             if link.mask is not None:
-                posed = result + link.mask[:, None] * (posed - result)
-            # The next link compares with what it was given, so a buffer that is written again will not do.
-            result = posed.copy() if link.mask is None and number + 1 < len(self.links) else posed
-        self.points = result
+                result = result + link.mask[:, None] * (link.binding.points - result)
+            elif self._end is None:
+                # The next link compares with what it was given: a buffer that is written again will not do.
+                result = link.binding.points.copy()
+        self._points = result
         return changed
 
 

@@ -298,3 +298,37 @@ def test_objects_that_move_beside_their_armatures():
             for obj, expected in zip(objects, wanted, strict=True):
                 off = scenes.worst(scenes.final_points(obj), expected[index])
                 assert off <= scenes.TOLERANCE * scenes.diagonal(obj), (obj.name, frame)
+
+
+def vectors_of(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray:
+    values = np.empty((len(attribute.data), 3), np.float32)
+    attribute.data.foreach_get("vector", values.ravel())
+    return values
+
+
+def test_the_memory_of_an_attribute_is_its_meshs_alone():
+    """A copy of a mesh has the same memory as the mesh itself until one of them is written."""
+    mesh = scenes.make_arm()[0].data
+    mesh.attributes.new("Points", "FLOAT_VECTOR", "POINT")
+    copy = mesh.copy()
+    points = mesh_io.points_in(copy.attributes["Points"])
+    points[:] = np.arange(points.size).reshape(-1, 3)
+    assert np.array_equal(vectors_of(copy.attributes["Points"]), points)
+    assert not vectors_of(mesh.attributes["Points"]).any()
+    empty = bpy.data.meshes.new("Empty").attributes.new("Points", "FLOAT_VECTOR", "POINT")
+    assert mesh_io.points_in(empty) is None
+
+
+def test_a_frame_writes_into_the_evaluated_mesh_alone():
+    """Not into the mesh itself, of which it is a copy; and who asks what Sinew gave gets the same."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(1)
+    attribute = obj.data.attributes[properties.of(obj).attribute]
+    stored = vectors_of(attribute)
+    bpy.context.scene.frame_set(7)
+    ((_obj, state),) = scenes.states_of(obj)
+    shown = scenes.final_points(obj)
+    assert scenes.worst(shown, stored) > 0.1 * scenes.diagonal(obj)
+    assert np.array_equal(state.points, shown)
+    assert np.array_equal(vectors_of(attribute), stored)

@@ -44,7 +44,7 @@ def deformer(obj: bpy.types.Object) -> str:
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
         ((_obj, known),) = scenes.states_of(obj)
-        assert scenes.worst(known.chain.points, scenes.final_points(obj)) <= 1e-5 * scenes.diagonal(obj)
+        assert scenes.worst(known.points, scenes.final_points(obj)) <= 1e-5 * scenes.diagonal(obj)
     return "blender" if by_blender else "sinew"
 
 

@@ -28,7 +28,7 @@ def points_of(obj: bpy.types.Object) -> np.ndarray:
     pairs = handlers.states_of([obj], bpy.context.view_layer.depsgraph)
     if not pairs or obj.mode in driven.MODES_OF_THE_MODIFIER:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
-    return pairs[0][1].chain.points
+    return pairs[0][1].points
 
 
 class ShapeKeys:

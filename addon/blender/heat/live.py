@@ -91,7 +91,7 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
     if stamp != subject.stamp:
         _bring_rest(subject, worlds)
         subject.gauge.set_frame(_frame_of_rig(subject, armatures))
-        shape = _in_world([driven.chain.points for _obj, driven in pairs], worlds)
+        shape = _in_world([driven.points for _obj, driven in pairs], worlds)
         others = [_Other.of(part, other) for part in subject.parts]
 
         def reference() -> np.ndarray:
@@ -110,7 +110,7 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
     parts = []
     for obj, driven in pairs:
         mesh = obj.data if properties.of(obj).front is None else front.evaluated_mesh(obj, depsgraph)
-        if mesh is None or driven.frames is None or len(mesh.vertices) != len(driven.chain.points):
+        if mesh is None or driven.frames is None or len(mesh.vertices) != len(driven.rest_points):
             return None
         links = [Link(Binding(link.binding.weighting), link.mask, link.multi) for link in driven.chain.links]
         parts.append(Part(obj, driven, driven.source, mesh_io.read_surface(mesh), Chain(links)))
