@@ -345,6 +345,8 @@ def _maintain(obj: bpy.types.Object, changes: Changes, is_left: bool) -> None:
     drive.follow_stack(obj)
     if properties.of(obj).standing_in == is_left:
         drive.switch(obj, on=not is_left)
+        if is_left:
+            points.put_away(obj)
     if is_left:
         drive.adopt_pointers(obj)
     elif obj.mode in MODES_THAT_NEED_THE_POINTER or _bones_are_edited(obj):

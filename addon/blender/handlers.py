@@ -183,6 +183,8 @@ def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:
 def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     settings = properties.of(obj)
     drive.switch(obj, settings.enabled)
+    if not settings.enabled:
+        points.put_away(obj)
     settings.error = ""
     state = state_of(obj)
     if settings.enabled and state is not None and settings.armature is not None:

@@ -99,6 +99,13 @@ def are_written(obj: bpy.types.Object, count: int) -> bool:
     return attribute is not None and len(attribute.data) == count
 
 
+def put_away(obj: bpy.types.Object) -> None:
+    """Takes them off the mesh while Sinew rests: a subdivision would work them out for each of its vertices,
+    and exports would have them."""
+    if not obj.data.is_editmode:
+        remove_attributes(obj)
+
+
 def remove(obj: bpy.types.Object) -> None:
     """Takes away all that held points."""
     front.remove(obj)

@@ -156,6 +156,27 @@ def test_the_final_mesh_has_no_attribute_of_sinews():
     assert not any(name.startswith("sinew") for name in names)
 
 
+@pytest.mark.parametrize("heat", [False, True])
+def test_while_off_the_mesh_has_no_attribute_of_sinews(heat):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "qv")
+    properties.of(obj).heat = heat
+    frames = [3, 7]
+    shown = scenes.shapes(obj, frames)
+
+    def ours() -> list[str]:
+        return [attribute.name for attribute in obj.data.attributes if "sinew" in attribute.name]
+
+    assert ours()
+    for _again in range(2):
+        properties.of(obj).enabled = False
+        bpy.context.scene.frame_set(5)
+        assert ours() == []
+        properties.of(obj).enabled = True
+        assert np.array_equal(scenes.shapes(obj, frames), shown)
+        assert len(ours()) == 1 + heat
+
+
 def test_a_deleted_attribute_is_written_again():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)

@@ -280,6 +280,18 @@ def test_chained_modifiers_each_by_its_own():
     assert not handlers.state_of(obj).is_left
 
 
+def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
+    obj, _armature = arm
+    scenes.shapes(obj, FRAMES)
+    before = set(obj.data.attributes.keys())
+    properties.of(obj).leave_small = False
+    expected = scenes.shapes(obj, FRAMES)
+    assert set(obj.data.attributes.keys()) == before | {properties.of(obj).attribute}
+    properties.of(obj).leave_small = True
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
+    assert set(obj.data.attributes.keys()) == before
+
+
 def test_numbers_are_those_of_sinew(arm):
     obj, _armature = arm
     measured = []
