@@ -1,23 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A frame in Blender: its Armature modifier beside Sinew, on the same scene in the same run.
 
-Two processes, one with the modifier and one with Sinew, take turns at a few frames. A frame is
-Scene.frame_set() and then asking for the evaluated mesh, which is where what the handler wrote arrives.
+One process and one file, in which Sinew is switched on and off: both take turns at a few frames. Of two
+processes one is up to a tenth slower, whichever has Sinew, by where its memory lies. A frame is
+Scene.frame_set() and then asking for the evaluated mesh, which is where Sinew's points arrive.
 """
 
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import os
+import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 
+import bpy
 import common
+import numpy as np
+import sinew_addon
 
 FRAMES = 60
+# A turn, as on playback in a row; before it some frames that are not timed, for caches and what is bound.
+TURN, BEFORE = 24, 4
 
 
 @dataclass(frozen=True)
@@ -54,13 +61,8 @@ def cases(quick: bool) -> list[Case]:
     return [replace(case, method=method) for case in found for method in ("dq", "lbs")]
 
 
-# --- In the two processes
-
-
-def make_tube(bpy, case: Case, index: int):
-    """A tube along Y, one unit a bone, each bone keyed to bend and twist; (mesh object, its armature)."""
-    import numpy as np
-
+def make_tube(case: Case, index: int) -> bpy.types.Object:
+    """A tube along Y, one unit a bone, each bone keyed to bend and twist."""
     collection = bpy.context.scene.collection.objects
     armature = bpy.data.objects.new(f"Rig {index}", bpy.data.armatures.new(f"Rig {index}"))
     collection.link(armature)
@@ -112,7 +114,7 @@ def make_tube(bpy, case: Case, index: int):
     return obj
 
 
-def open_rig(bpy, path: Path) -> list:
+def open_rig(path: Path) -> list[bpy.types.Object]:
     """The meshes of a rig that its armature deforms; every bone keyed, so that none of a frame is idle."""
     if path.suffix == ".blend":
         bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -134,47 +136,33 @@ def open_rig(bpy, path: Path) -> list:
     return meshes
 
 
-class Worker:
-    """One of the two processes."""
+class Scene:
+    """The open file of a case, with Sinew on its meshes."""
 
-    def __init__(self, with_sinew: bool, leave_small: bool) -> None:
-        import bpy
-
-        self.bpy = bpy
-        self.with_sinew, self.leave_small = with_sinew, leave_small
-        if with_sinew:
-            import sinew_addon
-
-            sinew_addon.register()
-            self.end = sinew_addon.unregister
-        else:
-            self.end = lambda: None
-
-    def open(self, case: Case) -> dict:
-        bpy = self.bpy
+    def __init__(self, case: Case, leave_small: bool) -> None:
         self.case = case
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         if case.rig:
-            self.meshes = open_rig(bpy, Path(os.environ["SINEW_RIGS"]) / case.rig)
+            self.meshes = open_rig(Path(os.environ["SINEW_RIGS"]) / case.rig)
         else:
-            self.meshes = [make_tube(bpy, case, index) for index in range(case.characters)]
+            self.meshes = [make_tube(case, index) for index in range(case.characters)]
         for obj in self.meshes:
             for modifier in obj.modifiers:
                 if modifier.type == "ARMATURE":
                     modifier.use_deform_preserve_volume = case.method == "dq"
         bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, FRAMES
         bpy.context.scene.frame_set(1)
-        if self.with_sinew:
-            for obj in self.meshes:
-                with bpy.context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
-                    bpy.ops.sinew.add()
-                obj.sinew.method = case.method
-                obj.sinew.leave_small = self.leave_small
-        vertices = sum(len(obj.data.vertices) for obj in self.meshes)
-        return {"vertices": vertices, "points": self.points(FRAMES // 2)}
+        for obj in self.meshes:
+            with bpy.context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
+                bpy.ops.sinew.add()
+            obj.sinew.method = case.method
+            obj.sinew.leave_small = leave_small
+
+    def switch(self, on: bool) -> None:
+        for obj in self.meshes:
+            obj.sinew.enabled = on
 
     def frame(self, number: int) -> None:
-        bpy = self.bpy
         bpy.context.scene.frame_set(number)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for obj in self.meshes:
@@ -184,12 +172,10 @@ class Worker:
             else:
                 mesh.vertices[0].co.length  # noqa: B018
 
-    def points(self, number: int):
-        """float32 [n, 3] of the first mesh: what both processes must agree on."""
-        import numpy as np
-
+    def points(self, number: int) -> np.ndarray:
+        """float32 [n, 3] of the first mesh: what both must agree on."""
         self.frame(number)
-        mesh = self.meshes[0].evaluated_get(self.bpy.context.evaluated_depsgraph_get()).data
+        mesh = self.meshes[0].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
         mesh.vertices.foreach_get("co", points.ravel())
         return points
@@ -210,7 +196,7 @@ class Worker:
 
     def _handler_times(self, numbers: list[int]) -> list[float]:
         """Between two functions of ours, one before and one behind Sinew's."""
-        functions = self.bpy.app.handlers.frame_change_post
+        functions = bpy.app.handlers.frame_change_post
         times: list[float] = []
 
         def before(*_arguments) -> None:
@@ -227,65 +213,37 @@ class Worker:
         return [seconds / len(self.meshes) for seconds in times]
 
 
-def serve(connection: Connection, with_sinew: bool, leave_small: bool) -> None:
-    # What Blender prints is not ours to show.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    worker = Worker(with_sinew, leave_small)
-    try:
-        while (request := connection.recv()) is not None:
-            name, *arguments = request
-            try:
-                connection.send((None, getattr(worker, name)(*arguments)))
-            except Exception as error:
-                connection.send((f"{type(error).__name__}: {error}", None))
-    finally:
-        worker.end()
-        connection.send((None, None))
-
-
-# --- In this one
-
-
-class Process:
-    def __init__(self, with_sinew: bool, leave_small: bool) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.connection, other = context.Pipe()
-        self.process = context.Process(target=serve, args=(other, with_sinew, leave_small), daemon=True)
-        self.process.start()
-
-    def ask(self, *request):
-        self.connection.send(request)
-        error, answer = self.connection.recv()
-        if error is not None:
-            raise RuntimeError(error)
-        return answer
-
-    def end(self) -> None:
-        self.connection.send(None)
-        self.process.join(20)
-
-
-def start(leave_small: bool) -> dict[str, Process]:
-    return {"modifier": Process(False, leave_small), "sinew": Process(True, leave_small)}
-
-
-def measure(case: Case, processes: dict[str, Process], seconds: float) -> dict:
-    opened = {who: process.ask("open", case) for who, process in processes.items()}
-    points = {who: answer.pop("points") for who, answer in opened.items()}
-    size = float((points["modifier"].max(axis=0) - points["modifier"].min(axis=0)).max())
+def measure(case: Case, seconds: float, leave_small: bool) -> dict:
+    scene = Scene(case, leave_small)
+    points, times = {}, {"modifier": [], "sinew": []}
+    number, end = 1, time.perf_counter() + seconds
+    while time.perf_counter() < end or len(times["sinew"]) < 2 * TURN:
+        numbers = [1 + (number + 7 * i) % FRAMES for i in range(TURN)]
+        number += 7 * TURN
+        for who in times:
+            scene.switch(who == "sinew")
+            if who not in points:
+                points[who] = scene.points(FRAMES // 2)
+            scene.run(numbers[:BEFORE])
+            times[who] += scene.run(numbers)
+    size = float(np.ptp(points["modifier"], axis=0).max())
     away = float(abs(points["modifier"] - points["sinew"]).max()) / size
-    times = {who: [] for who in processes}
-    # In a row, as on playback: a process that has waited finds its caches full of the other's data.
-    number, batch = 1, 24
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end or len(times["sinew"]) < 9:
-        numbers = [1 + (number + 7 * i) % FRAMES for i in range(batch)]
-        number += 7 * batch
-        for who, process in processes.items():
-            times[who] += process.ask("run", numbers)
     spreads = {who: common.spread(of) for who, of in times.items()}
-    handler = processes["sinew"].ask("handler")
-    return asdict(case) | opened["sinew"] | spreads | {"away": away, "handler": handler}
+    vertices = sum(len(obj.data.vertices) for obj in scene.meshes)
+    return asdict(case) | {"vertices": vertices} | spreads | {"away": away, "handler": scene.handler()}
+
+
+@contextmanager
+def quiet_blender() -> Iterator[Callable[[str], None]]:
+    """Gives a function that prints, while what Blender prints is not seen."""
+    sys.stdout.flush()
+    shown = os.dup(1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    try:
+        with os.fdopen(os.dup(shown), "w") as stdout:
+            yield lambda text: print(text, file=stdout, flush=True)
+    finally:
+        os.dup2(shown, 1)
 
 
 def line(name: str, result: dict) -> str:
@@ -310,27 +268,21 @@ def main() -> None:
     print("handler for each object after the evaluation, where it moves and where it stays; how far the")
     print("points are from the modifier's, as a part of the mesh's size.\n")
     print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
-    results, failed = {}, {}
-    leave_small = not arguments.all_by_sinew
-    processes = start(leave_small)
-    for case in cases(arguments.quick):
-        name = f"{case.name} {case.method}"
-        if arguments.k not in name:
-            continue
-        try:
-            result = measure(case, processes, 2.0 if arguments.quick else 4.0)
-        except (RuntimeError, EOFError, OSError) as error:
-            failed[name] = str(error) or "Blender ended"
-            print(f"{case.name:38}{case.method:4}  not measured: {failed[name]}", flush=True)
-            if not isinstance(error, RuntimeError):
-                processes = start(leave_small)
-            continue
-        results[name] = result
-        print(line(case.name, result), flush=True)
-    for process in processes.values():
-        process.end()
-    common.write(arguments.name, machine=facts, failed=failed, seconds=results)
+    results = {}
+    with quiet_blender() as say:
+        for case in cases(arguments.quick):
+            if arguments.k not in f"{case.name} {case.method}":
+                continue
+            result = measure(case, 2.0 if arguments.quick else 4.0, not arguments.all_by_sinew)
+            results[f"{case.name} {case.method}"] = result
+            say(line(case.name, result))
+    common.write(arguments.name, machine=facts, seconds=results)
 
 
 if __name__ == "__main__":
-    main()
+    sinew_addon.register()
+    try:
+        main()
+    finally:
+        # Left to itself it has Blender 4.2 crash and 4.5 hang at the end.
+        sinew_addon.unregister()
