@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A frame in Blender: its Armature modifier beside Sinew, on the same scene in the same run.
 
-One process and one file, in which Sinew is switched on and off: both take turns at a few frames. Of two
-processes one is up to a tenth slower, whichever has Sinew, by where its memory lies. A frame is
-Scene.frame_set() and then asking for the evaluated mesh, which is where Sinew's points arrive.
+One process and one file, in which Sinew is switched off and on: both take turns at a few frames. Two
+processes differ by some percent without any of Sinew's. A frame is Scene.frame_set() and then asking for the
+evaluated mesh, which is where Sinew's points arrive.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from pathlib import Path
 import bpy
 import common
 import numpy as np
-import sinew_addon
 
 FRAMES = 60
 # A turn, as on playback in a row; before it some frames that are not timed, for caches and what is bound.
@@ -280,6 +279,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    # Not in a whole Blender, whose extension has another name: see window.py.
+    import sinew_addon
+
     sinew_addon.register()
     try:
         main()

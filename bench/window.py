@@ -63,11 +63,11 @@ class Bench:
         )
         self.case = frames.Case(arguments.vertices, arguments.method, arguments.characters)
         if arguments.file is not None:
-            self.meshes = frames.open_rig(bpy, arguments.file)
+            self.meshes = frames.open_rig(arguments.file)
         else:
             for obj in list(bpy.data.objects):
                 bpy.data.objects.remove(obj)
-            self.meshes = [frames.make_tube(bpy, self.case, i) for i in range(arguments.characters)]
+            self.meshes = [frames.make_tube(self.case, i) for i in range(arguments.characters)]
         modifiers = [m for obj in self.meshes for m in obj.modifiers if m.type == "ARMATURE"]
         for modifier in modifiers:
             modifier.use_deform_preserve_volume = arguments.method == "dq"
