@@ -54,7 +54,13 @@ def paths_to_wait_for(armature: bpy.types.Object, names: Sequence[str]) -> list[
     bones = armature.data.bones
     bendy = [name for name in names if bones[name].bbone_segments > 1]
     wanted = dict.fromkeys([*names, *_handles_of(armature, bendy)])
-    above = {parent.name for name in wanted for parent in bones[name].parent_recursive}
+    above = set()
+    for name in wanted:
+        parent = bones[name].parent
+        # Those above a bone that was met are known.
+        while parent is not None and parent.name not in above:
+            above.add(parent.name)
+            parent = parent.parent
     # A bone is posed after those above it; joints come later, and only properties of theirs wait for them.
     return [
         *(f"{_path(name)}.length" for name in wanted if name not in above),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import sinew
@@ -47,7 +48,7 @@ class Binding:
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
         self._is_elsewhere = False
 
-    @property
+    @cached_property
     def moving_bones(self) -> list[str]:
         """Names of the bones that can move a vertex."""
         bones = np.unique(self.weighting.entries.bones)
