@@ -236,13 +236,12 @@ def measure(case: Case, seconds: float, leave_small: bool) -> dict:
 def quiet_blender() -> Iterator[Callable[[str], None]]:
     """Gives a function that prints, while what Blender prints is not seen."""
     sys.stdout.flush()
-    shown = os.dup(1)
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    try:
-        with os.fdopen(os.dup(shown), "w") as stdout:
+    with os.fdopen(os.dup(1), "w") as stdout, open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        try:
             yield lambda text: print(text, file=stdout, flush=True)
-    finally:
-        os.dup2(shown, 1)
+        finally:
+            os.dup2(stdout.fileno(), 1)
 
 
 def line(name: str, result: dict) -> str:

@@ -291,7 +291,8 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     if len(armatures) != len(driven.chain.links) or None in armatures:
         return
     attribute = mesh.attributes.get(driven.attribute)
-    if attribute is None:
+    shown = None if attribute is None else mesh_io.points_in(attribute)
+    if shown is None:
         return
     with driven.lock:
         started = time.perf_counter()
@@ -299,11 +300,7 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
         if frames is None:
             return
         driven.rest_points = source.keyed_points(obj, mesh, driven.source)
-        shown = mesh_io.points_in(attribute)
-        out = np.empty_like(driven.rest_points) if shown is None else shown
-        driven.chain.deform(driven.rest_points, frames, out)
-        if shown is None:
-            attribute.data.foreach_set("vector", out.ravel())
+        driven.chain.deform(driven.rest_points, frames, shown)
         driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
         driven.dirtied_by_frames = False
         driven.shapes += 1

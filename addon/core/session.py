@@ -227,7 +227,8 @@ class Chain:
     ) -> bool:
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
-        last = max(number for number, frame in enumerate(frames) if frame is not None)
+        last = self.links[max(number for number, frame in enumerate(frames) if frame is not None)]
+        self._end = last.binding if last.mask is None else None
         for number, (link, frame) in enumerate(zip(self.links, frames, strict=True)):
             if frame is None:
                 continue
@@ -237,14 +238,14 @@ class Chain:
                     break
                 starts[behind] = result
             start = starts.get(number, result)
-            self._end = link.binding if number == last and link.mask is None else None
+            is_end = link.binding is self._end
             changed |= link.binding.deform(
                 Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule),
-                None if self._end is None else out,
+                out if is_end else None,
             )
             if link.mask is not None:
                 result = result + link.mask[:, None] * (link.binding.points - result)
-            elif self._end is None:
+            elif not is_end:
                 # The next link compares with what it was given: a buffer that is written again will not do.
                 result = link.binding.points.copy()
         self._points = result
