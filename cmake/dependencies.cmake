@@ -1,10 +1,16 @@
 # Each dependency from the system where it is installed, else fetched at a fixed version.
 include(FetchContent)
 
+# GLM's headers are part of Sinew's own. Where they are fetched, they are installed with it (SINEW_FETCHED_GLM is
+# their folder): a target of theirs could not be exported, and a program would look for a GLM that is not there.
 find_package(glm QUIET)
 if(NOT TARGET glm::glm)
-  FetchContent_Declare(glm GIT_REPOSITORY https://github.com/g-truc/glm.git GIT_TAG 1.0.1)
+  FetchContent_Declare(glm GIT_REPOSITORY https://github.com/g-truc/glm.git GIT_TAG 1.0.1 SOURCE_SUBDIR none)
   FetchContent_MakeAvailable(glm)
+  set(SINEW_FETCHED_GLM "${glm_SOURCE_DIR}")
+  add_library(sinew_fetched_glm INTERFACE)
+  target_include_directories(sinew_fetched_glm SYSTEM INTERFACE "${SINEW_FETCHED_GLM}")
+  add_library(glm::glm ALIAS sinew_fetched_glm)
 endif()
 
 # Highway's headers alone: Debian has its library as a shared one only, which a wheel can not count on, and

@@ -74,6 +74,7 @@ public:
     friend bool operator==(Counted a, Counted b) { return compared(a, b), a.value_ == b.value_; }
 
     friend Counted square_root(Counted a) { return result(a, a, std::sqrt(a.value_), &Operations::roots); }
+    friend bool isfinite(Counted a) { return std::isfinite(a.value_); }
     friend Counted abs(Counted a) { return {std::abs(a.value_), a.is_constant_}; }
     friend Counted sin(Counted a) { return result(a, a, std::sin(a.value_), &Operations::functions); }
     friend Counted cos(Counted a) { return result(a, a, std::cos(a.value_), &Operations::functions); }

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "sinew/deform/deformer.h"
+
 namespace sinew::bindings {
 namespace {
 
@@ -41,8 +43,22 @@ std::string describe(const py::handle& value) {
     return text + "]";
 }
 
+std::string checked_name(const py::handle& value, const char* argument, const std::string& wanted) {
+    if (!py::isinstance<py::str>(value)) {
+        throw py::type_error(std::string(argument) + ": expected " + wanted + ", got " + describe(value));
+    }
+    Py_ssize_t length = 0;
+    const char* const text = PyUnicode_AsUTF8AndSize(value.ptr(), &length);
+    if (text == nullptr) {
+        // Half of a surrogate pair.
+        PyErr_Clear();
+        fail(argument, wanted, py::repr(value).cast<std::string>());
+    }
+    return {text, static_cast<std::size_t>(length)};
+}
+
 py::array_t<float> checked_points(const py::handle& value, const char* argument) {
-    auto points = checked<float>(value, argument, 2, "float32 [n, 3]");
+    auto points = checked<float>(value, argument, 2, "float32 [n, 3]", kMaxVertices);
     if (points.shape(1) != 3) fail(argument, "float32 [n, 3]", describe(value));
     return points;
 }

@@ -4,6 +4,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <limits>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -13,27 +15,48 @@ namespace sinew::bindings {
 
 namespace py = pybind11;
 
+inline constexpr std::size_t kAnyLength = std::numeric_limits<std::size_t>::max();
+
 /// Raises ValueError "`argument`: expected `wanted`, got `got`".
 [[noreturn]] void fail(const char* argument, const std::string& wanted, const std::string& got);
 
 /// "float64 [120, 4]" for an array, the type's name for anything else.
 std::string describe(const py::handle& value);
 
+/// The text of a `str`. TypeError for anything else, naming `wanted`.
+std::string checked_name(const py::handle& value, const char* argument, const std::string& wanted);
+
+/// The array `value` of element type T, C-contiguous and aligned; copied only where it is not.
+template <class T>
+py::array_t<T> in_order(const py::handle& value) {
+    constexpr int kFlags =
+        py::array::c_style | py::array::forcecast | py::detail::npy_api::NPY_ARRAY_ALIGNED_;
+    auto array = py::array_t<T, kFlags>::ensure(value);
+    // Too large to copy.
+    if (!array) throw std::bad_alloc();
+    return py::reinterpret_steal<py::array_t<T>>(array.release());
+}
+
 /// `value` as a C-contiguous array of T with `dimensions` dimensions; copied only where its layout is
-/// another. ValueError where it is no array of exactly that element type, naming `wanted`.
+/// another. ValueError where it is no array of exactly that element type, naming `wanted`, or has more than
+/// `most` of its first dimension.
 template <class T>
 py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_t dimensions,
-                       const std::string& wanted) {
+                       const std::string& wanted, std::size_t most = kAnyLength) {
     if (!py::isinstance<py::array>(value)) fail(argument, wanted, describe(value));
     const auto array = py::reinterpret_borrow<py::array>(value);
     if (!array.dtype().is(py::dtype::of<T>()) && !array.dtype().equal(py::dtype::of<T>())) {
         fail(argument, wanted, describe(value));
     }
     if (array.ndim() != dimensions) fail(argument, wanted, describe(value));
-    return py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(array);
+    // Before a copy is made.
+    if (static_cast<std::size_t>(array.shape(0)) > most) {
+        fail(argument, wanted + ", at most " + std::to_string(most), describe(value));
+    }
+    return in_order<T>(array);
 }
 
-/// float32 [n, 3].
+/// float32 [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 
 /// float32 [n, 4, 4] or [n, 3, 4], row-major, finite; a fourth row is not read.

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "arrays.h"
+#include "gil.h"
 #include "module.h"
 #include "sinew/deform/deformer.h"
 
@@ -23,23 +24,25 @@ std::span<const T> as_span(const py::array_t<T>& array) {
     return {array.data(), static_cast<std::size_t>(array.size())};
 }
 
-Method checked_method(const std::string& name) {
-    const std::optional<Method> method = find_method(name);
-    if (method) return *method;
+Method checked_method(const py::object& method) {
     std::string names;
     for (const Method& row : kMethods) names += (names.empty() ? "" : ", ") + std::string(row.name);
+    const std::string name = checked_name(method, "method", "one of " + names);
+    if (const std::optional<Method> row = find_method(name)) return *row;
     fail("method", "one of " + names, "'" + name + "'");
 }
 
 Deformer make_deformer(const py::object& rest_points, const py::object& influence_offsets,
                        const py::object& influence_bones, const py::object& influence_weights,
-                       const std::string& method, const py::object& rest_bones) {
+                       const py::object& method, const py::object& rest_bones) {
     const Method row = checked_method(method);
     const auto points = checked_points(rest_points, "rest_points");
-    const auto offsets =
-        checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]");
-    const auto bones = checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]");
-    const auto weights = checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]");
+    const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1,
+                                               "int32 [vertices + 1]", kMaxVertices + 1);
+    const auto bones =
+        checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences);
+    const auto weights =
+        checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences);
     std::vector<Affine<float>> axes;
     if (!rest_bones.is_none()) axes = checked_affines(rest_bones, "rest_bones");
     return Deformer(row.id, {as_points(points), as_span(offsets), as_span(bones), as_span(weights), axes});
@@ -55,6 +58,9 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
     if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3)
         fail("out", wanted, describe(out));
     if ((array.flags() & py::array::c_style) == 0) fail("out", wanted, "one that is not C-contiguous");
+    if ((array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0) {
+        fail("out", wanted, "one that is not aligned");
+    }
     if (!array.writeable()) fail("out", wanted, "a read-only array");
     return array;
 }
@@ -81,8 +87,9 @@ std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
     if (!py::isinstance<py::array_t<float>>(bone_transforms)) {
         fail("bone_transforms", wanted, describe(bone_transforms));
     }
-    const auto posed = py::reinterpret_borrow<py::array_t<float>>(bone_transforms);
+    auto posed = py::reinterpret_borrow<py::array_t<float>>(bone_transforms);
     if (!are_affines(posed)) fail("bone_transforms", wanted, describe(bone_transforms));
+    if ((posed.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0) posed = in_order<float>(posed);
     const std::string as_many =
         "float64 [" + std::to_string(posed.shape(0)) + ", 4, 4], one for each of bone_transforms";
     const auto inverse = checked<double>(rest_inverses, "rest_inverses", 3, as_many);
@@ -133,12 +140,16 @@ py::array_t<float> deform(const Deformer& deformer, const py::object& bone_trans
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
                                         deformer.vertex_count());
+    const auto run = [&] { deformer.deform(bones, options, target); };
     // Where many threads want the lock, getting it back takes longer than to deform a small mesh.
-    std::optional<py::gil_scoped_release> release;
-    if (deformer.vertex_count() > kVerticesUnderLock) release.emplace();
-    deformer.deform(bones, options, target);
-    release.reset();
+    deformer.vertex_count() > kVerticesUnderLock ? without_gil(run) : run();
     return points;
+}
+
+void set_rest_points(Deformer& deformer, const py::object& rest_points) {
+    const auto points = checked_points(rest_points, "rest_points");
+    // It may have to wait for another thread's deformation.
+    without_gil([&] { deformer.set_rest_points(as_points(points)); });
 }
 
 }  // namespace
@@ -152,6 +163,7 @@ void bind_deformer(py::module_& m) {
              "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
              "influence_bones: int32 [influences].\n"
              "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
+             "    At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.\n"
              "method: the name of one of sinew.methods().\n"
              "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the "
              "space\n"
@@ -170,19 +182,16 @@ void bind_deformer(py::module_& m) {
                                "Influences of positive weight.")
         .def_property_readonly("bone_count", &Deformer::bone_count,
                                "One more than the highest bone that an influence names.")
-        .def(
-            "set_rest_points",
-            [](Deformer& deformer, const py::object& rest_points) {
-                deformer.set_rest_points(as_points(checked_points(rest_points, "rest_points")));
-            },
-            py::arg("rest_points"), "New rest points, float32 [vertices, 3], as when shape keys change.")
+        .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
+             "New rest points, float32 [vertices, 3], as when shape keys change. Other threads may deform\n"
+             "meanwhile: each of their results has the old points or the new ones.")
         .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
              py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
              py::arg("rest_inverses") = py::none(),
              "The deformed points, float32 [vertices, 3], model space.\n\n"
              "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
              "read.\n"
-             "out: written and returned where given: float32 [vertices, 3], C-contiguous.\n"
+             "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned.\n"
              "threads: how many at most; None: as many as help. The result is the same bit for bit.\n"
              "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
              "    transforms, where the blending happens; the result is taken back. None: the same space.\n"

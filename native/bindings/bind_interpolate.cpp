@@ -6,7 +6,7 @@
 namespace sinew::bindings {
 namespace {
 
-py::object between(const py::object& a, const py::object& b, const py::object& t, const std::string& method) {
+py::object between(const py::object& a, const py::object& b, const py::object& t, const py::object& method) {
     return with_method(method, [&]<class Method>(Method) {
         return map<Method::template Transform, Method::template Transform, Scalar>(
             {"a", "b", "t"}, {a, b, t}, [](const auto& from, const auto& onto, auto at) {
@@ -40,8 +40,7 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
     const Shape common = broadcast(std::span<Input<T>>(inputs));
     Output<std::tuple<Transform, bool>> output(common);
     const py::ssize_t count = count_of(common);
-    {
-        const py::gil_scoped_release release;
+    without_gil([&] {
         std::vector<Transform> items(static_cast<std::size_t>(terms));
         for (py::ssize_t i = 0; i < count; ++i) {
             const T* from = inputs[0].at(i, common);
@@ -53,11 +52,11 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
             const auto result = Method::template blend<Signs::kToHeaviest, T>(items, shares);
             output.write(i, {result.transform, result.is_defined});
         }
-    }
+    });
     return output.take();
 }
 
-py::object blend(const py::object& transforms, const py::object& weights, const std::string& method) {
+py::object blend(const py::object& transforms, const py::object& weights, const py::object& method) {
     return with_method(method, [&]<class Method>(Method) {
         return with_element(transforms, "transforms",
                             Item<typename Method::template Transform<double>>::kShape,
@@ -78,19 +77,18 @@ py::object spline_items(const py::object& keys, const py::object& times, const p
     const auto moments = checked_input<T, T>(at, "at");
     Output<std::tuple<Transform, bool>> output(moments.lead);
     const py::ssize_t count = count_of(moments.lead);
-    {
-        const py::gil_scoped_release release;
+    without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
             const SplineSpan<T> span = spline_span(std::span<const T>(key_times), moments.data[i]);
             const auto result = combine(span, keys_of(span, std::span<const Transform>(items)));
             output.write(i, {result.transform, result.is_defined});
         }
-    }
+    });
     return output.take();
 }
 
 py::object spline(const py::object& keys, const py::object& times, const py::object& at,
-                  const std::string& method) {
+                  const py::object& method) {
     return with_method(method, [&]<class Method>(Method) {
         return with_element(
             keys, "keys", Item<typename Method::template Transform<double>>::kShape, [&]<class T>(T) {

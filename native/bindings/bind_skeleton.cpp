@@ -47,7 +47,7 @@ py::object relative_to_root(const Skeleton& skeleton, const py::object& transfor
 }
 
 py::object interpolate(const Skeleton& skeleton, const py::object& a, const py::object& b,
-                       const py::object& t, const std::string& method) {
+                       const py::object& t, const py::object& method) {
     return with_method(method, [&]<class Method>(Method) {
         const char* shape = Item<typename Method::template Transform<double>>::kShape;
         return with_element(a, "a", shape, [&]<class T>(T) -> py::object {
@@ -80,7 +80,7 @@ py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, c
 }
 
 py::object spline(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
-                  const py::object& time, const std::string& method) {
+                  const py::object& time, const py::object& method) {
     return with_method(method, [&]<class Method>(Method) {
         const char* shape = Item<typename Method::template Transform<double>>::kShape;
         return with_element(keyframes, "keyframes", shape, [&]<class T>(T) {

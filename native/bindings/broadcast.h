@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "arrays.h"
+#include "gil.h"
 #include "items.h"
 
 namespace sinew::bindings {
@@ -73,7 +74,7 @@ Input<T> checked_input(const py::handle& value, const char* argument) {
     }
     const std::string any = std::string("float32 or float64 ") + Item<Value>::kShape;
     if (is_double(value, argument, any) != std::is_same_v<T, double>) fail(argument, wanted, describe(value));
-    const auto array = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(value);
+    const auto array = in_order<T>(value);
     const auto axes = static_cast<py::ssize_t>(Item<Value>::kDimensions.size());
     bool fits = array.ndim() >= axes;
     py::ssize_t item_size = 1;
@@ -179,12 +180,11 @@ py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
     using Result = decltype(f(std::declval<const In<T>&>()...));
     Output<Result> output(common);
     const py::ssize_t count = count_of(common);
-    {
-        const py::gil_scoped_release release;
+    without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
             output.write(i, f(Item<In<T>>::read(inputs[I].at(i, common))...));
         }
-    }
+    });
     return output.take();
 }
 

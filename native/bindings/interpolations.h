@@ -6,17 +6,20 @@
 
 namespace sinew::bindings {
 
-/// f(Method{}) for the row of Interpolations called `name`. ValueError for a name it does not have.
+/// f(Method{}) for the row of Interpolations called `method`. ValueError for another name, TypeError for no name.
 template <class F>
-py::object with_method(const std::string& name, F f) {
-    py::object result;
+py::object with_method(const py::object& method, F f) {
     std::string names;
+    std::apply([&](auto... row) { ((names += (names.empty() ? "" : ", ") + std::string(row.name)), ...); },
+               Interpolations{});
+    const std::string wanted = "one of " + names;
+    const std::string name = checked_name(method, "method", wanted);
+    py::object result;
     const auto try_row = [&](auto row) {
         if (row.name == name) result = f(row);
-        names += (names.empty() ? "" : ", ") + std::string(row.name);
     };
     std::apply([&](auto... row) { (try_row(row), ...); }, Interpolations{});
-    if (!result) fail("method", "one of " + names, "'" + name + "'");
+    if (!result) fail("method", wanted, "'" + name + "'");
     return result;
 }
 

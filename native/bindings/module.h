@@ -7,6 +7,7 @@ namespace sinew::bindings {
 
 void bind_methods(pybind11::module_& m);
 void bind_skeleton(pybind11::module_& m);
+void bind_threads(pybind11::module_& m);
 void bind_transforms(pybind11::module_& m);
 void bind_interpolate(pybind11::module_& m);
 void bind_deformer(pybind11::module_& m);

@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <atomic>
 #include <functional>
+#include <limits>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "scene.h"
 #include "sinew/deform/deformer.h"
@@ -164,6 +170,90 @@ TEST_P(Deform, bones_that_no_influence_names_are_not_needed) {
     EXPECT_TRUE(same_bits(deformed(deformer, scene)[0], expected[0]));
 }
 
+TEST_P(Deform, bones_that_the_pose_lacks_stay_at_rest) {
+    for (const bool scaled : {false, true}) {
+        Scene scene = random_scene(18, 300, 1.0);
+        if (!scaled) {
+            for (std::size_t bone = 2; bone < 12; bone += 3)
+                scene.posed_from_rest[bone] = scene.posed_from_rest[0];
+        } else {
+            // Of no unit length, so seen to one by one whatever the pose.
+            scene.rest_bones[11] = cast<float>(scaling<double>({2.0, 2.0, 2.0}));
+        }
+        const Deformer deformer(method(), scene.data());
+        for (const std::size_t bones : {0, 1, 5, 11}) {
+            Scene whole = scene;
+            for (std::size_t bone = bones; bone < 12; ++bone) whole.posed_from_rest[bone] = {};
+            // Just as large, so that the address sanitizer sees a read past its end.
+            const std::vector<Affine<float>> shorter(
+                scene.posed_from_rest.begin(), scene.posed_from_rest.begin() + static_cast<long>(bones));
+            std::vector<Vec3<float>> points(deformer.vertex_count());
+            for (const Affine<float>& space :
+                 {Affine<float>{}, cast<float>(scaling<double>({1.0, 2.0, 1.0}))}) {
+                deformer.deform(shorter, {space, 0}, points);
+                const auto expected = deformed(deformer, whole, {space, 0});
+                for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+                    // A stretched rest bone has scale even where it does not move.
+                    ASSERT_LT(distance(points[vertex], expected[vertex]), scaled ? 20.0 : 1e-5) << bones;
+                }
+            }
+        }
+    }
+}
+
+TEST_P(Deform, writes_nothing_to_points_of_another_number) {
+    const Scene scene = random_scene(19, 30, 1.0);
+    const Deformer deformer(method(), scene.data());
+    for (const std::size_t size : {0, 29, 31}) {
+        const Vec3<float> mark(-1e9f);
+        std::vector<Vec3<float>> points(size, mark);
+        deformer.deform(scene.posed_from_rest, {}, points);
+        for (const auto& point : points) ASSERT_TRUE(same_bits(point, mark));
+    }
+}
+
+TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
+    Scene scene = random_scene(20, 10000, 1.0);
+    Deformer deformer(method(), scene.data());
+    const std::vector<Vec3<float>> old_rest(scene.rest_points.size(), Vec3<float>(0.25f));
+    const std::vector<Vec3<float>> new_rest(scene.rest_points.size(), Vec3<float>(-0.5f));
+    const auto results = [&](const std::vector<Vec3<float>>& rest) {
+        deformer.set_rest_points(rest);
+        return deformed(deformer, scene);
+    };
+    const auto with_new = results(new_rest);
+    const auto with_old = results(old_rest);
+    std::atomic<bool> done{false};
+    std::atomic<int> torn{0};
+    std::vector<std::thread> readers;
+    // More than there are palettes for.
+    for (int reader = 0; reader < 20; ++reader) {
+        readers.emplace_back([&, reader] {
+            std::vector<Vec3<float>> points(scene.rest_points.size());
+            while (!done) {
+                deformer.deform(scene.posed_from_rest, {{}, static_cast<std::size_t>(1 + reader % 2)},
+                                points);
+                const auto& expected = same_bits(points[0], with_old[0]) ? with_old : with_new;
+                if (!std::ranges::equal(points, expected, same_bits<float>)) ++torn;
+            }
+        });
+    }
+    for (int round = 0; round < 20; ++round) deformer.set_rest_points(round % 2 == 0 ? new_rest : old_rest);
+    done = true;
+    for (std::thread& reader : readers) reader.join();
+    EXPECT_EQ(torn, 0);
+}
+
+TEST_P(Deform, moved_deformers_go_on) {
+    const Scene scene = random_scene(21, 30, 1.0);
+    Deformer first(method(), scene.data());
+    const auto expected = deformed(first, scene);
+    Deformer second(std::move(first));
+    EXPECT_TRUE(same_bits(deformed(second, scene)[7], expected[7]));
+    first = std::move(second);
+    EXPECT_TRUE(same_bits(deformed(first, scene)[7], expected[7]));
+}
+
 TEST_P(Deform, says_what_it_was_made_of) {
     Scene scene = random_scene(17, 0, 1.0);
     scene.add_vertex({1, 2, 3}, {{1, 1.0f}, {4, 0.0f}});
@@ -244,6 +334,52 @@ TEST(Deformer, refuses_offsets_that_do_not_rise_from_0_to_the_end) {
 TEST(Deformer, refuses_a_negative_bone) {
     EXPECT_EQ(refusal([](Scene& s) { s.bones[2] = -1; }),
               "influence_bones: expected indices of bones, 0 or more, got -1 at influence 2");
+}
+
+TEST(Deformer, refuses_bones_beyond_the_limit) {
+    EXPECT_EQ(refusal([](Scene& s) { s.bones[1] = (1 << 20) - 1; }), "nothing thrown");
+    EXPECT_EQ(refusal([](Scene& s) { s.bones[1] = 1 << 20; }),
+              "influence_bones: expected indices of bones below 1048576, got 1048576 at influence 1");
+    EXPECT_EQ(refusal([](Scene& s) { s.bones[2] = std::numeric_limits<std::int32_t>::max(); }),
+              "influence_bones: expected indices of bones below 1048576, got 2147483647 at influence 2");
+}
+
+// Sizes alone: nothing that large is there to be read.
+TEST(Deformer, refuses_more_than_it_can_number) {
+    const Vec3<float> point(0.0f);
+    const std::size_t many = std::size_t{1} << 31;
+    BindData data{{&point, many}, {}, {}, {}, {}};
+    EXPECT_EQ(message_of([&] { const Deformer deformer(MethodId::lbs, data); }),
+              "rest_points: expected at most 2147483647 vertices, got 2147483648");
+    const std::int32_t bone = 0;
+    data = {{&point, 1}, {}, {&bone, many}, {}, {}};
+    EXPECT_EQ(message_of([&] { const Deformer deformer(MethodId::lbs, data); }),
+              "influence_bones: expected at most 2147483647 influences, got 2147483648");
+}
+
+TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {
+    const auto with_influences = [](std::size_t count) {
+        Scene scene;
+        scene.add_vertex({0, 0, 0}, {{0, 1.0f}});
+        scene.add_vertex({0, 0, 0}, std::vector<Influence<float>>(count, {0, 1.0f}));
+        return message_of([&] { const Deformer deformer(MethodId::dq, scene.data()); });
+    };
+    EXPECT_EQ(with_influences(65536), "nothing thrown");
+    EXPECT_EQ(with_influences(65537),
+              "influence_offsets: expected at most 65536 influences a vertex, got 65537 at vertex 1");
+}
+
+TEST(Deformer, refuses_rest_bones_that_are_not_finite) {
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.rest_bones.resize(2);
+                  s.rest_bones[1].linear[2].y = kNan;
+              }),
+              "rest_bones: expected finite values, got NaN or infinity at bone 1");
+    EXPECT_EQ(refusal([](Scene& s) {
+                  s.rest_bones.resize(3);
+                  s.rest_bones[0].translation.x = -kInfinity;
+              }),
+              "rest_bones: expected finite values, got NaN or infinity at bone 0");
 }
 
 TEST(Deformer, refuses_weights_that_are_negative_or_not_finite) {

@@ -113,6 +113,45 @@ TYPED_TEST(Interpolation, weights_without_sum_give_the_heaviest) {
     }
 }
 
+// Their sum is beyond the type, or 1 by it is.
+TYPED_TEST(Interpolation, weights_of_any_size_are_shares) {
+    using T = typename TypeParam::Scalar;
+    Random random(6);
+    const auto a = this->random(random);
+    const auto b = this->random(random);
+    const auto expected = this->blend({a, b, a}, {T(1), T(0.5), T(1)});
+    for (const T size : {std::numeric_limits<T>::max(), T(16) * std::numeric_limits<T>::denorm_min()}) {
+        const auto mean = this->blend({a, b, a}, {size, size / T(2), size});
+        EXPECT_EQ(mean.is_defined, expected.is_defined);
+        EXPECT_LT(this->apart(mean.transform, expected.transform), 16 * this->kTolerance);
+    }
+}
+
+// What is not finite is not called defined; what is called defined is right.
+TYPED_TEST(Interpolation, translations_near_the_largest_number_are_finite) {
+    using T = typename TypeParam::Scalar;
+    using M = typename TypeParam::M;
+    const T large = T(0.88) * std::numeric_limits<T>::max();
+    Random random(7);
+    for (int i = 0; i < 40; ++i) {
+        const auto random_end = [&] {
+            const Vec3<double> v = random.vector(1.0);
+            const Quat<T> turn(i % 4 == 0 ? Quat<double>(1, 0, 0, 0) : random.rotation());
+            const Vec3<T> sides(v.x < 0 ? -large : large, v.y < 0 ? -large : large, v.z < 0 ? T(0) : large);
+            return this->in_layout({turn, sides});
+        };
+        const auto a = random_end();
+        const auto b = random_end();
+        // As dual quaternions some are beyond the type themselves.
+        if (!sinew::is_finite(a) || !sinew::is_finite(b)) continue;
+        for (const T t : {T(0), T(0.25), T(0.5), T(1), T(-1), T(2), T(-1e30), T(3e38f)}) {
+            EXPECT_TRUE(sinew::is_finite(M::between(a, b, t).transform)) << i << " " << t;
+            EXPECT_TRUE(sinew::is_finite(this->blend({a, b, a}, {T(1) - t, t, t}).transform))
+                << i << " " << t;
+        }
+    }
+}
+
 TYPED_TEST(Interpolation, half_turns_are_finite_and_said_not_to_be_defined) {
     using T = typename TypeParam::Scalar;
     using M = typename TypeParam::M;

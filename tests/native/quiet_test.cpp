@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A frame allocates nothing and locks nothing. A program of its own, as it counts what everything in it does.
+// What is allocated and locked: by a frame nothing. A program of its own, as it counts what everything in it does.
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
 #include <new>
+#include <thread>
+#include <vector>
 
 #include "scene.h"
 
@@ -18,11 +20,13 @@ namespace {
 
 std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
+std::atomic<std::size_t> bytes{0};
 
 }  // namespace
 
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
     allocations.fetch_add(1);
+    bytes.fetch_add(size);
     return std::malloc(std::max<std::size_t>(size, 1));
 }
 
@@ -38,6 +42,13 @@ void* operator new(std::size_t size, std::align_val_t alignment) {
     throw std::bad_alloc();
 }
 
+void* operator new[](std::size_t size) { return operator new(size); }
+void* operator new[](std::size_t size, std::align_val_t alignment) { return operator new(size, alignment); }
+
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
@@ -74,27 +85,62 @@ TEST(Counting, sees_what_there_is) {
 #endif
 }
 
+// From the first frame on, on whatever thread, and with threads that were never started.
 TEST(Frames, allocate_nothing_and_lock_nothing) {
     // Sets of all sizes, scaled bones among them, and more blocks than one piece of a thread's work.
     Scene scene = random_scene(1, 20000, 1.0);
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
-    std::vector<Vec3<float>> points(scene.rest_points.size());
-    for (const Method& method : kMethods) {
-        const Deformer deformer(method.id, scene.data());
-        const auto frame = [&](std::size_t threads) {
-            deformer.deform(scene.posed_from_rest, {{}, threads}, points);
-            deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points);
-        };
-        // The first starts threads and makes room for the bones.
-        for (const std::size_t threads : {1, 4}) frame(threads);
-        const int allocations_before = allocations;
-        const int locks_before = locks;
-        for (int round = 0; round < 5; ++round) {
-            for (const std::size_t threads : {1, 4}) frame(threads);
+    std::vector<Deformer> deformers;
+    for (const Method& method : kMethods) deformers.emplace_back(method.id, scene.data());
+    std::vector<Vec3<float>> other_rest_points = scene.rest_points;
+    const auto frames = [&](std::vector<Vec3<float>>& points) {
+        for (Deformer& deformer : deformers) {
+            for (const std::size_t threads : {1, 4, 0}) {
+                deformer.deform(scene.posed_from_rest, {{}, threads}, points);
+                deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points);
+            }
+            deformer.set_rest_points(other_rest_points);
         }
-        EXPECT_EQ(allocations, allocations_before) << method.name;
-        EXPECT_EQ(locks, locks_before) << method.name;
+    };
+    std::vector<std::vector<Vec3<float>>> points(5, scene.rest_points);
+    const int allocations_before = allocations;
+    frames(points[0]);
+    EXPECT_EQ(allocations, allocations_before);
+    // The threads are started, which takes locks of the system's.
+    const int locks_before = locks;
+    for (int round = 0; round < 5; ++round) frames(points[0]);
+    EXPECT_EQ(allocations, allocations_before);
+    EXPECT_EQ(locks, locks_before);
+
+    // Many at once.
+    std::atomic<int> waiting{0};
+    std::atomic<int> in_frames{0};
+    std::vector<std::thread> threads;
+    for (auto& of_thread : points) {
+        threads.emplace_back([&] {
+            ++waiting;
+            while (waiting < 5) std::this_thread::yield();
+            const int before = allocations;
+            for (int round = 0; round < 5; ++round) frames(of_thread);
+            in_frames += allocations - before;
+        });
     }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(in_frames, 0);
+}
+
+// As a number of a bone is no size: what is made for it does not grow with it.
+TEST(Bones, of_high_numbers_take_no_memory) {
+    std::vector<std::size_t> sizes;
+    for (const std::int32_t bone : {0, static_cast<std::int32_t>(kMaxBones) - 1}) {
+        Scene scene;
+        scene.add_vertex({1, 2, 3}, {{bone, 1.0f}});
+        const std::size_t before = bytes;
+        const Deformer deformer(MethodId::dq, scene.data());
+        sizes.push_back(bytes - before);
+    }
+    // What the numbers are sorted by is 4 bytes each, and gone afterwards.
+    EXPECT_LT(sizes[1], sizes[0] + 5 * kMaxBones);
 }
 
 }  // namespace

@@ -68,36 +68,43 @@ inline std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& 
     return points;
 }
 
-template <class Method>
-std::vector<Vec3<double>> in_double(const Scene& scene) {
-    std::vector<typename Method::template Bone<double>> palette;
+/// As skinning/ has it in T, weights normalised in double and bones prepared in it.
+template <class T, class Method>
+std::vector<Vec3<T>> by_skinning(const Scene& scene) {
+    std::vector<typename Method::template Bone<T>> palette;
     for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
-        palette.push_back(
-            Method::prepare(cast<double>(scene.posed_from_rest[bone]), cast<double>(scene.rest_bones[bone])));
+        palette.push_back(cast<T>(Method::prepare(cast<double>(scene.posed_from_rest[bone]),
+                                                  cast<double>(scene.rest_bones[bone]))));
     }
-    std::vector<Vec3<double>> points;
+    std::vector<Vec3<T>> points;
     for (std::size_t vertex = 0; vertex < scene.rest_points.size(); ++vertex) {
-        std::vector<Influence<double>> influences;
+        const auto begin = static_cast<std::size_t>(scene.offsets[vertex]);
+        const auto end = static_cast<std::size_t>(scene.offsets[vertex + 1]);
         double sum = 0.0;
-        for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
-             i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
-            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i])});
-            sum += influences.back().weight;
+        for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(scene.weights[i]);
+        std::vector<Influence<T>> influences;
+        for (std::size_t i = begin; i < end; ++i) {
+            influences.push_back(
+                {scene.bones[i], static_cast<T>(static_cast<double>(scene.weights[i]) / sum)});
         }
-        for (Influence<double>& influence : influences) influence.weight /= sum;
-        points.push_back(Method::template deform_vertex<double>(palette, influences,
-                                                                Vec3<double>(scene.rest_points[vertex])));
+        points.push_back(
+            Method::template deform_vertex<T>(palette, influences, Vec3<T>(scene.rest_points[vertex])));
     }
     return points;
 }
 
-inline std::vector<Vec3<double>> in_double(MethodId method, const Scene& scene) {
+template <class T>
+std::vector<Vec3<T>> by_skinning(MethodId method, const Scene& scene) {
     switch (method) {
-        case MethodId::lbs: return in_double<Lbs>(scene);
-        case MethodId::qv: return in_double<Qv>(scene);
-        case MethodId::dq: return in_double<Dq>(scene);
+        case MethodId::lbs: return by_skinning<T, Lbs>(scene);
+        case MethodId::qv: return by_skinning<T, Qv>(scene);
+        case MethodId::dq: return by_skinning<T, Dq>(scene);
     }
     return {};
+}
+
+inline std::vector<Vec3<double>> in_double(MethodId method, const Scene& scene) {
+    return by_skinning<double>(method, scene);
 }
 
 // kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The shift of a

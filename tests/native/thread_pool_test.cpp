@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -116,6 +117,67 @@ TEST(ParallelFor, may_be_called_from_many_threads_at_once) {
             }
         });
     }
+    for (std::thread& caller : callers) caller.join();
+    EXPECT_EQ(failures, 0);
+}
+
+// Whoever throws, caller or helper, and however many.
+TEST(ParallelFor, hands_an_exception_to_its_caller_and_goes_on_working) {
+    for (int round = 0; round < 50; ++round) {
+        for (const std::size_t threads : {1, 2, 5}) {
+            for (const std::size_t bad : {0, 10, 19}) {
+                std::atomic<int> calls{0};
+                const auto work = [&](std::size_t begin, std::size_t) {
+                    ++calls;
+                    if (begin == 4096 * bad || round % 2 == 1) throw std::out_of_range("chunk");
+                };
+                EXPECT_THROW(parallel_for(20 * 4096, threads, work), std::out_of_range)
+                    << threads << " " << bad;
+                EXPECT_LE(calls, 20);
+                if (threads == 1) break;  // one chunk
+            }
+        }
+        ASSERT_TRUE(covers_once(50000, 4));
+    }
+    EXPECT_TRUE(meets_a_helper());
+}
+
+TEST(ParallelFor, takes_chunks_of_any_size) {
+    for (const std::size_t piece : {std::size_t{0}, std::size_t{1}, std::size_t{7}, ~std::size_t{0}}) {
+        std::vector<int> visits(100, 0);
+        parallel_for(
+            100, 3,
+            [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) ++visits[i];
+            },
+            piece);
+        EXPECT_TRUE(std::all_of(visits.begin(), visits.end(), [](int n) { return n == 1; })) << piece;
+    }
+}
+
+TEST(EndThreads, is_followed_by_others) {
+    for (int round = 0; round < 20; ++round) {
+        end_threads();
+        EXPECT_TRUE(meets_a_helper());
+        EXPECT_TRUE(covers_once(50000, 5));
+    }
+    end_threads();
+    end_threads();
+}
+
+TEST(EndThreads, waits_for_those_who_use_them) {
+    std::atomic<bool> done{false};
+    std::atomic<int> failures{0};
+    std::vector<std::thread> callers;
+    for (int caller = 0; caller < 3; ++caller) {
+        callers.emplace_back([&] {
+            while (!done) {
+                if (!covers_once(20000, 3)) ++failures;
+            }
+        });
+    }
+    for (int round = 0; round < 50; ++round) end_threads();
+    done = true;
     for (std::thread& caller : callers) caller.join();
     EXPECT_EQ(failures, 0);
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import os
+import subprocess
 import sys
 import threading
 
@@ -473,3 +474,203 @@ def test_deforms_in_a_forked_child():
             os._exit(code)
     _, status = os.waitpid(child, 0)
     assert os.waitstatus_to_exitcode(status) == 0
+
+
+NOT_A_NAME = [(3, "int"), (None, "NoneType"), (b"dq", "bytes"), (["dq"], "list"), ("\ud800", "'\\ud800'")]
+
+
+@pytest.mark.parametrize(("method", "got"), NOT_A_NAME)
+def test_a_method_that_is_no_name_is_refused_in_one_sentence(method, got):
+    rig = random_rig(50, vertices=3)
+    layout = np.zeros((2, 8), np.float32)
+    layout[:, 0] = 1
+    skeleton = sinew.Skeleton(np.int32([-1, 0]))
+    calls = [
+        lambda: sinew.Deformer(*rig.mesh, method=method),
+        lambda: sinew.interpolate.between(layout, layout, 0.5, method),
+        lambda: sinew.interpolate.blend(layout, np.ones(2, np.float32), method),
+        lambda: sinew.spline.catmull_rom(layout, np.float32([0, 1]), 0.5, method),
+        lambda: skeleton.interpolate(layout, layout, 0.5, method),
+        lambda: skeleton.spline(layout[None], np.float32([0]), 0.5, method),
+    ]
+    for call in calls:
+        wrong = ValueError if isinstance(method, str) else TypeError
+        with pytest.raises(wrong, match=r"^method: expected one of [\w, ]+, got ") as error:
+            call()
+        assert str(error.value).endswith(f"got {got}")
+
+
+def unaligned(array):
+    """The same numbers one byte off."""
+    memory = np.zeros(array.nbytes + 1, np.uint8)
+    result = memory[1:].view(array.dtype).reshape(array.shape)
+    result[...] = array
+    assert not result.flags.aligned
+    return result
+
+
+@every_method
+def test_unaligned_input_is_copied(method):
+    rig = random_rig(51, scaled=True)
+    deformer = sinew.Deformer(*(unaligned(array) for array in rig.mesh), method, unaligned(rig.rest_bones))
+    np.testing.assert_array_equal(deformer.deform(unaligned(rig.transforms)), rig.deform(method))
+    deformer.set_rest_points(unaligned(rig.rest_points))
+    inverses = np.tile(np.eye(4), (len(rig.transforms), 1, 1))
+    points = deformer.deform(unaligned(rig.transforms), rest_inverses=unaligned(inverses))
+    np.testing.assert_array_equal(points, rig.deform(method))
+    turned = unaligned(rig.transforms.astype(np.float64))
+    np.testing.assert_array_equal(sinew.affine.to_quat_vec(turned), sinew.affine.to_quat_vec(turned.copy()))
+
+
+def test_unaligned_out_is_refused():
+    rig = random_rig(52, vertices=3)
+    with pytest.raises(ValueError, match=r"^out: expected writable .*, got one that is not aligned$"):
+        rig.deform("dq", out=unaligned(rig.rest_points))
+
+
+def test_rest_bones_that_are_not_finite_are_refused():
+    rig = random_rig(53)
+    rest_bones = rig.rest_bones.copy()
+    rest_bones[2, 1, 1] = np.nan
+    with pytest.raises(ValueError, match=r"^rest_bones: expected finite values, got .* at index 2$"):
+        sinew.Deformer(*rig.mesh, "dq", rest_bones)
+
+
+@pytest.mark.parametrize("bone", [1 << 20, 100_000_000, 2**31 - 1])
+def test_bones_beyond_the_limit_are_refused(bone):
+    point, offsets, weights = np.zeros((1, 3), np.float32), np.int32([0, 1]), np.float32([1])
+    with pytest.raises(ValueError, match=f"below 1048576, got {bone} at influence 0$"):
+        sinew.Deformer(point, offsets, np.int32([bone]), weights)
+
+
+# Repeated without memory of their own: refused before any is taken.
+@pytest.mark.parametrize("length", [2**31, 2**40, 2**58])
+def test_more_than_can_be_numbered_is_refused(length):
+    rig = random_rig(54, vertices=3)
+    points, offsets, bones, weights = rig.mesh
+    many = np.broadcast_to(points[:1], (length, 3))
+    for call in (
+        lambda: sinew.Deformer(many, *rig.mesh[1:]),
+        lambda: rig.deformer("dq").set_rest_points(many),
+    ):
+        with pytest.raises(ValueError, match=r"^rest_points: expected .*, at most 2147483647, got "):
+            call()
+    for argument, arrays in (
+        ("influence_bones", (points, offsets, np.broadcast_to(bones[:1], (length,)), weights)),
+        ("influence_weights", (points, offsets, bones, np.broadcast_to(weights[:1], (length,)))),
+        ("influence_offsets", (points, np.broadcast_to(offsets[:1], (length + 1,)), bones, weights)),
+    ):
+        with pytest.raises(ValueError, match=f"^{argument}: expected .*, at most "):
+            sinew.Deformer(*arrays)
+
+
+def test_what_is_too_large_to_copy_is_a_memory_error():
+    rig = random_rig(55, vertices=3)
+    many = np.broadcast_to(rig.transforms[:1], (2**50, 4, 4))
+    with pytest.raises(MemoryError):
+        rig.deformer("dq").deform(many)
+    with pytest.raises(MemoryError):
+        sinew.affine.inverse(many)
+
+
+@every_method
+def test_set_rest_points_beside_deform_tears_nothing(method):
+    count = 60_000
+    bones = (np.arange(count) % 3).astype(np.int32)
+    old, new = np.full((count, 3), 0.25, np.float32), np.full((count, 3), -0.5, np.float32)
+    deformer = sinew.Deformer(
+        old, np.arange(count + 1, dtype=np.int32), bones, np.ones(count, np.float32), method
+    )
+    transforms = np.array([random_motion(np.random.default_rng(i)) for i in range(3)], np.float32)
+    expected = []
+    for rest in (new, old):
+        deformer.set_rest_points(rest)
+        expected.append(deformer.deform(transforms))
+    done, torn = threading.Event(), []
+
+    def deform():
+        out = np.empty((count, 3), np.float32)
+        while not done.is_set():
+            deformer.deform(transforms, out=out, threads=2)
+            if not any(np.array_equal(out, points) for points in expected):
+                torn.append(True)
+
+    threads = [threading.Thread(target=deform) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for turn in range(200):
+        deformer.set_rest_points((new, old)[turn % 2])
+    done.set()
+    for thread in threads:
+        thread.join()
+    assert torn == []
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_forked_while_others_deform_goes_on(tmp_path):
+    """Of the threads that deform here it has none, and must not wait for them."""
+    program = tmp_path / "fork.py"
+    program.write_text(FORKING)
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout.strip()) == (0, "children: 20"), done.stderr
+
+
+FORKING = """
+import os, signal, threading
+import numpy as np, sinew
+count = 200_000
+rest = np.ones((count, 3), np.float32)
+offsets = np.arange(count + 1, dtype=np.int32)
+deformer = sinew.Deformer(rest, offsets, np.zeros(count, np.int32), np.ones(count, np.float32), "dq")
+bones = np.eye(4, dtype=np.float32)[None]
+done = threading.Event()
+def deform():
+    while not done.is_set():
+        deformer.deform(bones)
+threads = [threading.Thread(target=deform) for _ in range(3)]
+for thread in threads: thread.start()
+ended = 0
+for _ in range(20):
+    child = os.fork()
+    if child == 0:
+        signal.alarm(30)
+        deformer.set_rest_points(2 * rest)
+        os._exit(0 if (deformer.deform(bones) == 2).all() else 1)
+    ended += os.waitpid(child, 0)[1] == 0
+done.set()
+for thread in threads: thread.join()
+print("children:", ended)
+"""
+
+
+# What waits for Python's lock when Python ends is unwound before 3.14, and must not take the process along.
+ENDING = """
+import threading, time
+import numpy as np, sinew
+count = 200_000
+rest = np.zeros((count, 3), np.float32)
+offsets = np.arange(count + 1, dtype=np.int32)
+deformer = sinew.Deformer(rest, offsets, np.zeros(count, np.int32), np.ones(count, np.float32), "lbs")
+bones = np.eye(4, dtype=np.float32)[None]
+many = np.tile(np.eye(4), (200_000, 1, 1))
+def deform():
+    while True: deformer.deform(bones, threads=2)
+def set_rest_points():
+    while True: deformer.set_rest_points(rest)
+def invert():
+    while True: sinew.affine.inverse(many)
+def blend():
+    while True: sinew.interpolate.between(many[:20_000], many[:20_000], 0.5, "matrix_polar")
+for work in (deform, deform, set_rest_points, invert, blend):
+    threading.Thread(target=work, daemon=True).start()
+time.sleep(0.2)
+print("the end")
+"""
+
+
+def test_python_ends_while_daemon_threads_are_at_work(tmp_path):
+    program = tmp_path / "ending.py"
+    program.write_text(ENDING)
+    for _ in range(10):
+        done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=60)
+        assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "the end", "")

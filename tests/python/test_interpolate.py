@@ -276,3 +276,33 @@ def test_nothing_is_ever_nan(a, b):
 def test_methods_and_layouts_are_those_of_the_table():
     assert set(METHODS) == set(LAYOUT_OF)
     assert set(LAYOUT_OF.values()) == set(LAYOUTS)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_largest_translations_are_finite_and_never_falsely_defined(method, dtype):
+    name = LAYOUT_OF[method]
+    large = 0.88 * float(np.finfo(dtype).max)  # 3e38 in float32
+    a = layout(RigidTransform.identity(), name, dtype)
+    b = layout(RigidTransform.from_rotation(Rotation.from_rotvec([0.3, 1.1, -0.4])), name, dtype)
+    where = {"affine": (slice(0, 3), 3), "quat_vec": slice(4, 7), "dual_quat": None}[name]
+    for end, sign in ((a, 1.0), (b, -1.0)):
+        if where is None:
+            # real * (0, t) / 2 with t along x, which may be as large as any.
+            w, x, y, z = end[:4]
+            end[4:] = sign * (large / 2) * np.array([-x, w, z, -y], dtype)
+        else:
+            end[where] = [sign * large, sign * large, -sign * large]
+    for t in (-1.0, 0.0, 0.3, 0.5, 1.0, 2.0):
+        for result in (
+            between(a, b, t, method),
+            blend(np.stack([a, b, a]), np.array([1 - t, t, 0.1], dtype), method),
+        ):
+            assert np.isfinite(result.transforms).all(), (method, t)
+    spline = sinew.spline.catmull_rom(np.stack([a, b, a]), np.array([0, 1, 2], dtype), 0.5, method)
+    assert np.isfinite(spline.transforms).all()
+    vector = sinew.spline.catmull_rom_vector(np.stack([a, b, a]), np.array([0, 1, 2], dtype), 0.5)
+    assert np.isfinite(vector.transforms).all()
+    ends = np.array([-large, large], dtype)
+    between_times = sinew.spline.catmull_rom_vector(np.stack([a, b]), ends, 0.0)
+    assert np.isfinite(between_times.transforms).all()

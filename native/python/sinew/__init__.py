@@ -6,7 +6,7 @@ sinew.interpolate, sinew.spline.
 """
 
 from . import affine, dual_quat, interpolate, quat_vec, spline
-from ._native import Deformer, Method, Skeleton, __version__, methods
+from ._native import Deformer, Method, Skeleton, __version__, keep_thread_state, methods
 
 __all__ = [
     "Deformer",
@@ -16,6 +16,7 @@ __all__ = [
     "affine",
     "dual_quat",
     "interpolate",
+    "keep_thread_state",
     "methods",
     "quat_vec",
     "spline",

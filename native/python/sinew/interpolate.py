@@ -19,7 +19,7 @@ Each result says whether it is defined. Not defined, and then:
   half a turn from the identity (matrix_log): one of the two directions of the axis;
   a sum that cancels: the heaviest transform (qv_nlerp, qv_slerp, matrix_polar: its rotation, and the mean of
     the translations);
-  weights whose sum is not above 0: the heaviest transform;
+  weights whose sum is not above 0, or a result beyond the element type: the heaviest transform;
   an iteration that does not settle (qv_slerp, dib): where it has come to.
 No result is NaN.
 """

@@ -3,15 +3,22 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
-#include "sinew/deform/packed_mesh.h"
 #include "sinew/export.h"
 #include "sinew/skinning/methods.h"
 #include "sinew/transform/affine.h"
 
 namespace sinew {
+
+/// What a Deformer takes at most; more is refused.
+inline constexpr std::size_t kMaxVertices = 0x7FFFFFFF;    // 2^31 - 1
+inline constexpr std::size_t kMaxInfluences = 0x7FFFFFFF;  // of all vertices
+inline constexpr std::size_t kMaxVertexInfluences = std::size_t{1} << 16;
+inline constexpr std::size_t kMaxBones = std::size_t{1}
+                                         << 20;  // an influence names one of 0 to kMaxBones - 1
 
 /// What a Deformer is made of. Nothing is kept by reference.
 struct BindData {
@@ -34,28 +41,35 @@ struct DeformOptions {
     std::size_t threads = 0;
 };
 
-/// A mesh bound to bones, ready to be deformed at any pose. Once constructed it is valid, and deforming
-/// can not fail. Any number of threads may deform with one Deformer at once.
+/// A mesh bound to bones, ready to be deformed at any pose. Once constructed it is valid, and deforming can not
+/// fail and allocates nothing. Any number of threads may use one Deformer at once; of more than 16 that deform,
+/// some wait for others. One that was moved from can only be assigned to or destroyed.
 class SINEW_EXPORT Deformer {
 public:
     /// Throws std::invalid_argument that names the field, what was wanted and what came: sizes that do not
-    /// fit, offsets that do not rise from 0 to the number of influences, a negative bone, a weight that is
-    /// negative, a value that is not finite.
+    /// fit or are beyond the limits above, offsets that do not rise from 0 to the number of influences, a
+    /// negative bone, a weight that is negative, a value that is not finite.
     Deformer(MethodId method, const BindData& data);
+    Deformer(Deformer&&) noexcept;
+    Deformer& operator=(Deformer&&) noexcept;
+    ~Deformer();
 
-    [[nodiscard]] MethodId method() const noexcept { return method_; }
-    [[nodiscard]] std::size_t vertex_count() const noexcept { return vertex_count_; }
-    [[nodiscard]] std::size_t influence_count() const noexcept { return influence_count_; }
+    [[nodiscard]] MethodId method() const noexcept;
+    [[nodiscard]] std::size_t vertex_count() const noexcept;
+    /// Influences of positive weight.
+    [[nodiscard]] std::size_t influence_count() const noexcept;
     /// One more than the highest bone that an influence names.
-    [[nodiscard]] std::size_t bone_count() const noexcept { return bone_count_; }
+    [[nodiscard]] std::size_t bone_count() const noexcept;
 
     /// New rest points [vertices], as when shape keys change. Throws std::invalid_argument for another
-    /// number of points or a value that is not finite. Not to be called while another thread deforms.
+    /// number of points or a value that is not finite. Waits for threads that deform, and they for it: each
+    /// of their results has the old points or the new ones.
     void set_rest_points(std::span<const Vec3<float>> rest_points);
 
-    /// Writes the deformed points [vertices], model space.
+    /// Writes the deformed points, model space.
     ///
-    /// posed_from_rest  [bones, at least bone_count()] finite
+    /// posed_from_rest  [bones, at least bone_count()] finite; bones that it lacks stay at rest
+    /// points           [vertices]; of another size nothing is written
     ///
     /// A vertex without influences, or with all weights zero, stays at rest. The result does not depend
     /// on the number of threads.
@@ -63,13 +77,8 @@ public:
                 std::span<Vec3<float>> points) const noexcept;
 
 private:
-    MethodId method_;
-    PackedMesh mesh_;
-    std::vector<Affine<float>> rest_bones_;
-    std::vector<std::int32_t> stretched_bones_;  // used, and with axes that are not of unit length
-    std::size_t vertex_count_ = 0;
-    std::size_t influence_count_ = 0;
-    std::size_t bone_count_ = 0;
+    struct Bound;
+    std::unique_ptr<Bound> bound_;
 };
 
 }  // namespace sinew

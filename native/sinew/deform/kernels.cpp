@@ -33,12 +33,12 @@ void deform(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void prepare_bones(MethodId method, std::span<const std::int32_t> used,
-                   std::span<const Affine<float>> posed_from_rest, Palette& palette) {
-    if (method == MethodId::dq) {
-        prepare_rigid<DqKernel>(used, posed_from_rest, palette);
-    } else {
-        prepare_rigid<QvKernel>(used, posed_from_rest, palette);
+void prepare_of_target(MethodId method, std::span<const std::int32_t> used,
+                       std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    switch (method) {
+        case MethodId::lbs: return prepare_columns(used, posed_from_rest, palette);
+        case MethodId::qv: return prepare_rigid<QvKernel>(used, posed_from_rest, palette);
+        case MethodId::dq: return prepare_rigid<DqKernel>(used, posed_from_rest, palette);
     }
 }
 
@@ -54,7 +54,7 @@ namespace {
 struct Target {
     std::int64_t bit;
     decltype(&HWY_STATIC_DISPATCH(deform)) deform;
-    decltype(&HWY_STATIC_DISPATCH(prepare_bones)) prepare;
+    decltype(&HWY_STATIC_DISPATCH(prepare_of_target)) prepare;
 
     [[nodiscard]] std::string_view name() const { return hwy::TargetName(bit); }
 };
@@ -62,13 +62,13 @@ struct Target {
 // Highway's own choice (HWY_DYNAMIC_DISPATCH) needs libhwy, which Debian ships as a shared library only: a
 // wheel would then need it on the user's machine. Its headers do without; so the choice is made here.
 #define SINEW_TARGET(name) \
-    { HWY_##name, HWY_CHOOSE_##name(deform), HWY_CHOOSE_##name(prepare_bones) }
+    { HWY_##name, HWY_CHOOSE_##name(deform), HWY_CHOOSE_##name(prepare_of_target) }
 constexpr Target kTargets[] = {
     SINEW_TARGET(AVX3),
     SINEW_TARGET(AVX2),
     SINEW_TARGET(SSE4),
     SINEW_TARGET(SSSE3),
-    {HWY_STATIC_TARGET, &HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare_bones)},
+    {HWY_STATIC_TARGET, &HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare_of_target)},
 };
 
 bool runs_here(std::int64_t bit) {
@@ -118,8 +118,8 @@ void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) noexc
     chosen().load(std::memory_order_relaxed)->deform(frame, begin, end);
 }
 
-void prepare_rigid(MethodId method, std::span<const std::int32_t> used,
-                   std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+void prepare_bones(MethodId method, std::span<const std::int32_t> used,
+                   std::span<const Affine<float>> posed_from_rest, Palette& palette) noexcept {
     chosen().load(std::memory_order_relaxed)->prepare(method, used, posed_from_rest, palette);
 }
 

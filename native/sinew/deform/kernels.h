@@ -21,10 +21,10 @@ struct Frame {
     Vec3<float>* points;
 };
 
-/// Writes the rows of the bones `used` to `palette.bones` as if each were rigid, in the method `qv` or `dq`,
-/// and adds those to `palette.scaled` that are not.
-void prepare_rigid(MethodId method, std::span<const std::int32_t> used,
-                   std::span<const Affine<float>> posed_from_rest, Palette& palette);
+/// Writes the rows of the bones `used` to `palette.bones`, and their sizes. Under the rigid methods as if each were
+/// rigid; the indices of those that are not are added to `palette.scaled`.
+void prepare_bones(MethodId method, std::span<const std::int32_t> used,
+                   std::span<const Affine<float>> posed_from_rest, Palette& palette) noexcept;
 
 /// Deforms the blocks [begin, end) on the instruction set in use. What a method means is in skinning/;
 /// the kernels agree with it.

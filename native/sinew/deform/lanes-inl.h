@@ -7,6 +7,8 @@
 #define SINEW_DEFORM_LANES_INL_H_
 #endif
 
+#include <algorithm>
+
 #include "hwy/highway.h"
 #include "sinew/deform/kernels.h"
 
@@ -35,6 +37,11 @@ struct Places {
 HWY_INLINE Places places_of(const Frame& frame) {
     const PackedMesh& mesh = *frame.mesh;
     return {mesh.blocks.data(), mesh.rows.data(), mesh.vertices.data(), mesh.runs.data(), frame.points};
+}
+
+/// The weights of the first influence of block `b`, which is not mixed.
+HWY_INLINE const float* first_weights_of(const Frame& frame, std::size_t b) {
+    return frame.mesh->first_weights[b].lane.data();
 }
 
 /// One coordinate of several vertices in each vector.
@@ -191,6 +198,16 @@ HWY_INLINE void store_points(D d, const Places& to, std::size_t b, std::size_t l
 template <class D>
 HWY_INLINE std::size_t lanes_end(D d, const Block& block) {
     return hn::MaxLanes(D()) == kLanes ? hn::Lanes(d) : block.vertices;
+}
+
+/// Whether bones are added plainly of which the first and the smallest have these of Palette::sizes.
+HWY_INLINE bool is_plain(float first, float least) { return !(first < kAlike * kAlike * least); }
+
+HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std::size_t count) {
+    const float first = palette.sizes[bones[0]];
+    float least = first;
+    for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette.sizes[bones[k]]);
+    return is_plain(first, least);
 }
 
 /// Blocks [begin, end), which have no bones.

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Linear blend on blocks: compiled once for each instruction set, see kernels.cpp.
 //
-// A vertex is moved as by its first bone, then by what each other bone differs from the first, by weight: a
-// weight's part in the sum is then never asked of the first.
+// A vertex's bones are added up as Palette says.
 #if defined(SINEW_DEFORM_LBS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_LBS_INL_H_
 #undef SINEW_DEFORM_LBS_INL_H_
@@ -85,18 +84,23 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
 /// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
 ///
 /// first     columns of the first bone
-/// other_of  what the bone of an influence differs from it
+/// other_of  what the bone of an influence differs from it; if plain, that bone
 /// kCount    the number of influences, or 0 for `count`
-template <std::size_t kCount, std::size_t kVectors, class D, class OtherOf>
-HWY_INLINE void deform_lanes(D d, const Places& places, std::size_t b, std::size_t lane, std::size_t count,
-                             const float* first, const OtherOf& other_of) {
+template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class OtherOf>
+HWY_INLINE void deform_lanes(D d, const Frame& frame, const Places& places, std::size_t b, std::size_t lane,
+                             std::size_t count, const float* first, const OtherOf& other_of) {
     const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
     const std::size_t step = hn::Lanes(d);
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
     Vec<D> weight[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v) sum[v] = p[v] = load_points(d, rows, lane + v * step);
-    add_bone<kVectors, false>(d, Columns{first}, weight, p, sum);
+    if constexpr (kPlain) {
+        for (std::size_t v = 0; v < kVectors; ++v) {
+            weight[v] = hn::Load(d, first_weights_of(frame, b) + lane + v * step);
+        }
+    }
+    add_bone<kVectors, kPlain>(d, Columns{first}, weight, p, sum);
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
         const float* const weights = rows[2 + k].lane.data() + lane;
         for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
@@ -109,7 +113,7 @@ HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
     return frame.palette->bones[kLbsQuads * static_cast<std::size_t>(bone)].value.data();
 }
 
-template <std::size_t kCount, class OtherOf>
+template <std::size_t kCount, bool kPlain, class OtherOf>
 HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
                             const OtherOf& other_of) {
     const Full d;
@@ -120,7 +124,7 @@ HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t e
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, places.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
-            deform_lanes<kCount, kVectors>(d, places, b, lane, count, first, other_of);
+            deform_lanes<kCount, kVectors, kPlain>(d, frame, places, b, lane, count, first, other_of);
         }
     }
 }
@@ -132,7 +136,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const float* const first = columns_of_bone(frame, bones[0]);
     // What is stored can not be read at once: for one block alone that takes longer than it saves.
     if (kCount == 0 || end - begin == 1) {
-        return deform_each<kCount>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+        return deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
             return Differences{columns_of_bone(frame, bones[k]), first};
         });
     }
@@ -145,47 +149,82 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
                       columns + kColumns * k + i);
         }
     }
-    deform_each<kCount>(frame, begin, end, first,
-                        [&](std::size_t k) HWY_ATTR { return Columns{loaded_anew(columns + kColumns * k)}; });
+    deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+        return Columns{loaded_anew(columns + kColumns * k)};
+    });
+}
+
+/// The same where they are added plainly.
+inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
+    deform_each<0, true>(frame, begin, end, columns_of_bone(frame, bones[0]),
+                         [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k])}; });
 }
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// A mixed block vertex by vertex, x, y and z in the lanes: the same operations in the same order.
+using Four = hn::CappedTag<float, 4>;
+
+/// One vertex, x, y and z in the lanes: the same operations in the same order. Whether that is the right way to add
+/// these bones.
+///
+/// rows  of the block, from this vertex's lane on
+/// to    the vertex's point
+template <bool kPlain>
+HWY_INLINE bool deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
+                              const float* rows, Vec3<float>* to) {
+    const Four four;
+    using V4 = Vec<Four>;
+    const V4 x = hn::Set(four, rows[0]);
+    const V4 y = hn::Set(four, rows[kLanes]);
+    const V4 z = hn::Set(four, rows[2 * kLanes]);
+    const float* const weights = rows + 3 * kLanes;
+    const auto size_of = [&](std::size_t k) {
+        return frame.palette->sizes[static_cast<std::size_t>(bones[k])];
+    };
+    const auto moved_by = [&](const V4* columns) HWY_ATTR {
+        return hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
+    };
+    // Not by way of memory: a vector load of what was just stored in parts waits for it.
+    V4 sum = hn::IfThenElse(hn::FirstN(four, 1), x, hn::IfThenElse(hn::FirstN(four, 2), y, z));
+    V4 first[kLbsQuads];
+    const float* const stored_first = columns_of_bone(frame, bones[0]);
+    for (std::size_t c = 0; c < kLbsQuads; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
+    const V4 by_first = moved_by(first);
+    sum = kPlain ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
+    float least = size_of(0);
+    for (std::size_t k = 1; k < count; ++k) {
+        const float* const stored = columns_of_bone(frame, bones[k]);
+        least = std::min(least, size_of(k));
+        V4 columns[kLbsQuads];
+        for (std::size_t c = 0; c < kLbsQuads; ++c) {
+            columns[c] = hn::Load(four, stored + 4 * c);
+            if (!kPlain) columns[c] = hn::Sub(columns[c], first[c]);
+        }
+        sum = hn::MulAdd(hn::Set(four, weights[kLanes * k]), moved_by(columns), sum);
+    }
+    alignas(16) float point[4];
+    hn::Store(sum, four, point);
+    std::memcpy(to, point, sizeof(Vec3<float>));
+    return kPlain == is_plain(size_of(0), least);
+}
+
+/// Apart, so that its registers are not those of every vertex.
+inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
+                                             const float* rows, Vec3<float>* to) {
+    deform_vertex<true>(frame, bones, count, rows, to);
+}
+
 inline void deform_mixed(const Frame& frame, std::size_t b) {
-    const hn::CappedTag<float, 4> four;
-    using V4 = Vec<hn::CappedTag<float, 4>>;
     const Block& block = frame.mesh->blocks[b];
     const Lanes<float>* const rows = &frame.mesh->rows[block.first_row];
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
-    const auto first = hn::FirstN(four, 1);
-    const auto first_two = hn::FirstN(four, 2);
-    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const V4 x = hn::Set(four, rows[0].lane[lane]);
-        const V4 y = hn::Set(four, rows[1].lane[lane]);
-        const V4 z = hn::Set(four, rows[2].lane[lane]);
-        // Not by way of memory: a vector load of what was just stored in parts waits for it.
-        V4 sum = hn::IfThenElse(first, x, hn::IfThenElse(first_two, y, z));
-        V4 first_columns[kLbsQuads];
-        for (std::size_t k = 0; k < block.influences; ++k, ++bones) {
-            const float* const stored = columns_of_bone(frame, *bones);
-            V4 columns[kLbsQuads];
-            for (std::size_t c = 0; c < kLbsQuads; ++c) {
-                columns[c] = hn::Load(four, stored + 4 * c);
-                if (k == 0)
-                    first_columns[c] = columns[c];
-                else
-                    columns[c] = hn::Sub(columns[c], first_columns[c]);
-            }
-            const V4 moved =
-                hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
-            sum =
-                k == 0 ? hn::Add(moved, sum) : hn::MulAdd(hn::Set(four, rows[3 + k].lane[lane]), moved, sum);
+    for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
+        const float* const of_vertex = rows->lane.data() + lane;
+        Vec3<float>* const to = &frame.points[frame.mesh->vertices[b].lane[lane]];
+        if (!deform_vertex<false>(frame, bones, block.influences, of_vertex, to)) {
+            deform_plain_vertex(frame, bones, block.influences, of_vertex, to);
         }
-        alignas(16) float point[4];
-        hn::Store(sum, four, point);
-        const auto vertex = static_cast<std::size_t>(frame.mesh->vertices[b].lane[lane]);
-        std::memcpy(&frame.points[vertex], point, sizeof(Vec3<float>));
     }
 }
 
@@ -198,13 +237,18 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
     const Lanes<float>* const rows = places.rows + block.first_row;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
+        const bool plain = is_plain(*frame.palette, bones, block.influences);
         const Points<One> p = load_points(d, rows, lane);
         Points<One> sum = p;
-        const float* const first = columns_of_bone(frame, bones[0]);
-        add_bone<1, false>(d, Columns{first}, static_cast<const Vec<One>*>(nullptr), &p, &sum);
+        const Columns first{columns_of_bone(frame, bones[0])};
+        const Vec<One> weight_of_first = hn::Load(d, rows[3].lane.data() + lane);
+        plain ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
+              : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
         for (std::size_t k = 1; k < block.influences; ++k) {
+            const float* const columns = columns_of_bone(frame, bones[k]);
             const Vec<One> weight = hn::Load(d, rows[3 + k].lane.data() + lane);
-            add_bone<1, true>(d, Differences{columns_of_bone(frame, bones[k]), first}, &weight, &p, &sum);
+            plain ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
+                  : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
         }
         store_points(d, places, b, lane, sum);
     }
@@ -220,6 +264,12 @@ inline void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
             continue;
         }
         const std::size_t after = end_of_set(frame, b, end);
+        if (block.influences > 0 &&
+            is_plain(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
+            deform_plain_set(frame, b, after);
+            b = after;
+            continue;
+        }
         // A fixed count makes one run of instructions.
         switch (block.influences) {
             case 0: keep_blocks(frame, b, after); break;

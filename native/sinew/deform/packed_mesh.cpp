@@ -113,7 +113,7 @@ public:
             add_mixed(std::span(scattered).subspan(i, std::min(kLanes, scattered.size() - i)));
         }
         fill(rest_points);
-        find_used_bones();
+        number_used_bones();
         mesh_.blocks.shrink_to_fit();
         mesh_.vertices.shrink_to_fit();
         mesh_.runs.shrink_to_fit();
@@ -202,32 +202,38 @@ private:
 
     void fill(std::span<const Vec3<float>> rest_points) {
         mesh_.rows.resize(row_count_);
+        mesh_.first_weights.resize(mesh_.blocks.size());
         repack_points(mesh_, rest_points);
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             const Block& block = mesh_.blocks[b];
             Lanes<float>* const weights = &mesh_.rows[block.first_row] + 3;
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 const auto vertex = static_cast<std::uint32_t>(mesh_.vertices[b].lane[lane]);
-                // In the kernels' order: a vertex gets the same first weight in either kind of block.
-                float left = 1.0f;
-                Lanes<float>* row = weights + (block.mixed ? 1 : 0);
-                for (std::size_t k = 1; k < count(vertex); ++k, ++row) {
-                    row->lane[lane] = influences_[offsets_[vertex] + k].weight;
-                    left -= row->lane[lane];
-                }
-                if (block.mixed && count(vertex) > 0) weights->lane[lane] = left;
+                const std::size_t first = offsets_[vertex];
+                const std::size_t end = offsets_[vertex + 1];
+                if (first == end) continue;
+                Lanes<float>* row = weights;
+                (block.mixed ? *row++ : mesh_.first_weights[b]).lane[lane] = influences_[first].weight;
+                for (std::size_t i = first + 1; i < end; ++i) (row++)->lane[lane] = influences_[i].weight;
             }
         }
     }
 
-    void find_used_bones() {
-        std::int32_t end = 0;
-        for (const std::int32_t bone : mesh_.bones) end = std::max(end, bone + 1);
-        std::vector<bool> used(static_cast<std::size_t>(end));
-        for (const std::int32_t bone : mesh_.bones) used[static_cast<std::size_t>(bone)] = true;
-        for (std::int32_t bone = 0; bone < end; ++bone) {
-            if (used[static_cast<std::size_t>(bone)]) mesh_.used_bones.push_back(bone);
+    /// Finds the bones that are used, and numbers those of the mesh by their places among them: what a frame
+    /// needs for its bones does not grow with the highest number.
+    void number_used_bones() {
+        if (mesh_.bones.empty()) return;
+        const std::int32_t highest = *std::ranges::max_element(mesh_.bones);
+        std::vector<std::int32_t> place_of(static_cast<std::size_t>(highest) + 1);
+        for (const std::int32_t bone : mesh_.bones) place_of[static_cast<std::size_t>(bone)] = 1;
+        std::int32_t count = 0;
+        for (std::int32_t bone = 0; bone <= highest; ++bone) {
+            std::int32_t& place = place_of[static_cast<std::size_t>(bone)];
+            if (place == 0) continue;
+            place = count++;
+            mesh_.used_bones.push_back(bone);
         }
+        for (std::int32_t& bone : mesh_.bones) bone = place_of[static_cast<std::size_t>(bone)];
     }
 
     std::span<const std::uint32_t> offsets_;

@@ -23,8 +23,7 @@ struct alignas(kLanes * sizeof(T)) Lanes {
 
 /// Up to kLanes vertices that are deformed together. Lanes beyond `vertices` repeat the last vertex.
 struct Block {
-    // Of PackedMesh::rows: x, y, z, then the weights of each influence; without the first, which is what the
-    // others leave of 1, unless mixed.
+    // Of PackedMesh::rows: x, y, z, then the weights of each influence; of the second on unless mixed.
     std::uint32_t first_row;
     std::uint32_t first_bone;  // of PackedMesh::bones: [influences], or if mixed [kLanes][influences]
     std::uint32_t influences;
@@ -46,16 +45,16 @@ struct Run {
 struct PackedMesh {
     std::vector<Block> blocks;
     std::vector<Lanes<float>> rows;
+    std::vector<Lanes<float>> first_weights;  // [blocks] apart, as they are seldom read; if mixed not at all
     std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the place of each lane in the mesh
     std::vector<Run> runs;
-    std::vector<std::int32_t> bones;
-    std::vector<std::int32_t> used_bones;  // rising, each once
+    std::vector<std::int32_t> bones;       // indices into used_bones
+    std::vector<std::int32_t> used_bones;  // rising, each once: bones as the caller numbers them
 };
 
 /// rest_points  [vertices]
 /// offsets      [vertices + 1] into `influences`
-/// influences   of each vertex, or none; of positive weights, of which the first is taken as what the others
-///              leave of 1
+/// influences   of each vertex, or none; of positive weights, of sum 1
 [[nodiscard]] PackedMesh pack(std::span<const Vec3<float>> rest_points,
                               std::span<const std::uint32_t> offsets,
                               std::span<const Influence<float>> influences);

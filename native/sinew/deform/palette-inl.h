@@ -8,6 +8,7 @@
 #endif
 
 #include <algorithm>
+#include <limits>
 
 #include "sinew/deform/rigid_methods-inl.h"
 #include "sinew/transform/split_scale.h"
@@ -20,6 +21,8 @@ namespace HWY_NAMESPACE {
 using Bones = hn::CappedTag<double, 8>;
 using BoneVec = Vec<Bones>;
 using BonePoints = Points<Bones>;
+
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// Affine transforms by their columns.
 struct Motions {
@@ -133,14 +136,66 @@ void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<fl
         alignas(64) double numbers[kRow][kMost];
         alignas(64) double rigid[kMost];
         for (std::size_t k = 0; k < kRow; ++k) hn::Store(row[k], d, numbers[k]);
+        const BoneVec sizes = hn::Max(dot(motions.shift, motions.shift), hn::Set(d, kLeastSize * kLeastSize));
+        const hn::Rebind<float, Bones> floats;
+        hn::StoreU(hn::DemoteTo(floats, sizes), floats, palette.sizes + i);
         hn::Store(hn::IfThenElseZero(is_rotation(motions), hn::Set(d, 1.0)), d, rigid);
         for (std::size_t lane = 0; lane < bones.size(); ++lane) {
-            if (rigid[lane] == 0.0) palette.scaled.push_back(bones[lane]);
-            float* const to = palette.bones[2 * static_cast<std::size_t>(bones[lane])].value.data();
+            if (rigid[lane] == 0.0) {
+                palette.scaled[palette.scaled_count++] = static_cast<std::int32_t>(i + lane);
+            }
+            float* const to = palette.bones[2 * (i + lane)].value.data();
             for (std::size_t k = 0; k < kRow; ++k) to[k] = static_cast<float>(numbers[k][lane]);
         }
     }
 }
+
+#if HWY_TARGET != HWY_SCALAR
+
+/// The columns of each displacement, for lbs.
+inline void prepare_columns(std::span<const std::int32_t> used,
+                            std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    const hn::CappedTag<float, 4> d;
+    const auto three = hn::FirstN(d, 3);
+    // Of vectors, as the identity's other columns are this one in other lanes.
+    alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        const float* const from = &posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+        float* const to = palette.bones[kLbsQuads * i].value.data();
+        auto squares = hn::Zero(d);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const auto column = hn::IfThenElseZero(three, hn::LoadU(d, from + 3 * c));
+            const auto displacement = hn::Sub(column, hn::Load(d, kIdentity[c]));
+            squares = hn::MulAdd(displacement, displacement, squares);
+            hn::Store(displacement, d, to + 4 * c);
+        }
+        // From one before, as there is none after the last.
+        const auto shift = hn::ShiftRightLanes<1>(d, hn::LoadU(d, from + 8));
+        hn::Store(shift, d, to + 12);
+        const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(shift, shift)));
+        const float length = hn::GetLane(hn::SumOfLanes(d, squares));
+        palette.sizes[i] = length < kLong ? std::max(size, kLeastSize * kLeastSize) : kInfinity;
+    }
+}
+
+#else
+
+inline void prepare_columns(std::span<const std::int32_t> used,
+                            std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        const Affine<float>& motion = posed_from_rest[static_cast<std::size_t>(used[i])];
+        const Mat3<float> m = motion.linear - Mat3<float>(1.0f);
+        Quad* const to = &palette.bones[kLbsQuads * i];
+        for (int c = 0; c < 3; ++c) to[c] = {{m[c].x, m[c].y, m[c].z, 0.0f}};
+        const Vec3<float>& shift = motion.translation;
+        to[3] = {{shift.x, shift.y, shift.z, 0.0f}};
+        const float length = glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]);
+        palette.sizes[i] =
+            length < kLong ? std::max(glm::dot(shift, shift), kLeastSize * kLeastSize) : kInfinity;
+    }
+}
+
+#endif
 
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew

@@ -111,32 +111,38 @@ float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t
 
 #endif
 
-/// Copies the first bone of a set to `rows` and what the others differ from it, each turned to the side on
-/// which it is added. False where that depends on the weights, or where a bone has scale and so depends on
-/// the vertex.
-template <class Kernel>
+/// Copies the first bone of a set to `rows` and what the others differ from it, or if plain the others, each turned
+/// to the side on which it is added. False where that depends on the weights, or where a bone has scale and so
+/// depends on the vertex.
+template <class Kernel, bool kPlain>
 HWY_INLINE bool resolve(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
     if (count > kMostResolved) return false;
-    if (!palette.has_scale.empty()) {
+    if (palette.any_scale) {
         for (std::size_t k = 0; k < count; ++k) {
             if (palette.has_scale[static_cast<std::size_t>(bones[k])] != 0) return false;
         }
     }
     // Within 45 degrees of the first, all lie within 90 of each other.
-    if (copy_turned<Kernel, true>(palette, bones, count, rows) > 0.7072f) return true;
-    copy_turned<Kernel, false>(palette, bones, count, rows);
+    if (copy_turned<Kernel, !kPlain>(palette, bones, count, rows) > 0.7072f) return true;
+    if (!kPlain) copy_turned<Kernel, false>(palette, bones, count, rows);
     if (!signs_agree(rows, kRow, count)) return false;
-    subtract_first(rows, count);
+    if (!kPlain) subtract_first(rows, count);
     return true;
 }
 
 /// Lanes [lane, lane + N) of a block whose bones are resolved. A fixed count makes one run of instructions.
 ///
-/// weights  of the second influence and those after it
-template <std::size_t kCount, class D>
-HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const float* weights) {
+/// first_weight  of the first influence, read if plain
+/// weights       of the second and those after it
+template <std::size_t kCount, bool kPlain, class D>
+HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
+                             const float* weights) {
     Sum<D> sum;
     for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Set(d, rows[i]);
+    if constexpr (kPlain) {
+        const Vec<D> first = hn::Load(d, first_weight);
+        for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, sum.value[i]);
+    }
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
         add_row(d, hn::Load(d, weights + kLanes * (k - 1)), rows + kRow * k, 0, kRow, sum);
     }
@@ -144,27 +150,17 @@ HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const fl
 }
 
 /// The same for bones with scale, or with signs that depend on the weights.
-///
-/// kMixed  the first weight is with the others
-template <class Kernel, bool kMixed, class D>
+template <class Kernel, class D>
 HWY_INLINE Sum<D> blend_bones(D d, const Palette& palette, const std::int32_t* bones, std::size_t count,
-                              const float* weights, const Points<D>& rest) {
-    Vec<D> first_weight;
-    if constexpr (kMixed) {
-        first_weight = hn::Load(d, weights);
-        weights += kLanes;
-    } else {
-        first_weight = hn::Set(d, 1.0f);
-        for (std::size_t k = 1; k < count; ++k) {
-            first_weight = hn::Sub(first_weight, hn::Load(d, weights + kLanes * (k - 1)));
-        }
-    }
-    Blend<D> blend = begin_blend(d, row_of(palette, bones[0]), first_weight);
-    Kernel::add_scale(d, palette, bones[0], first_weight, first_weight, rest, blend.sum);
+                              bool plain, const float* first_weight, const float* weights,
+                              const Points<D>& rest) {
+    const Vec<D> first = hn::Load(d, first_weight);
+    const float* const base = plain ? kNoBase : row_of(palette, bones[0]);
+    Blend<D> blend = begin_blend(d, row_of(palette, bones[0]), first, plain);
+    Kernel::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
     for (std::size_t k = 1; k < count; ++k) {
         const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
-        const Vec<D> signed_weight =
-            add_to_blend<Kernel>(d, row_of(palette, bones[0]), row_of(palette, bones[k]), weight, blend);
+        const Vec<D> signed_weight = add_to_blend<Kernel>(d, base, row_of(palette, bones[k]), weight, blend);
         Kernel::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
     }
     return blend.sum;
@@ -200,7 +196,7 @@ HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].la
 /// Blocks [begin, end), which have the same resolved bones.
 ///
 /// kCount  their influences, or 0 for any number
-template <class Kernel, std::size_t kCount>
+template <class Kernel, std::size_t kCount, bool kPlain = false>
 void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
     const Full d;
     const Places places = places_of(frame);
@@ -210,14 +206,16 @@ void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, con
         const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
         const std::size_t lanes = lanes_end(d, places.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            const auto sum = blend_rows<kCount>(d, bone_rows, influences, weights_of(rows) + lane);
+            const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
+            const auto sum =
+                blend_rows<kCount, kPlain>(d, bone_rows, influences, first_weights, weights_of(rows) + lane);
             finish_and_store<Kernel>(d, places, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
         }
     }
 }
 
 template <class Kernel>
-void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end) {
+void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, bool plain) {
     const Full d;
     const Places places = places_of(frame);
     const Spaces spaces = spaces_of(frame);
@@ -228,10 +226,24 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end) {
         const std::size_t lanes = lanes_end(d, places.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             const Points<Full> rest = load_rest(d, rows, spaces, lane);
-            const auto sum = blend_bones<Kernel, false>(d, *frame.palette, bones, influences,
-                                                        weights_of(rows) + lane, rest);
+            const auto sum =
+                blend_bones<Kernel>(d, *frame.palette, bones, influences, plain,
+                                    first_weights_of(frame, b) + lane, weights_of(rows) + lane, rest);
             finish_and_store<Kernel>(d, places, spaces, b, lane, sum, rest);
         }
+    }
+}
+
+/// Blocks [begin, end), which have the same bones, where these are added plainly.
+template <class Kernel>
+HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
+    alignas(64) float rows[kMostResolved * kRow];
+    const Block& block = frame.mesh->blocks[begin];
+    const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
+    if (resolve<Kernel, true>(*frame.palette, bones, block.influences, rows)) {
+        deform_resolved<Kernel, 0, true>(frame, begin, end, rows);
+    } else {
+        deform_unresolved<Kernel>(frame, begin, end, true);
     }
 }
 
@@ -241,8 +253,9 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float rows[kMostResolved * kRow];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
-    if (!resolve<Kernel>(*frame.palette, bones, block.influences, rows)) {
-        return deform_unresolved<Kernel>(frame, begin, end);
+    if (is_plain(*frame.palette, bones, block.influences)) return deform_plain_set<Kernel>(frame, begin, end);
+    if (!resolve<Kernel, false>(*frame.palette, bones, block.influences, rows)) {
+        return deform_unresolved<Kernel>(frame, begin, end, false);
     }
     switch (block.influences) {
         case 1: return deform_resolved<Kernel, 1>(frame, begin, end, rows);
@@ -264,47 +277,81 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const Points<One> rest = load_rest(d, rows, spaces, lane);
-        const auto sum = blend_bones<Kernel, true>(d, *frame.palette, bones + block.influences * lane,
-                                                   block.influences, weights_of(rows) + lane, rest);
+        const std::int32_t* const of_vertex = bones + block.influences * lane;
+        const bool plain = is_plain(*frame.palette, of_vertex, block.influences);
+        const float* const weights = weights_of(rows) + lane;
+        const auto sum = blend_bones<Kernel>(d, *frame.palette, of_vertex, block.influences, plain, weights,
+                                             weights + kLanes, rest);
         finish_and_store<Kernel>(d, places, spaces, b, lane, sum, rest);
     }
 }
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// A mixed block: a bone's row is added as it lies in memory, quad by quad, and the sums of all vertices
-/// are then turned into lanes.
+/// One vertex of a mixed block: a bone's row is added as it lies in memory, quad by quad. Whether that is the right
+/// way to add these bones.
+///
+/// weights  of each influence, kLanes apart
+/// sums     where the sum's quads are written, 4 * kLanes apart
+template <class Kernel, bool kPlain>
+HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                            const float* weights, float* sums) {
+    const Four d;
+    using V4 = Vec<Four>;
+    const auto row_at = [&](std::size_t k) {
+        return &palette.bones[kRowQuads * static_cast<std::size_t>(bones[k])];
+    };
+    const Quad* const first = row_at(0);
+    const float size = palette.sizes[bones[0]];
+    float least = size;
+    V4 sum[kRowQuads];
+    for (std::size_t q = 0; q < kRowQuads; ++q) sum[q] = hn::Load(d, first[q].value.data());
+    V4 side = hn::Mul(hn::Set(d, weights[0]), sum[0]);
+    if (kPlain) {
+        for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
+    }
+    for (std::size_t k = 1; k < count; ++k) {
+        const Quad* const row = row_at(k);
+        least = std::min(least, palette.sizes[bones[k]]);
+        const V4 weight = hn::Set(d, weights[kLanes * k]);
+        const V4 quaternion = hn::Load(d, row->value.data());
+        const auto below = hn::Lt(dot(quaternion, side), hn::Zero(d));
+        const V4 away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
+        for (std::size_t q = 0; q < kRowQuads; ++q) {
+            V4 by = hn::Load(d, row[q].value.data());
+            if (q < Kernel::kSignedQuads) by = hn::Xor(by, away);
+            if (!kPlain) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
+            sum[q] = hn::MulAdd(weight, by, sum[q]);
+        }
+        side = hn::MulAdd(hn::Xor(weight, away), quaternion, side);
+    }
+    for (std::size_t q = 0; q < kRowQuads; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
+    return kPlain == is_plain(size, least);
+}
+
+/// Apart, so that its registers are not those of every vertex.
+template <class Kernel>
+HWY_NOINLINE void blend_quads_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                                      const float* weights, float* sums) {
+    blend_quads<Kernel, true>(palette, bones, count, weights, sums);
+}
+
+/// A mixed block: the sums of all vertices are turned into lanes.
 template <class Kernel>
 void deform_mixed(const Frame& frame, std::size_t b) {
-    const Four four;
-    using V4 = Vec<Four>;
     const Places places = places_of(frame);
     const Spaces spaces = spaces_of(frame);
     const Block& block = places.blocks[b];
     const Lanes<float>* const rows = places.rows + block.first_row;
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
+    const Palette palette = *frame.palette;
     alignas(64) float sums[kRowQuads][4 * kLanes];
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        const Quad* const first = &frame.palette->bones[kRowQuads * static_cast<std::size_t>(*bones)];
-        V4 sum[kRowQuads];
-        for (std::size_t q = 0; q < kRowQuads; ++q) sum[q] = hn::Load(four, first[q].value.data());
-        V4 side = hn::Mul(hn::Set(four, rows[3].lane[lane]), sum[0]);
-        ++bones;
-        for (std::size_t k = 1; k < block.influences; ++k, ++bones) {
-            const Quad* const row = &frame.palette->bones[kRowQuads * static_cast<std::size_t>(*bones)];
-            const V4 weight = hn::Set(four, rows[3 + k].lane[lane]);
-            const V4 quaternion = hn::Load(four, row->value.data());
-            const auto below = hn::Lt(dot(quaternion, side), hn::Zero(four));
-            const V4 away = hn::And(hn::SignBit(four), hn::VecFromMask(four, below));
-            for (std::size_t q = 0; q < kRowQuads; ++q) {
-                V4 turned = hn::Load(four, row[q].value.data());
-                if (q < Kernel::kSignedQuads) turned = hn::Xor(turned, away);
-                const V4 difference = hn::Sub(turned, hn::Load(four, first[q].value.data()));
-                sum[q] = hn::MulAdd(weight, difference, sum[q]);
-            }
-            side = hn::MulAdd(hn::Xor(weight, away), quaternion, side);
+    for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
+        const float* const weights = weights_of(rows) + lane;
+        float* const to = sums[0] + 4 * lane;
+        if (!blend_quads<Kernel, false>(palette, bones, block.influences, weights, to)) {
+            blend_quads_plainly<Kernel>(palette, bones, block.influences, weights, to);
         }
-        for (std::size_t q = 0; q < kRowQuads; ++q) hn::Store(sum[q], four, sums[q] + 4 * lane);
     }
     const Full d;
     for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
@@ -328,7 +375,7 @@ void deform_mixed(const Frame& frame, std::size_t b) {
 
 template <class Kernel>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
-    const bool scaled = !frame.palette->has_scale.empty();
+    const bool scaled = frame.palette->any_scale;
     for (std::size_t b = begin; b < end;) {
         const Block& block = frame.mesh->blocks[b];
         if (block.mixed) {

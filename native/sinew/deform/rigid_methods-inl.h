@@ -2,8 +2,7 @@
 // The rigid methods on lanes, agreeing with skinning/: compiled once for each instruction set, see
 // kernels.cpp.
 //
-// Rows of bones are summed as the first and, by weight, what the others differ from it, which saves the first's
-// products; `finish` makes points of the sums. There is no case for blends that
+// Rows of bones are summed as Palette says; `finish` makes points of the sums. There is no case for blends that
 // cancel: a term never points against the sum before it, so |sum|^2 >= the sum of squared weights
 // >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
 #if defined(SINEW_DEFORM_RIGID_METHODS_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -43,21 +42,28 @@ struct Blend {
     Vec<D> side[4];
 };
 
+/// The base that rows are added without where they are added plainly.
+inline constexpr float kNoBase[kRow] = {};
+
+/// plain  whether the first row is added by its weight
 template <class D>
-HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight) {
+HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight, bool plain) {
     Blend<D> blend;
     for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Set(d, row[i]);
     for (std::size_t i = 0; i < 4; ++i) blend.side[i] = hn::Mul(weight, hn::Set(d, row[i]));
+    if (plain) {
+        for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Mul(weight, hn::Set(d, row[i]));
+    }
     return blend;
 }
 
-/// Adds what `row`, turned to the side of the blend, differs from the `first`; the weight, negative where it
-/// was turned.
+/// Adds what `row`, turned to the side of the blend, differs from the `base`: the first row, or kNoBase; the
+/// weight, negative where it was turned.
 ///
 /// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
 /// must decide a tie alike.
 template <class Kernel, class D>
-HWY_INLINE Vec<D> add_to_blend(D d, const float* first, const float* row, Vec<D> weight, Blend<D>& blend) {
+HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight, Blend<D>& blend) {
     Vec<D>* const side = blend.side;
     const Vec<D> dot =
         hn::Add(hn::Add(hn::Mul(hn::Set(d, row[0]), side[0]), hn::Mul(hn::Set(d, row[2]), side[2])),
@@ -65,8 +71,8 @@ HWY_INLINE Vec<D> add_to_blend(D d, const float* first, const float* row, Vec<D>
     const auto away = hn::Lt(dot, hn::Zero(d));
     const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
     for (std::size_t i = 0; i < kRow; ++i) {
-        const Vec<D> difference = hn::Set(d, row[i] - first[i]);
-        const Vec<D> turned = hn::Set(d, -row[i] - first[i]);
+        const Vec<D> difference = hn::Set(d, row[i] - base[i]);
+        const Vec<D> turned = hn::Set(d, -row[i] - base[i]);
         const Vec<D> by =
             i < 4 * Kernel::kSignedQuads ? hn::IfThenElse(away, turned, difference) : difference;
         blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
@@ -83,7 +89,7 @@ HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
 template <class D>
 HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest, Points<D>& by) {
     const auto index = static_cast<std::size_t>(bone);
-    if (palette.has_scale.empty() || palette.has_scale[index] == 0) return false;
+    if (!palette.any_scale || palette.has_scale[index] == 0) return false;
     by = displacement(d, palette.scales[kDisplacementQuads * index].value.data(), rest);
     return true;
 }

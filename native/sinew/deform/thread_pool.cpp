@@ -6,15 +6,22 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <system_error>
+#include <exception>
+#include <new>
 #include <thread>
+#include <type_traits>
 
-#ifndef _WIN32
+#ifdef _WIN32
+#include <process.h>
+#include <windows.h>
+#else
 #include <pthread.h>
 #endif
 #if defined(__x86_64__) || defined(__i386__)
 #include <immintrin.h>
 #endif
+
+#include "sinew/deform/forks.h"
 
 namespace sinew {
 namespace {
@@ -49,6 +56,53 @@ bool spin_until(const Ready& ready) {
     return ready();
 }
 
+/// A thread of the system. Not std::thread, which allocates, and whose destructor would end the process with the
+/// threads of a pool that is left as it is.
+class SystemThread {
+public:
+    using Main = void (*)(std::size_t);
+
+    /// False where the system refuses one.
+    bool start(Main main, std::size_t argument) noexcept {
+        main_ = main;
+        argument_ = argument;
+#ifdef _WIN32
+        handle_ = reinterpret_cast<HANDLE>(_beginthreadex(nullptr, 0, &run, this, 0, nullptr));
+        return handle_ != nullptr;
+#else
+        return pthread_create(&handle_, nullptr, &run, this) == 0;
+#endif
+    }
+
+    void join() noexcept {
+#ifdef _WIN32
+        WaitForSingleObject(handle_, INFINITE);
+        CloseHandle(handle_);
+#else
+        pthread_join(handle_, nullptr);
+#endif
+    }
+
+private:
+#ifdef _WIN32
+    static unsigned __stdcall run(void* self) {
+        const auto* const thread = static_cast<const SystemThread*>(self);
+        thread->main_(thread->argument_);
+        return 0;
+    }
+    HANDLE handle_ = nullptr;
+#else
+    static void* run(void* self) {
+        const auto* const thread = static_cast<const SystemThread*>(self);
+        thread->main_(thread->argument_);
+        return nullptr;
+    }
+    pthread_t handle_{};
+#endif
+    Main main_ = nullptr;
+    std::size_t argument_ = 0;
+};
+
 class Pool {
 public:
     void run(std::size_t count, std::size_t threads, const Work& work, std::size_t piece) {
@@ -58,6 +112,9 @@ public:
             return;
         }
         const auto helpers = static_cast<std::uint32_t>(start_workers(threads - 1));
+        std::exception_ptr error;
+        error_ = &error;
+        failed_.store(false, std::memory_order_relaxed);
         work_ = &work;
         count_ = count;
         piece_ = piece;
@@ -68,8 +125,7 @@ public:
         left_.store(0, std::memory_order_relaxed);
         const std::uint64_t job = (job_of(gate_.load(std::memory_order_relaxed)) + 1) << 32;
         gate_.store(job | helpers, std::memory_order_release);
-        bell_.fetch_add(1, std::memory_order_release);
-        bell_.notify_all();
+        ring();
 
         take_pieces(0);
         // Workers that have not come yet would find no pieces left: close their seats.
@@ -83,6 +139,18 @@ public:
             }
         }
         busy_.store(false, std::memory_order_release);
+        if (error) std::rethrow_exception(error);
+    }
+
+    /// Joins the workers; the next call starts others.
+    void end() noexcept {
+        while (busy_.exchange(true, std::memory_order_acquire)) std::this_thread::yield();
+        ending_.store(true, std::memory_order_relaxed);
+        ring();
+        for (std::size_t worker = 0; worker < worker_count_; ++worker) workers_[worker].join();
+        worker_count_ = 0;
+        ending_.store(false, std::memory_order_relaxed);
+        busy_.store(false, std::memory_order_release);
     }
 
 private:
@@ -90,18 +158,13 @@ private:
 
     static std::uint64_t job_of(std::uint64_t gate) { return gate >> 32; }
 
-    // The number of workers that can help, at most `wanted`: fewer where the system refuses threads.
-    std::size_t start_workers(std::size_t wanted) {
-        while (worker_count_ < wanted) {
-            try {
-                std::thread([this, self = worker_count_ + 1] { serve(self); }).detach();
-            } catch (const std::system_error&) {
-                break;
-            }
-            ++worker_count_;
-        }
-        return std::min(worker_count_, wanted);
+    void ring() {
+        bell_.fetch_add(1, std::memory_order_release);
+        bell_.notify_all();
     }
+
+    // The number of workers that can help, at most `wanted`: fewer where the system refuses threads.
+    std::size_t start_workers(std::size_t wanted) noexcept;
 
     void serve(std::size_t self) {
         std::uint64_t last_job = 0;
@@ -113,6 +176,7 @@ private:
                 left_.fetch_add(1, std::memory_order_release);
                 left_.notify_one();
             }
+            if (ending_.load(std::memory_order_relaxed)) return;
             const auto rung = [this, heard] { return bell_.load(std::memory_order_acquire) != heard; };
             if (!spin_until(rung)) bell_.wait(heard, std::memory_order_acquire);
         }
@@ -134,22 +198,28 @@ private:
 
     /// Where share `share` of the pieces starts.
     [[nodiscard]] std::size_t share_begin(std::size_t share) const {
-        const std::size_t pieces = (count_ + piece_ - 1) / piece_;
+        const std::size_t pieces = (count_ - 1) / piece_ + 1;
         return std::min(pieces * share / shares_ * piece_, count_);
     }
 
     /// First the same share in every job, as what it reads and writes is still in this core's cache (with
     /// pieces dealt out at random two threads took 0.74 of the time of one, not 0.5), then what others have
-    /// left.
-    void take_pieces(std::size_t self) {
-        for (std::size_t turn = 0; turn < shares_; ++turn) {
-            const std::size_t share = (self + turn) % shares_;
-            const std::size_t end = share_begin(share + 1);
-            std::atomic<std::size_t>& next = next_[share].index;
-            while (next.load(std::memory_order_relaxed) < end) {
-                const std::size_t begin = next.fetch_add(piece_, std::memory_order_relaxed);
-                if (begin < end) (*work_)(begin, std::min(begin + piece_, end));
+    /// left. The first exception of all threads is kept for the caller, and ends the job.
+    void take_pieces(std::size_t self) noexcept {
+        try {
+            for (std::size_t turn = 0; turn < shares_; ++turn) {
+                const std::size_t share = (self + turn) % shares_;
+                const std::size_t end = share_begin(share + 1);
+                std::atomic<std::size_t>& next = next_[share].index;
+                while (next.load(std::memory_order_relaxed) < end) {
+                    const std::size_t begin = next.fetch_add(piece_, std::memory_order_relaxed);
+                    if (begin >= end) break;
+                    if (failed_.load(std::memory_order_relaxed)) return;
+                    (*work_)(begin, std::min(begin + piece_, end));
+                }
             }
+        } catch (...) {
+            if (!failed_.exchange(true, std::memory_order_relaxed)) *error_ = std::current_exception();
         }
     }
 
@@ -158,7 +228,10 @@ private:
     };
 
     std::atomic<bool> busy_{false};
+    std::atomic<bool> ending_{false};
     const Work* work_ = nullptr;
+    std::exception_ptr* error_ = nullptr;  // of the first that failed
+    std::atomic<bool> failed_{false};
     std::size_t count_ = 0;
     std::size_t piece_ = 1;
     std::size_t shares_ = 1;
@@ -166,28 +239,38 @@ private:
     // Apart, as all threads write them while they read the ones above.
     alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, then its free seats
     std::atomic<std::uint32_t> bell_{0};              // changes with every job; what workers sleep on
-    std::array<Next, kMostThreads> next_;             // first piece of each share that nobody has
+    std::array<Next, kMostThreads> next_{};           // first piece of each share that nobody has
     alignas(64) std::atomic<std::uint32_t> left_{0};  // workers that are done with the job
+    std::array<SystemThread, kMostThreads> workers_{};
 };
 
-// Never destroyed: at the end of a process its workers may still wait on it, and joining them from a
-// library's static destructor can hang.
-Pool* pool = nullptr;
+// Not allocated, and never destroyed: at the end of a process its workers may still wait on it, and joining them
+// from a library's static destructor can hang.
+constinit Pool pool;
+static_assert(std::is_trivially_destructible_v<Pool>);
 
-Pool& the_pool() {
-    static const bool once = [] {
-        pool = new Pool;
-#ifndef _WIN32
-        // A forked child has none of its parent's threads: it starts over with a pool of its own.
-        pthread_atfork(nullptr, nullptr, [] { pool = new Pool; });
-#endif
-        return true;
-    }();
-    static_cast<void>(once);
-    return *pool;
+std::size_t Pool::start_workers(std::size_t wanted) noexcept {
+    while (worker_count_ < wanted) {
+        const auto serve = [](std::size_t self) { pool.serve(self); };
+        if (!workers_[worker_count_].start(serve, worker_count_ + 1)) break;
+        ++worker_count_;
+    }
+    return std::min(worker_count_, wanted);
 }
 
+std::atomic<std::uint32_t> fork_count{0};
+
+#ifndef _WIN32
+// A forked child has none of its parent's threads: it starts over.
+[[maybe_unused]] const int at_fork = pthread_atfork(nullptr, nullptr, [] {
+    new (&pool) Pool;
+    fork_count.fetch_add(1, std::memory_order_relaxed);
+});
+#endif
+
 }  // namespace
+
+std::uint32_t forks() noexcept { return fork_count.load(std::memory_order_relaxed); }
 
 std::size_t hardware_threads() noexcept {
     // Asking the system takes 10 us: as long as 5,000 vertices.
@@ -197,12 +280,13 @@ std::size_t hardware_threads() noexcept {
 }
 
 void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t piece) {
-    const std::size_t useful = std::min({threads, (count + piece - 1) / piece, kMostThreads});
-    if (useful <= 1) {
-        if (count > 0) work(0, count);
-    } else {
-        the_pool().run(count, useful, work, piece);
-    }
+    if (count == 0) return;
+    piece = std::clamp<std::size_t>(piece, 1, count);
+    const std::size_t useful = std::min({threads, (count - 1) / piece + 1, kMostThreads});
+    if (useful <= 1) return work(0, count);
+    pool.run(count, useful, work, piece);
 }
+
+void end_threads() noexcept { pool.end(); }
 
 }  // namespace sinew

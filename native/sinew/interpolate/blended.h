@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <span>
 
@@ -24,12 +25,16 @@ enum class Signs {
     kAsGiven,     ///< leaves them
 };
 
-/// Weights brought to sum 1 by `scale`, and the index of the largest, the first of equals.
+/// Weights brought to sum 1, and the index of the largest, the first of equals.
 template <class T>
 struct Shares {
     std::size_t heaviest = 0;
-    T scale = T(1);
+    T largest = T(1);
+    T scale = T(1);  ///< of weights that are divided by the largest
     bool is_defined = true;
+
+    /// By the largest first: the sum of the largest numbers is infinite, and so is 1 by that of the smallest.
+    [[nodiscard]] T of(T weight) const noexcept { return weight / largest * scale; }
 };
 
 /// weights  [n], n >= 1, of any sign. A sum not above kDegenerateBlend times the largest is not defined.
@@ -37,10 +42,48 @@ template <class T>
 [[nodiscard]] Shares<T> shares(std::span<const T> weights) noexcept {
     assert(!weights.empty());
     const auto largest = std::max_element(weights.begin(), weights.end());
+    const auto heaviest = static_cast<std::size_t>(largest - weights.begin());
+    if (!(*largest > T(0))) return {heaviest, T(1), T(1), false};
     T sum = T(0);
-    for (const T weight : weights) sum += weight;
-    const bool is_defined = sum > T(kDegenerateBlend) * *largest && *largest > T(0);
-    return {static_cast<std::size_t>(largest - weights.begin()), is_defined ? T(1) / sum : T(1), is_defined};
+    for (const T weight : weights) sum += weight / *largest;
+    if (!(sum > T(kDegenerateBlend))) return {heaviest, T(1), T(1), false};
+    return {heaviest, *largest, T(1) / sum, true};
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Vec3<T>& v) noexcept {
+    using std::isfinite;
+    return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Quat<T>& q) noexcept {
+    using std::isfinite;
+    return isfinite(q.w) && is_finite(vector_part(q));
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const Affine<T>& a) noexcept {
+    return is_finite(a.linear[0]) && is_finite(a.linear[1]) && is_finite(a.linear[2]) &&
+           is_finite(a.translation);
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const QuatVec<T>& a) noexcept {
+    return is_finite(a.rotation) && is_finite(a.translation);
+}
+
+template <class T>
+[[nodiscard]] bool is_finite(const DualQuat<T>& a) noexcept {
+    return is_finite(a.real) && is_finite(a.dual);
+}
+
+/// `result`; where it, or a number on the way to it, is too large for its type, `heaviest`, which is then not
+/// defined.
+template <class Transform>
+[[nodiscard]] Blended<Transform> finite_or(const Blended<Transform>& result,
+                                           const Transform& heaviest) noexcept {
+    return is_finite(result.transform) ? result : Blended<Transform>{heaviest, false};
 }
 
 /// `q` or -q, whichever is on the side of `pivot`.
@@ -122,7 +165,7 @@ template <Signs signs, class Transform, class T>
     Blended<Transform> total{scaled(T(0), pivot), true};
     for (std::size_t i = 0; i < transforms.size(); ++i) {
         if (weights[i] == T(0)) continue;
-        const T weight = share.scale * weights[i];
+        const T weight = share.of(weights[i]);
         if constexpr (signs == Signs::kToHeaviest) {
             if (is_half_turn_apart(transforms[i], pivot)) total.is_defined = false;
             total.transform = sum(total.transform, scaled(weight, aligned(transforms[i], pivot)));

@@ -25,12 +25,14 @@ struct Sclerp {
     [[nodiscard]] static Blended<DualQuat<T>> between(const DualQuat<T>& a, const DualQuat<T>& b,
                                                       T t) noexcept {
         const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
-        return {normalized(a * power(inverse(a) * b, t)), is_defined};
+        return finite_or<DualQuat<T>>({normalized(a * power(inverse(a) * b, t)), is_defined},
+                                      T(1) - t < t ? b : a);
     }
 
     template <Signs signs = Signs::kToHeaviest, class T>
     [[nodiscard]] static Blended<DualQuat<T>> blend(std::span<const DualQuat<T>> transforms,
                                                     std::span<const T> weights) noexcept {
+        using std::hypot;
         using std::max;
         const Shares<T> share = shares(weights);
         Blended<DualQuat<T>> mean = Dlb::blend<signs, T>(transforms, weights);
@@ -39,7 +41,8 @@ struct Sclerp {
         const T rounding = T(8) * std::numeric_limits<T>::epsilon();
         T longest = T(0);
         for (const DualQuat<T>& transform : transforms) {
-            longest = max(longest, T(2) * glm::length(transform.dual));
+            longest =
+                max(longest, T(2) * hypot(safe_length(vector_part(transform.dual)), transform.dual.w, T(0)));
         }
         for (int step = 0; step < kBlendSteps; ++step) {
             Twist<T> correction;
@@ -48,9 +51,10 @@ struct Sclerp {
                 if (weights[i] == T(0)) continue;
                 is_half_turn = is_half_turn || is_half_turn_apart(mean.transform, transforms[i]);
                 const DualQuat<T> turn = inverse(mean.transform) * transforms[i];
-                correction = correction + (share.scale * weights[i]) * to_twist(turn);
+                correction = correction + share.of(weights[i]) * to_twist(turn);
             }
             mean.transform = normalized(mean.transform * to_dual_quat(correction));
+            if (!is_finite(mean.transform)) return {transforms[share.heaviest], false};
             if (safe_length(correction.angular) <= rounding &&
                 safe_length(correction.linear) <= rounding * longest) {
                 mean.is_defined = !is_half_turn;

@@ -10,8 +10,8 @@ namespace sinew {
 // Each method is a type with a name, the representation it works on, and
 //   between(a, b, t)             from `a` at t = 0 to `b` at t = 1; other t go on beyond
 //   blend(transforms, weights)   of n >= 1; weights of any sign, brought to sum 1
-// All rotations are of unit length. Where the weights' sum is not above 0 the blend is not defined and is
-// the heaviest transform. Of two equal weights the first is the heavier.
+// All rotations are of unit length. Where the weights' sum is not above 0, or the type can not hold the result, it
+// is not defined and is the heaviest transform. Of two equal weights the first is the heavier.
 
 // The linear methods make what they give of a weighted sum by
 //   finished(total, heaviest)    `total` of weights of sum 1, defined where its signs are
@@ -25,7 +25,19 @@ template <class Method, class Transform, class T>
     // As shares() has it of weights that all but cancel.
     if (!(T(1) > T(kDegenerateBlend) * (s < t ? t : s))) return {heaviest, false};
     const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
-    return Method::template finished<T>({sum(scaled(s, a), scaled(t, onto)), is_defined}, heaviest);
+    return finite_or(Method::template finished<T>({sum(scaled(s, a), scaled(t, onto)), is_defined}, heaviest),
+                     heaviest);
+}
+
+/// blend() of the methods that make what they give of a weighted sum.
+template <class Method, Signs signs, class Transform, class T>
+[[nodiscard]] Blended<Transform> blend_of_many(std::span<const Transform> transforms,
+                                               std::span<const T> weights) noexcept {
+    const Shares<T> share = shares(weights);
+    const Transform& heaviest = transforms[share.heaviest];
+    if (!share.is_defined) return {heaviest, false};
+    return finite_or(Method::template finished<T>(weighted_sum<signs>(transforms, weights, share), heaviest),
+                     heaviest);
 }
 
 /// The matrices' sum, component by component: not rigid between different rotations, and between opposite
@@ -43,9 +55,7 @@ struct MatrixLinear {
     template <Signs signs = Signs::kToHeaviest, class T>
     [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
                                                   std::span<const T> weights) noexcept {
-        const Shares<T> share = shares(weights);
-        if (!share.is_defined) return {transforms[share.heaviest], false};
-        return weighted_sum<signs>(transforms, weights, share);
+        return blend_of_many<MatrixLinear, signs>(transforms, weights);
     }
 
     template <class T>
@@ -74,9 +84,7 @@ struct MatrixPolar {
     template <Signs signs = Signs::kToHeaviest, class T>
     [[nodiscard]] static Blended<Affine<T>> blend(std::span<const Affine<T>> transforms,
                                                   std::span<const T> weights) noexcept {
-        const Shares<T> share = shares(weights);
-        if (!share.is_defined) return {transforms[share.heaviest], false};
-        return finished<T>(weighted_sum<signs>(transforms, weights, share), transforms[share.heaviest]);
+        return blend_of_many<MatrixPolar, signs>(transforms, weights);
     }
 
     template <class T>
@@ -107,9 +115,7 @@ struct QvNlerp {
     template <Signs signs = Signs::kToHeaviest, class T>
     [[nodiscard]] static Blended<QuatVec<T>> blend(std::span<const QuatVec<T>> transforms,
                                                    std::span<const T> weights) noexcept {
-        const Shares<T> share = shares(weights);
-        if (!share.is_defined) return {transforms[share.heaviest], false};
-        return finished<T>(weighted_sum<signs>(transforms, weights, share), transforms[share.heaviest]);
+        return blend_of_many<QvNlerp, signs>(transforms, weights);
     }
 
     template <class T>
@@ -142,9 +148,7 @@ struct Dlb {
     template <Signs signs = Signs::kToHeaviest, class T>
     [[nodiscard]] static Blended<DualQuat<T>> blend(std::span<const DualQuat<T>> transforms,
                                                     std::span<const T> weights) noexcept {
-        const Shares<T> share = shares(weights);
-        if (!share.is_defined) return {transforms[share.heaviest], false};
-        return finished<T>(weighted_sum<signs>(transforms, weights, share), transforms[share.heaviest]);
+        return blend_of_many<Dlb, signs>(transforms, weights);
     }
 
     template <class T>

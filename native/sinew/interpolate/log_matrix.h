@@ -39,10 +39,11 @@ struct MatrixLog {
             // Below this the sign of w, and with it that of the axis, is rounding.
             const bool is_half_turn = rigid.rotation.w < T(kDegenerateBlend);
             // A matrix of weight 1 is the result whichever logarithm it has.
-            if (is_half_turn && share.scale * weights[i] != T(1)) is_defined = false;
-            total = total + (share.scale * weights[i]) * to_twist(rigid);
+            const T weight = share.of(weights[i]);
+            if (is_half_turn && weight != T(1)) is_defined = false;
+            total = total + weight * to_twist(rigid);
         }
-        return {to_affine(total), is_defined};
+        return finite_or<Affine<T>>({to_affine(total), is_defined}, transforms[share.heaviest]);
     }
 };
 

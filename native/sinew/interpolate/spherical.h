@@ -41,9 +41,10 @@ struct QvSlerp {
     template <class T>
     [[nodiscard]] static Blended<QuatVec<T>> between(const QuatVec<T>& a, const QuatVec<T>& b, T t) noexcept {
         const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
-        return {{slerp(a.rotation, aligned(b.rotation, a.rotation), t),
-                 (T(1) - t) * a.translation + t * b.translation},
-                is_defined};
+        return finite_or<QuatVec<T>>({{slerp(a.rotation, aligned(b.rotation, a.rotation), t),
+                                       (T(1) - t) * a.translation + t * b.translation},
+                                      is_defined},
+                                     T(1) - t < t ? b : a);
     }
 
     template <Signs signs = Signs::kToHeaviest, class T>
@@ -60,7 +61,7 @@ struct QvSlerp {
                 if (weights[i] == T(0)) continue;
                 is_half_turn = is_half_turn || is_half_turn_apart(rotation, transforms[i].rotation);
                 const Quat<T> turn = glm::conjugate(rotation) * transforms[i].rotation;
-                correction += (share.scale * weights[i]) * rotation_vector(turn);
+                correction += share.of(weights[i]) * rotation_vector(turn);
             }
             rotation = glm::normalize(rotation * quat_from_rotation_vector(correction));
             if (safe_length(correction) <= T(8) * std::numeric_limits<T>::epsilon()) {

@@ -76,7 +76,8 @@ template <class Transform, class T>
     const auto chain = along_chain(span, keys);
     const std::span<const Transform> terms(chain.transform);
     const std::span<const T> weights(span.weights);
-    return {weighted_sum<Signs::kAsGiven>(terms, weights, {1, T(1), true}).transform, chain.is_defined};
+    const Blended<Transform> sum = weighted_sum<Signs::kAsGiven>(terms, weights, {1, T(1), T(1), true});
+    return finite_or<Transform>({sum.transform, chain.is_defined}, keys[1]);
 }
 
 /// Blend form: the keys' blend by Method with the weights of the spline, rigid for every method but

@@ -4,18 +4,27 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#if defined(GLM_FORCE_QUAT_CTOR_XYZW) || (defined(GLM_FORCE_QUAT_DATA_XYZW) && GLM_VERSION >= 1000)
+#error "Sinew constructs quaternions as (w, x, y, z): build without GLM_FORCE_QUAT_CTOR_XYZW"
+#endif
+
 namespace sinew {
 
+// Packed whatever GLM's default is: with GLM_FORCE_DEFAULT_ALIGNED_GENTYPES a program would otherwise have
+// vectors of another size than the library that it calls.
+
 template <class T>
-using Vec3 = glm::vec<3, T, glm::defaultp>;
+using Vec3 = glm::vec<3, T, glm::packed_highp>;
 
 /// Column-major as all of GLM: `matrix[column][row]`.
 template <class T>
-using Mat3 = glm::mat<3, 3, T, glm::defaultp>;
+using Mat3 = glm::mat<3, 3, T, glm::packed_highp>;
 
 /// Constructed as (w, x, y, z); its four components are named, never indexed.
 template <class T>
-using Quat = glm::qua<T, glm::defaultp>;
+using Quat = glm::qua<T, glm::packed_highp>;
+
+static_assert(sizeof(Vec3<float>) == 3 * sizeof(float) && sizeof(Mat3<float>) == 9 * sizeof(float));
 
 /// Blends shorter than this have cancelled: their direction is rounding noise.
 /// Methods then return the heaviest influence alone.

@@ -1,19 +1,50 @@
-# Installs the library from BUILD, builds the README's C++ program against it and runs it.
-#   cmake -DSOURCE=... -DBUILD=... -P test.cmake
+# Installs the library, builds the programs of this folder against it and runs them.
+#   cmake -DSOURCE=... -DBUILD=... [-DGLM=...] -P test.cmake
+# GLM  a folder with GLM's headers: the library is first built as where the system has none, with these in the place
+#      of what is fetched; the one in BUILD is not read then
 set(folder "${BUILD}/consumer")
-file(REMOVE_RECURSE "${folder}")
+set(build "${BUILD}")
+set(without_glm "")
 
 function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
+
+if(GLM)
+  set(folder "${BUILD}/consumer-without-glm")
+  set(build "${folder}/library")
+  set(without_glm -DCMAKE_DISABLE_FIND_PACKAGE_glm=ON)
+endif()
+file(REMOVE_RECURSE "${folder}")
+if(GLM)
+  file(COPY "${GLM}/glm" DESTINATION "${folder}/fetched")
+  run(${CMAKE_COMMAND} -S "${SOURCE}" -B "${build}" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DSINEW_BUILD_TESTS=OFF
+    ${without_glm} "-DFETCHCONTENT_SOURCE_DIR_GLM=${folder}/fetched" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+  run(${CMAKE_COMMAND} --build "${build}")
+endif()
 
 file(READ "${SOURCE}/README.md" readme)
 if(NOT readme MATCHES "```cpp\n([^`]+)```")
   message(FATAL_ERROR "README.md has no C++ program")
 endif()
 file(WRITE "${folder}/build/readme.cpp" "${CMAKE_MATCH_1}")
-run(${CMAKE_COMMAND} --install "${BUILD}" --prefix "${folder}/installed")
-run(${CMAKE_COMMAND} -S "${SOURCE}/tests/native/consumer" -B "${folder}/build" -G Ninja
-  "-DCMAKE_PREFIX_PATH=${folder}/installed" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+run(${CMAKE_COMMAND} --install "${build}" --prefix "${folder}/installed")
+
+# What is compatible for CMake must be so for the linker.
+file(GLOB_RECURSE libraries "${folder}/installed/libsinew.*")
+if(UNIX AND NOT APPLE AND NOT libraries MATCHES "libsinew\\.so\\.0\\.1;")
+  message(FATAL_ERROR "no libsinew.so.0.1 among ${libraries}")
+endif()
+# What it does not export can not be called, and is not there.
+file(GLOB of_deform RELATIVE "${folder}/installed/include/sinew/deform" "${folder}/installed/include/sinew/deform/*")
+if(NOT of_deform STREQUAL "deformer.h;simd.h;thread_pool.h")
+  message(FATAL_ERROR "headers of sinew/deform: ${of_deform}")
+endif()
+
+run(${CMAKE_COMMAND} -S "${SOURCE}/tests/native/consumer" -B "${folder}/build" -G Ninja ${without_glm}
+  "-DCMAKE_PREFIX_PATH=${folder}/installed" "-DSINEW_INCLUDE=${folder}/installed/include"
+  "-DCMAKE_CXX_FLAGS=${FLAGS}")
 run(${CMAKE_COMMAND} --build "${folder}/build")
-run("${folder}/build/consumer")
+foreach(program readme calls_plain calls_aligned)
+  run("${folder}/build/${program}")
+endforeach()

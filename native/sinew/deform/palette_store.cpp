@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/deform/palette_store.h"
+
+#include <bit>
+
+#include "sinew/deform/forks.h"
+
+namespace sinew {
+namespace {
+
+constexpr std::uint32_t kReaders = (std::uint32_t{1} << PaletteStore::kMax) - 1;
+constexpr std::uint32_t kWriter = kReaders + 1;
+constexpr std::uint32_t kForks = ~(kReaders | kWriter);
+constexpr std::uint32_t kOneFork = kWriter << 1;
+
+/// `state` as it is for this process: a forked child has none of the threads that used its parent's palettes, and
+/// would wait for them for ever.
+std::uint32_t of_this_process(std::uint32_t state) noexcept {
+    const std::uint32_t forked = kOneFork * forks();
+    return (state & kForks) == forked ? state : forked;
+}
+
+}  // namespace
+
+PaletteStore::PaletteStore(MethodId method, std::size_t bones) {
+    // Left as the system gives it: only the first palette is ever touched where one thread at a time deforms.
+    const bool may_scale = method != MethodId::lbs;
+    const std::size_t of_bones = bone_quads(method) * bones;
+    const std::size_t of_scales = may_scale ? kDisplacementQuads * bones : 0;
+    quads_ = std::make_unique_for_overwrite<Quad[]>(kMax * (of_bones + of_scales));
+    const std::size_t of_sizes = bones + kSizesAtOnce;
+    sizes_ = std::make_unique_for_overwrite<float[]>(kMax * of_sizes);
+    if (may_scale) {
+        // A bone may be there twice: for its rest axes, and for its pose.
+        scaled_ = std::make_unique_for_overwrite<std::int32_t[]>(kMax * 2 * bones);
+        has_scale_ = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * bones);
+    }
+    for (std::size_t i = 0; i < kMax; ++i) {
+        Palette& palette = palettes_[i];
+        palette.bones = quads_.get() + i * (of_bones + of_scales);
+        palette.sizes = sizes_.get() + i * of_sizes;
+        if (!may_scale) continue;
+        palette.scales = palette.bones + of_bones;
+        palette.scaled = scaled_.get() + i * 2 * bones;
+        palette.has_scale = has_scale_.get() + i * bones;
+    }
+}
+
+/// Makes the state what `next` says of it, waiting as long as that is the same; what it was before.
+template <class Next>
+std::uint32_t PaletteStore::change(const Next& next) noexcept {
+    for (std::uint32_t stored = state_.load(std::memory_order_relaxed);;) {
+        const std::uint32_t state = of_this_process(stored);
+        if (const std::uint32_t after = next(state); after == state) {
+            state_.wait(stored, std::memory_order_relaxed);
+            stored = state_.load(std::memory_order_relaxed);
+        } else if (state_.compare_exchange_weak(stored, after, std::memory_order_acq_rel,
+                                                std::memory_order_relaxed)) {
+            return state;
+        }
+    }
+}
+
+std::uint32_t PaletteStore::start_reading() noexcept {
+    const std::uint32_t before = change([](std::uint32_t state) {
+        const bool is_free = (state & kWriter) == 0 && (state & kReaders) != kReaders;
+        return is_free ? state | (state + 1) : state;  // the lowest bit that is not set
+    });
+    return static_cast<std::uint32_t>(std::countr_one(before));
+}
+
+void PaletteStore::end_reading(std::uint32_t index) noexcept {
+    state_.fetch_and(~(std::uint32_t{1} << index), std::memory_order_release);
+    state_.notify_all();
+}
+
+void PaletteStore::start_writing() noexcept {
+    // First this, so that threads which deform without a pause do not keep it waiting.
+    change([](std::uint32_t state) { return state | kWriter; });
+    for (;;) {
+        const std::uint32_t state = state_.load(std::memory_order_acquire);
+        if ((state & kReaders) == 0) return;
+        state_.wait(state, std::memory_order_relaxed);
+    }
+}
+
+void PaletteStore::end_writing() noexcept {
+    state_.fetch_and(~kWriter, std::memory_order_release);
+    state_.notify_all();
+}
+
+}  // namespace sinew

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Calls all that the installed library exports, and looks at what comes.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "sinew/deform/deformer.h"
+#include "sinew/deform/simd.h"
+#include "sinew/deform/thread_pool.h"
+#include "sinew/interpolate/methods.h"
+#include "sinew/skeleton/forward_kinematics.h"
+#include "sinew/transform/make.h"
+
+namespace {
+
+void expect(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "not so: %s\n", what);
+    std::exit(1);
+}
+
+void deform() {
+    const std::vector<sinew::Vec3<float>> rest{{1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
+    const std::vector<std::int32_t> offsets{0, 1, 2, 3}, bones{0, 1, 1};
+    const std::vector<float> weights{1.0f, 1.0f, 1.0f};
+    std::vector<sinew::Affine<float>> pose(2);
+    pose[0].translation = {10, 20, 30};
+    pose[1].translation = {100, 200, 300};
+    for (const sinew::Method& method : sinew::kMethods) {
+        sinew::Deformer deformer(method.id, {rest, offsets, bones, weights});
+        std::vector<sinew::Vec3<float>> points(rest.size());
+        deformer.deform(pose, {}, points);
+        expect(points[0] == sinew::Vec3<float>(11, 20, 30), "the first point is moved by its bone");
+        expect(points[1] == sinew::Vec3<float>(100, 202, 300), "the second point is moved by its bone");
+        expect(points[2] == sinew::Vec3<float>(100, 200, 303), "the third point is moved by its bone");
+        deformer.set_rest_points(points);
+        expect(deformer.vertex_count() == 3 && deformer.influence_count() == 3 &&
+                   deformer.bone_count() == 2 && deformer.method() == method.id,
+               "a Deformer says what it was made of");
+    }
+}
+
+void interpolate() {
+    const sinew::DualQuat<float> from{};
+    const auto onto = sinew::from_translation<sinew::DualQuat>(sinew::Vec3<float>(2, 4, 6));
+    const auto middle = sinew::Dlb::between(from, onto, 0.5f);
+    expect(glm::length(sinew::translation(middle.transform) - sinew::Vec3<float>(1, 2, 3)) < 1e-6f,
+           "half of a translation");
+}
+
+}  // namespace
+
+int main() {
+    deform();
+    interpolate();
+    const std::vector<std::int32_t> parents{-1, 0};
+    expect(sinew::Skeleton(parents).bone_count() == 2, "a skeleton has its bones");
+    expect(sinew::simd_target() == sinew::simd_targets().front(), "the fastest kernels are in use");
+    sinew::use_simd_target(sinew::simd_targets().back());
+    deform();
+    expect(sinew::hardware_threads() >= 1, "there is a thread");
+    sinew::parallel_for(
+        10, 2, [](std::size_t, std::size_t) {}, 1);
+    sinew::end_threads();
+}

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a host loads and unloads; see unload_test.cpp.
+#include <vector>
+
+#include "sinew/deform/deformer.h"
+#include "sinew/deform/thread_pool.h"
+
+extern "C" __attribute__((visibility("default"))) int work_on_threads(int threads) {
+    const std::size_t count = 100'000;
+    const std::vector<sinew::Vec3<float>> rest(count, sinew::Vec3<float>(1.0f, 2.0f, 3.0f));
+    std::vector<std::int32_t> offsets(count + 1), bones(count, 0);
+    for (std::size_t i = 0; i <= count; ++i) offsets[i] = static_cast<std::int32_t>(i);
+    const std::vector<float> weights(count, 1.0f);
+    const sinew::Deformer deformer(sinew::MethodId::dq, {rest, offsets, bones, weights});
+    std::vector<sinew::Affine<float>> pose(1);
+    pose[0].translation = {1.0f, 1.0f, 1.0f};
+    std::vector<sinew::Vec3<float>> points(count);
+    deformer.deform(pose, {{}, static_cast<std::size_t>(threads)}, points);
+    return points.front() == sinew::Vec3<float>(2.0f, 3.0f, 4.0f) && points.back() == points.front() ? 1 : 0;
+}
+
+extern "C" __attribute__((visibility("default"))) void end_threads() { sinew::end_threads(); }
