@@ -16,3 +16,17 @@ def unregister() -> None:
 
     cli.unregister_command()
     registration.unregister()
+
+
+def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
+    """Blender's glTF exporter calls this before an export."""
+    from .blender import exporters
+
+    exporters.before_export(export_settings)
+
+
+def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
+    """Blender's glTF exporter calls this after an export."""
+    from .blender import exporters
+
+    exporters.after_export(export_settings)

@@ -15,15 +15,14 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
 from concurrent import futures
 from dataclasses import dataclass
-from pathlib import Path
 
 from .core.errors import SinewError
+from .core.scratch import ScratchFolder
 
 # A file in the folder of a Blender that says what it is doing: an object of JSON, and blanks.
 DOING = "doing"
@@ -68,16 +67,21 @@ class BlenderProcess:
 
     def __init__(self, limits: Limits, wait: bool = True) -> None:
         # Blender keeps a folder there that it leaves behind when it is ended.
-        self._folder = tempfile.TemporaryDirectory(prefix="sinew-", ignore_cleanup_errors=True)
-        self._process = subprocess.Popen(
-            _command(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=None if limits.verbose else subprocess.DEVNULL,
-            env={**_environment(limits), "TMPDIR": self._folder.name, "TEMP": self._folder.name},
-            # Ctrl-C in a terminal is for the batch, which ends its Blenders itself.
-            start_new_session=True,
-        )
+        self._folder = ScratchFolder()
+        own = str(self._folder.path)
+        try:
+            self._process = subprocess.Popen(
+                _command(),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=None if limits.verbose else subprocess.DEVNULL,
+                env={**_environment(limits), "TMPDIR": own, "TEMP": own},
+                # Ctrl-C in a terminal is for the batch, which ends its Blenders itself.
+                start_new_session=True,
+            )
+        except OSError as error:
+            self._folder.remove()
+            raise SinewError(f"no Blender can be started: {error.strerror or error}") from None
         self._is_there = False
         # Of what it is busy with, if it is; why it had to be ended.
         self._limits: Limits | None = None
@@ -182,7 +186,7 @@ class BlenderProcess:
     def _bury(self) -> None:
         self._process.wait()
         self._ended.set()
-        self._folder.cleanup()
+        self._folder.remove()
 
     def _doing(self) -> str:
         return self._said().get("doing", "starting")
@@ -190,7 +194,7 @@ class BlenderProcess:
     def _said(self) -> dict:
         """ "doing", and what else there is to know of it; nothing before its first word."""
         with contextlib.suppress(OSError, ValueError):
-            return json.loads(Path(self._folder.name, DOING).read_bytes())
+            return json.loads((self._folder.path / DOING).read_bytes())
         return {}
 
     def _memory(self) -> int:

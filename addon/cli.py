@@ -7,23 +7,26 @@ import argparse
 import atexit
 import re
 import sys
+from contextlib import suppress
 
+from .blender import native
 from .core import interrupt
 from .core.errors import SinewError, WrongUse
+from .core.output import sentence as output_sentence
 from .prepare import leave_blender, prepare_blender
 
 # The batches have Blenders of their own, or ask for this one; a report without Blender has no pictures.
-WITHOUT_BLENDER = ("methods", "report", "reskin", "restore")
+WITHOUT_BLENDER = ("methods", "check", "report", "reskin", "restore")
 
 _commands: list[object] = []
 
 
-def main(argv: list[str]) -> int:
-    """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
+def make_parser() -> tuple[argparse.ArgumentParser, dict[str, object]]:
+    """The parser of the whole command line, and the module of each subcommand."""
     from .commands import (
         bake,
+        check,
         compare,
-        console,
         inbetween,
         info,
         methods,
@@ -37,6 +40,7 @@ def main(argv: list[str]) -> int:
     modules = {
         "methods": methods,
         "info": info,
+        "check": check,
         "points": points,
         "reskin": reskin,
         "restore": restore,
@@ -51,26 +55,44 @@ def main(argv: list[str]) -> int:
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for module in modules.values():
         module.add_parser(subparsers)
+    return parser, modules
+
+
+def main(argv: list[str]) -> int:
+    """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
+    reason = native.load_error()
+    if reason is not None:
+        print(f"sinew: {reason}", file=sys.stderr)
+        return 1
+    from .commands import console
+
+    parser, modules = make_parser()
+    output = console.keep_output()
     try:
         args = parser.parse_args(_with_signed_frames(argv))
-    except SystemExit as stop:
-        # Inside Blender an exit would skip its own ending.
-        return stop.code if isinstance(stop.code, int) else 2
-    output = console.keep_output() if args.verbose else console.take_over_output()
-    try:
+        if not args.verbose:
+            output = console.take_over_output()
         if args.command not in WITHOUT_BLENDER:
             prepare_blender()
         with interrupt.heard():
             return modules[args.command].run(args, output)
+    except SystemExit as stop:
+        # Of the parser: inside Blender an exit would skip its own ending.
+        return stop.code if isinstance(stop.code, int) else 2
     except SinewError as error:
         output.complain(error)
         return 2 if isinstance(error, WrongUse) else 1
+    except OSError as error:
+        # Whatever a path or a disk can be that nobody has thought of.
+        output.complain(output_sentence(error))
+        return 1
     except KeyboardInterrupt as stop:
         output.complain(": ".join(("stopped", *map(str, stop.args))))
         return 130
     finally:
-        output.out.flush()
-        output.err.flush()
+        with suppress(OSError):
+            output.out.flush()
+            output.err.flush()
 
 
 def _with_signed_frames(argv: list[str]) -> list[str]:

@@ -82,5 +82,6 @@ def _as_arguments(options: dict[str, object]) -> list[object]:
         if value is True:
             arguments.append(f"--{name.replace('_', '-')}")
         elif value not in (None, False):
-            arguments += [f"--{name.replace('_', '-')}", value]
+            # In one: by itself, a name that begins with a dash would be an option.
+            arguments.append(f"--{name.replace('_', '-')}={value}")
     return arguments

@@ -23,10 +23,15 @@ Report = Callable[..., None]
 
 def run(task: dict, report: Report) -> dict:
     """Does one task in this process: what became of it, and the hash of what was read."""
-    from .blender import reskin
+    from .blender import preflight, reskin
     from .blender.bake import bake_apart
 
-    actions = {"reskin": reskin.reskin, "restore": reskin.restore, "export": bake_apart.export}
+    actions = {
+        "reskin": reskin.reskin,
+        "restore": reskin.restore,
+        "export": bake_apart.export,
+        "check": preflight.check,
+    }
     try:
         # First: what is written to the file afterwards is then known to have changed it.
         read = {"hash": content_hash(Path(task["source"]))}

@@ -7,6 +7,7 @@ import glob
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
@@ -52,16 +53,18 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     # Absolute without following links: a linked folder keeps the name it has here.
     path = Path(os.path.abspath(given))
     if given == STANDARD_INPUT:
-        paths = [Path(os.path.abspath(line)) for line in (line.strip("\r\n") for line in listed) if line]
+        lines = [line for line in (line.strip("\r\n") for line in listed) if line]
+        if any("\0" in line for line in lines):
+            raise WrongUse("standard input: expected one path a line, not separated by zeros")
+        paths = [Path(os.path.abspath(line)) for line in lines]
         if not paths:
             raise WrongUse("standard input: no paths, expected one a line")
         return Path(os.path.commonpath([p.parent for p in paths])), paths
     if path.is_dir():
-        root, found = path, _blend_files_below(path)
+        root, found = path, blend_files_below(path)
     elif glob.has_magic(given) and not path.exists():
         root = _fixed_part(path)
-        pattern = os.path.join(glob.escape(str(root)), path.relative_to(root))
-        found = (Path(p) for p in glob.iglob(pattern, recursive=True))
+        found = _matching(root, path.relative_to(root))
     else:
         return path.parent, [path]
     # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
@@ -80,12 +83,54 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
     return root, files
 
 
-def _blend_files_below(folder: Path) -> Iterator[Path]:
+def blend_files_below(folder: Path) -> Iterator[Path]:
+    return (path for path in _files_below(folder) if path.name.endswith(".blend"))
+
+
+def _files_below(folder: Path) -> Iterator[Path]:
     """Also in linked folders, but in none that the way there has been through."""
     for path, folders, names in os.walk(folder, followlinks=True):
         above = {os.path.realpath(part) for part in (path, *Path(path).parents)}
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
-        yield from (Path(path, name) for name in names if name.endswith(".blend"))
+        yield from (Path(path, name) for name in names)
+
+
+def _matching(root: Path, pattern: Path) -> Iterator[Path]:
+    """The files below `root` that fit a pattern, as of glob: ** is any folders, and * is nothing hidden. Not
+    by glob itself, which goes round and round where links lead up again."""
+    parts = pattern.parts
+    if "**" not in parts:
+        found = glob.iglob(os.path.join(glob.escape(str(root)), pattern))
+        return (Path(path) for path in found)
+    return (path for path in _files_below(root) if _fits(path.relative_to(root).parts, parts))
+
+
+def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
+    # The places in the pattern that the names so far can have led to.
+    places = {0}
+    for name in names:
+        shown = not name.startswith(".")
+        after = set()
+        for place in _past_folders(places, parts):
+            if place == len(parts):
+                continue
+            if parts[place] == "**":
+                after |= {place} if shown else set()
+            elif fnmatchcase(name, parts[place]) and (shown or parts[place].startswith(".")):
+                after.add(place + 1)
+        places = after
+    # At a pattern's end ** is any file, too.
+    return len(parts) in places or (parts[-1] == "**" and len(parts) - 1 in places)
+
+
+def _past_folders(places: set[int], parts: tuple[str, ...]) -> set[int]:
+    """With those behind each **, which can be no folder at all."""
+    found = set(places)
+    for place in sorted(places):
+        while place < len(parts) and parts[place] == "**":
+            place += 1
+            found.add(place)
+    return found
 
 
 def _fixed_part(pattern: Path) -> Path:

@@ -12,9 +12,12 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable
-from pathlib import Path
+from contextlib import suppress
+from pathlib import Path, PurePath
 
 from ..core.errors import SinewError, WrongUse
+from ..core.lock import try_lock
+from ..core.output import writing
 
 NAME = "sinew-journal.jsonl"
 MARK = ".unfinished"
@@ -34,12 +37,13 @@ class Journal:
         self.out = out
         self.path = out / NAME
         self._start = len(os.path.join(out, ""))
-        try:
+        # Half a line at its end is cut off: not of what a link in a folder from elsewhere leads to.
+        if self.path.is_symlink() or (self.path.exists() and not self.path.is_file()):
+            raise SinewError(f"{self.path}: is no journal but a link or a folder; remove it")
+        with writing(self.path):
             out.mkdir(parents=True, exist_ok=True)
             self._file = self.path.open("a+b", buffering=0)
-        except OSError as error:
-            raise SinewError(f"{self.path}: can not be written: {error.strerror}") from None
-        if not _lock(self._file.fileno()):
+        if not try_lock(self._file.fileno()):
             self._file.close()
             raise WrongUse(f"{out}: another batch is at work there; wait for it, or choose another --out")
         self.latest = self._read()
@@ -125,13 +129,46 @@ class Journal:
             os.truncate(self.path, whole)
         latest = {}
         for line in content[:whole].splitlines():
-            try:
+            # A machine that lost its power can leave anything, and a folder from elsewhere can hold it: such
+            # a file is done again.
+            with suppress(ValueError):
                 record = json.loads(line)
-                latest[record["file"]] = record
-            except (ValueError, TypeError, KeyError):
-                # A machine that lost its power can leave anything: such a file is done again.
-                continue
+                if _is_sound(record):
+                    latest[record["file"]] = record
         return latest
+
+
+def _is_sound(record: object) -> bool:
+    """Whether a line says of files what a journal's line does, and leads to none outside of its folder."""
+    if not isinstance(record, dict):
+        return False
+    beside, unfinished = record.get("beside", []), record.get("unfinished", MARK)
+    if not isinstance(beside, list) or not all(isinstance(one, list) and len(one) == 3 for one in beside):
+        return False
+    if not isinstance(unfinished, str) or PurePath(unfinished).name != unfinished:
+        return False
+    return all(
+        _leads_inside(path) for path in (record.get("file"), *(path for one in beside for path in one[:2]))
+    )
+
+
+def tells_all(record: dict) -> bool:
+    """Whether a record of a file that is done has what a report says of it."""
+    kinds = {"hash": str, "versions": dict, "meshes": list, "left_out": list, "notes": list, "seconds": dict}
+    if not all(isinstance(record.get(key), kind) for key, kind in kinds.items()):
+        return False
+    meshes_tell = all(
+        isinstance(mesh, dict) and {"object", "method", "warnings"} <= mesh.keys()
+        for mesh in record["meshes"]
+    )
+    return meshes_tell and {"sinew", "blender"} <= record["versions"].keys()
+
+
+def _leads_inside(path: object) -> bool:
+    if not isinstance(path, str) or not path or "\0" in path:
+        return False
+    pure = PurePath(path)
+    return not pure.is_absolute() and not pure.drive and ".." not in pure.parts
 
 
 def content_hash(path: Path) -> str | None:
@@ -156,24 +193,3 @@ def _stamp(path: Path) -> list[int] | None:
         return stamp(path)
     except OSError:
         return None
-
-
-def _lock(descriptor: int) -> bool:
-    """Locks a file for this process alone; the system unlocks it however the process ends."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        import msvcrt
-
-        # Beyond any journal's end, as Windows lets nobody read what is locked.
-        os.lseek(descriptor, 1 << 40, os.SEEK_SET)
-        try:
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

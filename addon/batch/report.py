@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import json
-import os
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-from ..core.errors import SinewError
-from ..core.output import remove
+from ..core.output import write_text
 
 PICTURES = "report-pictures"
 
@@ -33,24 +31,13 @@ img { max-width: 360px; max-height: 360px; background: #2a2c30; border-radius: 4
 
 def write_report(out: Path, summary: dict, rows: list[dict]) -> Path:
     """Writes both into the folder `out`, beside first and then renamed; the path of report.html."""
-    _write(
+    write_text(
         out / "report.json",
         json.dumps({"summary": summary, "files": rows}, indent=1, ensure_ascii=False),
     )
     path = out / "report.html"
-    _write(path, _page(summary, rows))
+    write_text(path, _page(summary, rows))
     return path
-
-
-def _write(path: Path, text: str) -> None:
-    unfinished = path.with_name(f".{path.name}.unfinished")
-    try:
-        # Names on a disk need not be text: what is not is shown with a ?.
-        unfinished.write_text(text, encoding="utf-8", errors="replace")
-        os.replace(unfinished, path)
-    except OSError as error:
-        remove(unfinished)
-        raise SinewError(f"{path}: can not be written: {error.strerror}") from None
 
 
 def _page(summary: dict, rows: list[dict]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import ipaddress
 import logging
 import threading
 import uuid
@@ -200,8 +201,12 @@ def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Ite
         pool.shutdown(wait=False)
 
 
-def run_in_dask(tasks: Sequence[dict], limits: Limits, scheduler: str) -> Iterator[tuple[dict, dict]]:
+def run_in_dask(
+    tasks: Sequence[dict], limits: Limits, scheduler: str, warn: Callable[[str], None]
+) -> Iterator[tuple[dict, dict]]:
     """The same by the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
+
+    warn  told in one sentence where the cluster is open to others
 
     Raises SinewError where the cluster can not be used.
     """
@@ -211,9 +216,13 @@ def run_in_dask(tasks: Sequence[dict], limits: Limits, scheduler: str) -> Iterat
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_LIMIT)
-    except (OSError, ValueError) as error:
+    except TypeError as error:
+        # Of tls://, with no or half a configuration.
+        raise SinewError(f"{scheduler}: {_sentence(error)}; docs/batch.md has how to set up TLS") from None
+    except (OSError, ValueError, RuntimeError) as error:
         raise SinewError(f"{scheduler}: no dask scheduler answers there: {error}") from None
     with client:
+        _warn_where_open(client.scheduler_info()["address"], warn)
         _check_workers(client, scheduler)
         futures = client.map(do_task, tasks, limits=limits, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
@@ -233,6 +242,24 @@ def _outcome(task: dict, result: Callable[[], dict]) -> dict:
         return result()
     except Exception as error:
         return {"error": f"{task['source']}: {_sentence(error)}"}
+
+
+def _warn_where_open(address: str, warn: Callable[[str], None]) -> None:
+    """address  where the scheduler itself says that it listens: its machine's own, where it does on all"""
+    scheme, _separator, place = address.rpartition("://")
+    host = place.rpartition(":")[0].strip("[]")
+    if scheme != "tls" and not _is_this_machine(host):
+        warn(
+            f"{address}: whoever reaches this scheduler can run programs as you, on its workers and here; "
+            "use TLS, or have it listen on 127.0.0.1 alone (docs/batch.md)"
+        )
+
+
+def _is_this_machine(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _check_workers(client, scheduler: str) -> None:

@@ -12,12 +12,13 @@ import bpy
 class Changes:
     """The data touched since the last update, by session_uid.
 
-    touched    objects and meshes that were touched in any way
+    touched    objects, meshes and shape keys that were touched in any way
     objects    whose geometry was touched
     moved      that were moved
-    gated      whose modifiers rested, which touches their geometry and mesh
-    meshes     whose geometry was touched: points, weights, topology, shape keys
+    meshes     whose own geometry was touched: points, weights, topology, shape keys; not those that only
+               follow their shape keys' animation
     armatures  whose bones may differ
+    edited     the objects themselves that were touched so, and not by a change of frame
     structure  objects may have come, gone or been hidden
     frame      this is a change of frame
     complete   whatever is not listed is as it was at the last update; else all may have changed
@@ -26,9 +27,9 @@ class Changes:
     touched: set[int] = field(default_factory=set)
     objects: set[int] = field(default_factory=set)
     moved: set[int] = field(default_factory=set)
-    gated: set[int] = field(default_factory=set)
     meshes: set[int] = field(default_factory=set)
     armatures: set[int] = field(default_factory=set)
+    edited: list[bpy.types.Object] = field(default_factory=list)
     structure: bool = False
     frame: bool = False
     complete: bool = False
@@ -47,35 +48,57 @@ class Changes:
 
     @staticmethod
     def meshes_in(depsgraph: bpy.types.Depsgraph) -> set[int] | None:
-        """Those whose geometry was touched, by session_uid, without reading all the rest; None where no mesh
-        was touched in any way."""
+        """As `meshes`, without reading all the rest; None where no mesh was touched in any way."""
         if not depsgraph.id_type_updated("MESH"):
             return None
-        return {
-            update.id.original.session_uid
-            for update in depsgraph.updates
-            if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh)
-        }
+        return _touched_meshes(depsgraph.updates)
 
     @classmethod
     def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:
-        changes = cls(frame=frame, complete=complete)
-        for update in depsgraph.updates:
+        updates = depsgraph.updates
+        changes = cls(frame=frame, complete=complete, meshes=_touched_meshes(updates))
+        for update in updates:
             what = update.id
             if isinstance(what, bpy.types.Object):
                 uid = what.original.session_uid
                 changes.touched.add(uid)
                 if update.is_updated_geometry:
                     changes.objects.add(uid)
+                    if not frame:
+                        changes.edited.append(what.original)
                 if update.is_updated_transform:
                     changes.moved.add(uid)
-            elif isinstance(what, bpy.types.Mesh):
-                uid = what.original.session_uid
-                changes.touched.add(uid)
-                if update.is_updated_geometry:
-                    changes.meshes.add(uid)
+            elif isinstance(what, bpy.types.Mesh | bpy.types.Key):
+                changes.touched.add(what.original.session_uid)
             elif isinstance(what, bpy.types.Armature):
                 changes.armatures.add(what.original.session_uid)
             elif isinstance(what, bpy.types.Scene | bpy.types.Collection):
                 changes.structure = True
         return changes
+
+    def add(self, other: Changes) -> None:
+        """Makes these the changes of both evaluations."""
+        self.touched |= other.touched
+        self.objects |= other.objects
+        self.moved |= other.moved
+        self.meshes |= other.meshes
+        self.armatures |= other.armatures
+        self.edited += other.edited
+        self.structure |= other.structure
+        self.complete &= other.complete
+
+
+def _touched_meshes(updates: bpy.types.bpy_prop_collection) -> set[int]:
+    """Shape keys that an animation sets touch the geometry of their mesh, and nothing else of it; so does
+    little that an artist does, and then the keys are not listed (seen on 4.2 and 5.2)."""
+    keys, meshes = set(), []
+    for update in updates:
+        if isinstance(update.id, bpy.types.Key):
+            keys.add(update.id.original.session_uid)
+        elif isinstance(update.id, bpy.types.Mesh) and update.is_updated_geometry:
+            meshes.append((update.id.original, update.is_updated_shading or update.is_updated_transform))
+    return {
+        mesh.session_uid
+        for mesh, whole in meshes
+        if whole or mesh.shape_keys is None or mesh.shape_keys.session_uid not in keys
+    }

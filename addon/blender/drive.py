@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Puts Sinew in the place of an object's Armature modifiers, and takes it away again.
 
-While Sinew is at work, the Armature modifiers stay in the stack, switched off and without their armatures:
-such a pointer alone makes Blender evaluate the mesh and all behind it twice a frame.
+While Sinew is at work, the Armature modifiers stay in the stack, switched off. A saved file is Blender's own:
+there they deform, and Sinew's modifier is off.
 """
 
 from __future__ import annotations
@@ -10,9 +10,13 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from . import animation, front, points, pose_driver, properties, stack
+from . import animation, front, node_group, points, pose_driver, properties, stack
 from .heat import heat_view
 from .stack import armature_modifier, sinew_modifier
+from .updates import updates_suspended
+
+# Tools of this mode look for the armature behind a modifier that is on.
+MODES_FOR_WEIGHTS = {"WEIGHT_PAINT"}
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -62,7 +66,8 @@ def check_can_add(obj: bpy.types.Object) -> None:
 
 
 def add(obj: bpy.types.Object, method: str | None = None) -> None:
-    """Sinew takes over from the Armature modifiers, each with its method where none is given.
+    """Sinew takes over from the Armature modifiers, each with its method where none is given; with the next
+    handlers.refresh() it deforms.
 
     Raises SinewError, and changes nothing, where that can not be done.
     """
@@ -71,6 +76,11 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
             use_one_method(obj, method)
         return
     check_can_add(obj)
+    with updates_suspended():
+        _add(obj, method)
+
+
+def _add(obj: bpy.types.Object, method: str | None) -> None:
     settings = properties.of(obj)
     active = obj.modifiers.active
     if armature_modifier(obj) is None:
@@ -79,6 +89,7 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
     nodes = obj.modifiers.new("Sinew", "NODES")
     nodes.show_expanded = False
     nodes.show_in_editmode = False
+    _show(nodes, False, False)
     # Not the last one where the artist pinned others to the end.
     modifiers = list(obj.modifiers)
     obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[0]))
@@ -86,11 +97,8 @@ def add(obj: bpy.types.Object, method: str | None = None) -> None:
         obj.modifiers.active = active
     settings.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
-    pairs = stand_ins(obj)
-    points.arrange(obj)
-    switch(obj, on=True)
-    # Last, as a change of method deforms the object.
-    for modifier, stand_in in pairs:
+    for modifier, stand_in in stand_ins(obj):
+        stand_in.armature = modifier.object
         if method is None and method_of(modifier) != settings.method:
             stand_in.method = method_of(modifier)
 
@@ -121,7 +129,14 @@ def use_one_method(obj: bpy.types.Object, method: str) -> None:
 
 def remove(obj: bpy.types.Object) -> None:
     """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
+    with updates_suspended():
+        _remove(obj)
+    heat_view.tidy()
+
+
+def _remove(obj: bpy.types.Object) -> None:
     switch(obj, on=False)
+    resume_after_save(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     if settings.heat:
         heat_view.take_off(obj)
@@ -138,16 +153,15 @@ def remove(obj: bpy.types.Object) -> None:
     points.remove(obj)
     animation.remove(obj)
     properties.clear(obj)
-    heat_view.tidy()
 
 
 def switch(obj: bpy.types.Object, on: bool) -> None:
     """On: Sinew deforms. Off: the Armature modifiers do, as they were, and Sinew's modifier rests."""
     settings, nodes = properties.of(obj), sinew_modifier(obj)
+    resume_after_save(obj)
     if on:
-        clear_pointers(obj)
-        if not settings.standing_in:
-            _switch_off(obj)
+        adopt_pointers(obj)
+        _switch_off(obj)
         keyed = any(animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
         shown = [s for s in settings.stand_ins if s.armature is not None]
         viewport, render = (
@@ -158,21 +172,63 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         give_back(obj)
         for modifier in stack.armature_modifiers(obj):
             stand_in = _stand_in(obj, modifier)
-            _show(modifier, stand_in.show_viewport, stand_in.show_render)
+            # What an animation sets was left alone.
+            if not animation.is_visibility_animated(obj, modifier):
+                _show(modifier, stand_in.show_viewport, stand_in.show_render)
         _show(nodes, False, False)
-    settings.standing_in = on
+    properties.store(settings, "standing_in", on)
+
+
+def prepare_for_save(obj: bpy.types.Object) -> bool:
+    """Makes an object as a Blender without Sinew needs it: its Armature modifiers deform, by the shape that
+    is nearest to Sinew's. Whether it was Sinew that deformed it; switch() is the way back."""
+    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    was_on = settings.standing_in
+    if not (was_on or settings.enabled):
+        return False
+    switch(obj, on=False)
+    if nodes is not None and nodes.node_group is not None:
+        node_group.set_inputs(nodes, {node_group.PRESENT: False})
+    for number, (modifier, stand_in) in enumerate(stand_ins(obj)):
+        properties.store(stand_in, "preserve_volume", modifier.use_deform_preserve_volume)
+        method = properties.method_of_link(settings.method, stand_in.method, is_first=number == 0)
+        _preserve_volume(modifier, method == "dq")
+    properties.store(settings, "is_saved", True)
+    return was_on
+
+
+def resume_after_save(obj: bpy.types.Object) -> None:
+    """The Armature modifiers have the artist's own choices again, where a saved file had others."""
+    settings = properties.of(obj)
+    if settings.is_saved:
+        for modifier, stand_in in stand_ins(obj):
+            _preserve_volume(modifier, stand_in.preserve_volume)
+        properties.store(settings, "is_saved", False)
+
+
+def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> None:
+    if modifier.use_deform_preserve_volume != preserve:
+        modifier.use_deform_preserve_volume = preserve
 
 
 def _switch_off(obj: bpy.types.Object) -> None:
-    for modifier in stack.armature_modifiers(obj):
-        stand_in = _stand_in(obj, modifier)
-        stand_in.show_viewport, stand_in.show_render = modifier.show_viewport, modifier.show_render
-        _show(modifier, False, False)
+    """Also those that the artist added or switched on since."""
+    for modifier, stand_in in stand_ins(obj):
+        ours = ((False, False), (stand_in.show_viewport, False))
+        flags = (modifier.show_viewport, modifier.show_render)
+        if not properties.of(obj).standing_in or flags not in ours:
+            properties.store(stand_in, "show_viewport", modifier.show_viewport)
+            properties.store(stand_in, "show_render", modifier.show_render)
+        # What an animation sets it would set again with the next frame, and tells Sinew until then.
+        if not animation.is_visibility_animated(obj, modifier):
+            _show(modifier, stays_beside(obj) and stand_in.show_viewport, False)
 
 
 def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
-    if modifier is not None:
-        modifier.show_viewport, modifier.show_render = viewport, render
+    for name, value in (("show_viewport", viewport), ("show_render", render)):
+        # Setting what is set has Blender evaluate the object, too.
+        if modifier is not None and getattr(modifier, name) != value:
+            setattr(modifier, name, value)
 
 
 def _stand_in(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> properties.SinewStandIn:
@@ -203,11 +259,8 @@ def follow_stack(obj: bpy.types.Object) -> None:
     """Brings Sinew's modifier and what it keeps of the Armature modifiers in line with how the artist moved,
     renamed and deleted modifiers. Each keeps its method; one that no longer follows the first without a gap
     deforms by itself again."""
-    run, nodes, settings = stack.armature_modifiers(obj), sinew_modifier(obj), properties.of(obj)
-    modifiers = list(obj.modifiers)
-    own, first = modifiers.index(nodes), modifiers.index(run[0])
-    if own + 1 != first:
-        obj.modifiers.move(own, first if own > first else first - 1)
+    settings = properties.of(obj)
+    _place_sinew(obj)
     kept = settings.stand_ins
     names = [stand_in.name for _modifier, stand_in in stand_ins(obj)]
     if [stand_in.name for stand_in in kept] == names:
@@ -228,6 +281,26 @@ def follow_stack(obj: bpy.types.Object) -> None:
             kept[name].method = methods[name]
 
 
+def _place_sinew(obj: bpy.types.Object) -> None:
+    """In front of the Armature modifiers in whose place it stands; behind them where they are on beside it,
+    as it moves each vertex to its point whatever came before."""
+    run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
+    own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
+    if stays_beside(obj):
+        if own < last:
+            obj.modifiers.move(own, last)
+    elif own + 1 != first:
+        obj.modifiers.move(own, first if own > first else first - 1)
+
+
+def stays_beside(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifiers stay on in the viewport, in front of Sinew's: tools for weights look
+    there for the bones that deform."""
+    return obj.mode in MODES_FOR_WEIGHTS and not any(
+        animation.is_visibility_animated(obj, modifier) for modifier in stack.armature_modifiers(obj)
+    )
+
+
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:
     """What each Armature modifier that Sinew stands in for blends by, by its name."""
     return {
@@ -244,7 +317,8 @@ def adopt_pointers(obj: bpy.types.Object) -> None:
 
 
 def clear_pointers(obj: bpy.types.Object) -> None:
-    """Clears the Armature modifiers' pointers, which the settings keep."""
+    """Clears the Armature modifiers' pointers, which the settings keep: where Sinew deforms after the
+    evaluation, a pointer alone has Blender evaluate the mesh and all behind it twice a frame."""
     adopt_pointers(obj)
     for modifier in stack.armature_modifiers(obj):
         if modifier.object is not None:
@@ -258,11 +332,20 @@ def give_back_pointers(obj: bpy.types.Object) -> None:
 
 
 def _give_back_pointer(modifier: bpy.types.ArmatureModifier, stand_in: properties.SinewStandIn) -> None:
-    if modifier.object is None and stand_in.armature is not None:
-        modifier.object = stand_in.armature
+    armature = stand_in.armature
+    if armature is not None and is_deleted(armature):
+        modifier.object = None
+    elif modifier.object is None and armature is not None:
+        modifier.object = armature
+
+
+def is_deleted(armature: bpy.types.Object) -> bool:
+    """Whether the user deleted it: that takes an object out of all collections, and Sinew's pointer alone
+    still keeps it in the file."""
+    return armature.library is None and not armature.users_collection
 
 
 def give_back(obj: bpy.types.Object) -> None:
-    """The Armature modifiers point to their armatures again, and nothing else of ours does."""
+    """The Armature modifiers point to their armatures again, and no driver of ours does."""
     give_back_pointers(obj)
     pose_driver.remove(obj)

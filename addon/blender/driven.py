@@ -16,6 +16,7 @@ from ..core.session import Binding, Chain, Link, LinkFrame
 from . import (
     animation,
     armature_io,
+    attach,
     drive,
     mesh_io,
     points,
@@ -28,12 +29,14 @@ from . import (
 )
 from .changes import Changes
 from .modifier_options import ModifierOptions
+from .plan import MODES_OF_THE_MODIFIER, Plan, State
 from .source import Source
+from .updates import is_rendering_in_window
 
-# Tools of these modes work through the Armature modifier, which shows its own shape meanwhile.
-MODES_OF_THE_MODIFIER = {"EDIT", "SCULPT"}
-# Tools of this one look for the armature behind a modifier, to paint by bone.
-MODES_THAT_NEED_THE_POINTER = {"WEIGHT_PAINT"}
+# As often its node group is made again, which another add-on removes.
+MOST_LOSSES = 2
+# As often as Sinew in a row could not deform a mesh within Blender's evaluation, it tries again there.
+MOST_ATTEMPTS = 1
 
 
 @dataclass
@@ -46,16 +49,26 @@ class Driven:
     frames             what decided the last frame
     rest_points        of the last frame
     dirtied_by_frames  the last change of frame moved the object or its rest points
+    modifier           the name of Sinew's
+    name               the object's own, by which an evaluation finds this
+    losses             how often it had lost its node group
     looks              what the artist can change of the object itself
+    plan               who deforms the object; applied to it unless needs_apply
     left_by            what had a small mesh left to its Armature modifiers, as small_meshes.choices(); empty
                        where it is not
-    asking             the driver asks for the points within Blender's evaluation
-    attribute          what holds them there
+    attribute          what holds the points within Blender's evaluation
     mesh_users         how many the mesh has; others could read while it is written
+    is_alone           it has as many now
     answered           the address of the evaluated mesh that was given points in the last evaluation, or 0
-    is_kept            the mesh itself holds the last points too, not only the evaluated one
-    is_suspect         the mesh may have changed since it was read: left to Blender, it is looked at when
-                       somebody asks
+    is_announced       Blender called handlers before the evaluation that goes on, or Sinew itself caused it
+    is_touched         Sinew changed the object since
+    first              the first point that was written last
+    declined           why an evaluation since was not given points; empty where all were
+    refusal            what the user has to see to before it can be
+    attempts           how often in a row that was so
+    failures, failure  how often it failed there, and what failed last
+    is_suspect         the mesh may have changed since it was read: it is looked at with the next event, or
+                       when somebody asks
     lock               held while the chain works: a render may ask from a thread of its own
     shapes             how many have been written
     """
@@ -71,13 +84,25 @@ class Driven:
     frames: list[LinkFrame | None] | None = None
     rest_points: np.ndarray | None = None
     dirtied_by_frames: bool = False
+    modifier: str = ""
+    name: str = ""
+    losses: int = 0
     looks: list = field(default_factory=list)
+    plan: Plan = field(default_factory=lambda: Plan(State.OFF))
+    needs_apply: bool = True
     left_by: list[str] = field(default_factory=list)
-    asking: bool = False
     attribute: str = ""
     mesh_users: int = 0
+    is_alone: bool = True
     answered: int = 0
-    is_kept: bool = True
+    is_announced: bool = True
+    is_touched: bool = False
+    first: bytes | None = None
+    declined: str = ""
+    refusal: SinewError | None = None
+    attempts: int = 0
+    failures: int = 0
+    failure: str = ""
     is_suspect: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
     milliseconds: float = 0.0
@@ -101,16 +126,28 @@ class Driven:
         """Whether a change of frame, whose Changes.meshes_in() these are and which changed nothing else, left
         what the shape is made of as it was. What is left to Blender has its shape in any case."""
         if meshes is None:
-            return True
+            return not self.is_suspect
         if self.is_left:
             self.is_suspect = True
             return True
-        if obj.data.session_uid in meshes:
-            keys = obj.data.shape_keys
-            # Animated ones touch their mesh on each frame.
-            if keys is None or keys.animation_data is None:
-                return False
+        if self.is_suspect or obj.data.session_uid in meshes:
+            return False
         return self.mode == obj.mode and self.looks == _looks(obj)
+
+    def is_attached(self, obj: bpy.types.Object) -> bool:
+        """Whether Sinew's modifier is there, with its node group where that is needed: of what another
+        add-on's handler takes away Blender tells nobody."""
+        modifier = obj.modifiers.get(self.modifier)
+        if self.is_left:
+            return modifier is not None
+        return getattr(modifier, "node_group", None) is not None
+
+    def fail(self, error: Exception) -> None:
+        """Within an evaluation, which could not be given points."""
+        if isinstance(error, SinewError):
+            self.refusal = error
+        self.declined = self.failure = f"{type(error).__name__}: {error}"
+        self.failures += 1
 
     @property
     def is_left(self) -> bool:
@@ -137,69 +174,137 @@ def update(
     Raises SinewError with a sentence for the user where it can not be driven.
     """
     if obj.library is not None:
-        # Blender lets nothing be written in bulk to linked data.
-        raise SinewError(
-            f"{obj.name} is linked from another file: its Armature modifier deforms it; make a library "
-            "override to use Sinew here"
-        )
+        # Its Armature modifier deforms it: that is how its file is saved.
+        return None
+    if driven is not None and driven.refusal is not None:
+        raise driven.refusal
     mode = obj.mode
+    if driven is not None and not driven.is_attached(obj):
+        driven.needs_apply = True
+        nodes = stack.sinew_modifier(obj)
+        driven.losses += nodes is not None and nodes.node_group is None
+        if driven.losses > MOST_LOSSES:
+            raise SinewError(
+                f"{obj.name}: something removes Sinew's node group again and again, another add-on perhaps; "
+                "stop that, then press Rebind"
+            )
+    if driven is not None and driven.name != obj.name:
+        driven.name, driven.declined = obj.name, "it has another name"
     if driven is not None and driven.is_suspect:
         changes.meshes.add(obj.data.session_uid)
         changes.touched.add(obj.data.session_uid)
-    if driven is not None and driven.mode == mode and driven.is_untouched_by(changes):
+    if (
+        driven is not None
+        and driven.mode == mode
+        and not (driven.needs_apply or driven.declined)
+        and driven.is_untouched_by(changes)
+    ):
         return driven
     if mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
-        drive.switch(obj, on=False)
+        attach.apply(obj, attach.plan_of(obj))
         return None
-    answered = driven is not None and driven.is_answered(obj, depsgraph)
-    touched = changes.structure or bool(changes.armatures) or obj.session_uid in changes.objects
-    # What else decides that an object is left comes with no frame.
-    is_left = (answered and driven.is_left and changes.frame) or small_meshes.is_left_to_blender(obj)
-    left_or_taken = driven is not None and is_left != driven.is_left
-    if answered and not (changes.structure or changes.armatures or left_or_taken):
+    answered = driven is not None and not driven.declined and driven.is_answered(obj, depsgraph)
+    if driven is not None and driven.declined:
+        driven.attempts += 1
+    inspect = (
+        driven is None
+        or driven.mode != mode
+        or driven.needs_apply
+        or bool(driven.declined)
+        or changes.structure
+    )
+    keys = obj.data.shape_keys
+    if not inspect and (
+        obj.session_uid in changes.objects
+        or changes.armatures
+        or (keys is not None and keys.session_uid in changes.touched)
+    ):
         # Being asked for points touches the object by itself.
-        touched = _looks(obj) != driven.looks
-        if not touched and driven.mode == mode and obj.data.session_uid not in changes.touched:
-            driven.dirtied_by_frames = False
-            return driven
-    touched = touched or left_or_taken
+        in_depsgraph = driven.plan.state is State.IN_DEPSGRAPH
+        inspect = not (answered or in_depsgraph) or _looks(obj) != driven.looks
+    if not inspect and answered and not changes.armatures and obj.data.session_uid not in changes.touched:
+        driven.dirtied_by_frames = False
+        return driven
+    if inspect and is_rendering_in_window():
+        # Seen to when the render has ended.
+        if driven is None:
+            return None
+        driven.needs_apply, inspect = True, False
+    wanted = before = driven.plan if driven is not None else None
     was_on = properties.of(obj).standing_in
-    if driven is None or touched or driven.mode != mode:
-        _maintain(obj, changes, is_left)
+    if inspect:
+        _check(obj, changes)
+        wanted = attach.plan_of(obj, driven.failure if driven and driven.attempts > MOST_ATTEMPTS else "")
+        attach.apply(obj, wanted)
+    # First of all, as groups are renamed along with bones.
+    bones_changed = driven is not None and _bones_changed(obj, driven, depsgraph, changes)
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
         # What is in another scene stays as it is.
         return None if obj.evaluated_get(depsgraph).is_evaluated else driven
     known, known_source = driven, driven and driven.source
-    driven = _current(obj, driven, depsgraph, changes, touched)
-    driven.left_by = small_meshes.choices(obj) if is_left else []
-    driven.is_suspect = False
-    if touched or not driven.watched:
-        driven.looks = _looks(obj)
+    is_read_later = driven is not None and _is_read_later(obj, driven, depsgraph, changes)
+    driven = _current(obj, driven, depsgraph, changes, inspect, is_read_later, bones_changed)
+    if driven is not known and known is not None:
+        driven.failures, driven.failure, driven.attempts = known.failures, known.failure, known.attempts
+        driven.losses = known.losses
+    driven.is_suspect = is_read_later
+    if inspect or not driven.watched:
+        driven.plan, driven.needs_apply, driven.name, driven.is_touched = wanted, False, obj.name, True
+        driven.left_by = small_meshes.choices(obj) if wanted.state is State.BUILT_IN else []
+        driven.keyed = [animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
+        driven.modifier, driven.looks = stack.sinew_modifier(obj).name, _looks(obj)
         mesh = obj.data.session_uid
-        driven.watched = {obj.session_uid, mesh, _uid(properties.of(obj).front), *driven.armatures}
-        if not is_left:
+        keys = _uid(obj.data.shape_keys)
+        driven.watched = {obj.session_uid, mesh, keys, _uid(properties.of(obj).front), *driven.armatures}
+        if not wanted.uses_builtin:
             hold_pose(obj, driven)
-    if is_left:
-        driven.asking, driven.frames = False, None
-    elif answered and driven is known and driven.source is known_source:
+    is_same = driven is known and driven.source is known_source
+    if driven.is_left:
+        driven.frames = None
+    elif driven.plan.state is State.IN_DEPSGRAPH:
         driven.dirtied_by_frames = False
+        if driven.declined or not is_same or wanted != before:
+            driven.declined, driven.is_touched = "", True
+            # Blender evaluates the object once more, and so asks for its points.
+            obj.update_tag(refresh={"OBJECT"})
     else:
         with driven.lock:
-            _deform(obj, driven, depsgraph, changes, touched)
+            _deform(obj, driven, depsgraph, changes, inspect)
     driven.source.known_key_values = driven.source.key_values
     return driven
+
+
+def _is_read_later(
+    obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether weights are read with the next event only: in a window, while a shape key's slider moves."""
+    return not bpy.app.background and source.is_slider_moved(obj, driven.source, depsgraph, changes)
 
 
 def _looks(obj: bpy.types.Object) -> list:
     """What the artist can change of the object itself that decides how it is driven."""
     settings = properties.of(obj)
-    looks = [settings.standing_in, obj.parent_type, obj.data.session_uid, obj.show_only_shape_key]
+    mesh, keys = obj.data, obj.data.shape_keys
+    looks = [
+        settings.standing_in,
+        obj.parent_type,
+        _uid(obj.parent),
+        mesh.session_uid,
+        mesh.users,
+        obj.show_only_shape_key,
+    ]
+    looks.append(keys is None or keys.use_relative)
+    looks += [armature.mode for armature in settings.armatures]
+    # What an animation sets has no other event.
+    looks += sorted(
+        path for path in animation.animated_paths(obj) if path.startswith(("sinew.", "modifiers"))
+    )
     looks += obj.vertex_groups.keys()
     for modifier in obj.modifiers:
         looks += (modifier.name, modifier.show_viewport, modifier.show_render)
         if modifier.type == "ARMATURE":
-            looks += (modifier.object, *ModifierOptions.values(modifier))
+            looks += (modifier.object, drive.method_of(modifier), *ModifierOptions.values(modifier))
     return looks
 
 
@@ -220,13 +325,10 @@ def _deform(
         reshaped = before is not None and driven.rest_points is not before
         driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
     if differs:
-        points.write(obj, driven.chain.points)
+        points.write(obj, driven.chain.points, driven.source.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
-    elif _are_lost(obj, driven, changes, touched):
-        points.write(obj, driven.chain.points)
-    else:
-        return
-    driven.is_kept = True
+    elif touched and not points.are_written(obj, len(driven.rest_points)):
+        points.write(obj, driven.chain.points, driven.source.points)
 
 
 def bring_up_to_date(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph) -> Driven:
@@ -239,9 +341,9 @@ def bring_up_to_date(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types
         return driven
     current = driven
     if driven.is_suspect:
-        current = _current(obj, driven, depsgraph, Changes(meshes={obj.data.session_uid}), touched=False)
+        current = _current(obj, driven, depsgraph, Changes(meshes={obj.data.session_uid}))
+        current.plan, current.needs_apply, current.is_suspect = driven.plan, driven.needs_apply, False
         current.left_by, current.looks, current.watched = driven.left_by, driven.looks, driven.watched
-        current.is_suspect = False
     with current.lock:
         _shape(obj, current, depsgraph)
     return current
@@ -261,7 +363,7 @@ def _shape(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph
         # settings comes with the next time.
         settings = properties.of(obj)
     frames = _frames(evaluated, settings, armatures, driven, depsgraph.mode)
-    if frames is None or not all(np.isfinite(frame.pose).all() for frame in frames if frame is not None):
+    if frames is None or not _are_finite(frames):
         return None
     driven.frames = frames
     driven.rest_points = source.rest_points(obj, driven.source, depsgraph)
@@ -270,94 +372,85 @@ def _shape(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph
     return differs
 
 
-def _are_lost(obj: bpy.types.Object, driven: Driven, changes: Changes, touched: bool) -> bool:
-    """Whether the evaluated mesh may have other points than those that were given last."""
-    if not driven.is_kept and (not changes.complete or obj.data.session_uid in changes.touched):
-        # It was made anew of the mesh itself.
-        return True
-    return touched and not points.are_written(obj, len(driven.rest_points))
-
-
 def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: Driven) -> None:
-    """Writes the points into an evaluated mesh, while Blender evaluates its object.
+    """Writes the points into an evaluated mesh, while Blender evaluates its object, of evaluated data alone.
 
     Leaves it as it is where something is out of the ordinary: that is for update().
     """
-    obj, settings = evaluated.original, evaluated.sinew
-    if not driven.asking or driven.mode != evaluated.mode or driven.mesh_users != obj.data.users:
+    if driven.plan.state is not State.IN_DEPSGRAPH:
         return
+    settings = evaluated.sinew
     # Evaluated ones, as the driver reads them.
     armatures = [stand_in.armature for stand_in in settings.stand_ins]
-    if len(armatures) != len(driven.chain.links) or None in armatures:
-        return
-    attribute = mesh.attributes.get(driven.attribute)
-    shown = None if attribute is None else mesh_io.points_in(attribute)
-    if shown is None:
-        return
-    with driven.lock:
-        started = time.perf_counter()
-        frames = _frames(evaluated, settings, armatures, driven, "VIEWPORT")
-        if frames is None:
-            return
-        driven.rest_points = source.keyed_points(obj, mesh, driven.source)
-        driven.chain.deform(driven.rest_points, frames, shown)
-        driven.frames, driven.answered, driven.is_kept = frames, mesh.as_pointer(), False
-        driven.dirtied_by_frames = False
+    shown = mesh_io.points_in(mesh, driven.attribute)
+    if driven.mode != evaluated.mode or not driven.is_alone:
+        driven.declined = "its mode, or the users of its mesh, changed"
+    elif len(armatures) != len(driven.chain.links) or None in armatures:
+        driven.declined = "its Armature modifiers changed"
+    elif shown is None or len(shown) != len(driven.source.points):
+        driven.declined = "its mesh changed"
+    else:
+        if not driven.is_announced and driven.first is not None:
+            # Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy,
+            # without the points that were written last.
+            driven.is_suspect |= shown[0].tobytes() != driven.first
+        with driven.lock:
+            _deform_into(shown, evaluated, mesh, driven, armatures)
+            driven.first = shown[0].tobytes()
+
+
+def _deform_into(
+    shown: np.ndarray,
+    evaluated: bpy.types.Object,
+    mesh: bpy.types.Mesh,
+    driven: Driven,
+    armatures: list[bpy.types.Object],
+) -> None:
+    started = time.perf_counter()
+    frames = _frames(evaluated, evaluated.sinew, armatures, driven, "VIEWPORT")
+    rest_points = source.keyed_points(evaluated, mesh, driven.source)
+    if frames is None:
+        # The last shape stays.
+        last = driven.chain.points
+        shown[:] = rest_points if last is None else last
+    else:
+        driven.chain.deform(rest_points, frames, shown)
+        driven.frames, driven.rest_points = frames, rest_points
         driven.shapes += 1
-        driven.milliseconds = 1000.0 * (time.perf_counter() - started)
+    driven.answered, driven.declined, driven.attempts = mesh.as_pointer(), "", 0
+    driven.milliseconds = 1000.0 * (time.perf_counter() - started)
+
+
+def _are_finite(frames: list[LinkFrame | None]) -> bool:
+    return all(np.isfinite(frame.pose).all() for frame in frames if frame is not None)
 
 
 def hold_pose(obj: bpy.types.Object, driven: Driven) -> None:
     """Keeps the poses evaluated even where an armature is hidden, and has Blender ask for the points where it
     can."""
     settings, pairs, mesh = properties.of(obj), drive.stand_ins(obj), obj.data
-    driven.attribute, driven.mesh_users = settings.attribute, mesh.users
-    driven.asking = (
-        bool(settings.attribute)
-        # Its colours are written into the mesh itself, which is evaluated once more for them.
-        and not settings.heat
-        and mesh.users - mesh.use_fake_user == 1
-        and not any(driven.keyed)
-        and all(stand_in.show_viewport == stand_in.show_render for _modifier, stand_in in pairs)
-    )
+    driven.attribute, driven.mesh_users, driven.is_alone = settings.attribute, mesh.users, True
     poses = [
         (stand_in.armature, path)
         for (_modifier, stand_in), link in zip(pairs, driven.chain.links, strict=False)
         if stand_in.armature is not None
         for path in armature_io.paths_to_wait_for(stand_in.armature, link.binding.moving_bones)
     ]
-    pose_driver.ensure(obj, list(dict.fromkeys(poses)), driven.asking)
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), driven.plan.state is State.IN_DEPSGRAPH)
 
 
-def _maintain(obj: bpy.types.Object, changes: Changes, is_left: bool) -> None:
-    """Brings modifiers, pointers and what holds the points in line with what the artist did.
+def _check(obj: bpy.types.Object, changes: Changes) -> None:
+    """Brings what Sinew keeps of the modifiers in line with what the artist did to them.
 
-    Raises SinewError where the modifiers that Sinew works with are gone.
+    Raises SinewError where those that Sinew works with are gone.
     """
     if stack.armature_modifier(obj) is None:
         raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
-    nodes = stack.sinew_modifier(obj)
-    if nodes is None or nodes.node_group is None:
-        raise SinewError(f"{obj.name}: its Sinew modifier was deleted; press Remove, then Add Sinew")
+    # What decides the plan, such as Preserve Volume, is the artist's own.
+    drive.resume_after_save(obj)
     drive.follow_stack(obj)
-    if properties.of(obj).standing_in == is_left:
-        drive.switch(obj, on=not is_left)
-        if is_left:
-            points.put_away(obj)
-    if is_left:
-        drive.adopt_pointers(obj)
-    elif obj.mode in MODES_THAT_NEED_THE_POINTER or _bones_are_edited(obj):
-        drive.adopt_pointers(obj)
-        drive.give_back_pointers(obj)
-    else:
-        drive.clear_pointers(obj)
-    points.arrange(obj)
+    drive.adopt_pointers(obj)
     _check_armatures(obj, changes)
-
-
-def _bones_are_edited(obj: bpy.types.Object) -> bool:
-    """Whether Blender renames groups along with bones."""
-    return any(armature.mode == "EDIT" for armature in properties.of(obj).armatures)
 
 
 def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
@@ -368,8 +461,7 @@ def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
             "Rebind, or Remove"
         )
     for armature in armatures:
-        # Deleting takes an object out of all collections; our pointer alone still keeps it in the file.
-        if changes.structure and armature.library is None and not armature.users_collection:
+        if changes.structure and drive.is_deleted(armature):
             raise SinewError(
                 f"{obj.name}: its armature {armature.name} was deleted, or is in no collection; choose "
                 "another in the Armature modifier and press Rebind, or Remove"
@@ -422,27 +514,34 @@ def _current(
     driven: Driven | None,
     depsgraph: bpy.types.Depsgraph,
     changes: Changes,
-    touched: bool,
+    inspect: bool = False,
+    is_read_later: bool = False,
+    bones_changed: bool = False,
 ) -> Driven:
-    """The object's state, bound anew where its mesh, weights, bones or modifiers changed."""
+    """The object's state, bound anew where its mesh, weights, bones or modifiers changed.
+
+    inspect        the object itself may have changed
+    is_read_later  its mesh may have, too, and is not read now
+    bones_changed  its bones did
+    """
     if driven is None:
         return _bind(obj, depsgraph)
     driven.mode = obj.mode
-    if touched:
+    if inspect:
         pairs = drive.stand_ins(obj)
         armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
         options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]
         if driven.armatures != armatures or driven.options != options:
             return _bind(obj, depsgraph)
-    if _bones_changed(obj, driven, depsgraph, changes):
+    if bones_changed:
         return _bind(obj, depsgraph, driven)
-    if source.has_changed(obj, driven.source, depsgraph, changes, touched):
+    if not is_read_later and source.has_changed(obj, driven.source, depsgraph, changes, inspect):
         return _bind(obj, depsgraph, driven)
     return driven
 
 
-def _uid(armature: bpy.types.Object | None) -> int:
-    return 0 if armature is None else armature.session_uid
+def _uid(data: bpy.types.ID | None) -> int:
+    return 0 if data is None else data.session_uid
 
 
 def _bones_changed(
@@ -455,8 +554,7 @@ def _bones_changed(
             continue
         if armature.data.session_uid in changes.armatures or not known.complete:
             bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-            # Of a mesh that is left to it Blender has renamed them itself.
-            if not driven.is_left:
+            if driven.plan.state is State.AFTER_UPDATE:
                 _follow_renamed_bones(obj, known, bones)
             changed |= not bones.equals(known)
     return changed
@@ -500,7 +598,7 @@ def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgrap
 
 def _follow_renamed_bones(obj: bpy.types.Object, old: Bones, new: Bones) -> None:
     """Blender renames the vertex groups of a renamed bone only where a modifier points to the armature;
-    while Sinew holds the pointer it is ours to do."""
+    where Sinew has cleared the pointer it is ours to do."""
     if not np.array_equal(old.rest, new.rest):
         return
     renamed = {b: a for b, a in zip(old.names, new.names, strict=True) if b != a}

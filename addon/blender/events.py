@@ -11,6 +11,27 @@ import bpy
 IMPORTS_ARE_TOLD = hasattr(bpy.app.handlers, "blend_import_post")
 
 
+# At these others can change meshes while Sinew works.
+_TELLING = (
+    "depsgraph_update_pre",
+    "depsgraph_update_post",
+    "frame_change_pre",
+    "frame_change_post",
+    "save_pre",
+    "save_post",
+)
+
+
+def others_listen() -> bool:
+    """Whether Blender calls others than Sinew while Sinew changes settings or the file is saved."""
+    ours = __package__.rpartition(".")[0]
+    return any(
+        not getattr(function, "__module__", "").startswith(ours)
+        for event in _TELLING
+        for function in getattr(bpy.app.handlers, event)
+    )
+
+
 def hear(event: str, function: Callable) -> None:
     """Has Blender call the function; once, however often this is."""
     functions = getattr(bpy.app.handlers, event)

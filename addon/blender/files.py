@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import SinewError
-from ..core.output import remove
+from ..core.output import remove, writing
 
 IMPORTERS = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
@@ -30,6 +31,10 @@ SEEK_TABLE_MAGIC = 0x8F92EAB1
 SKIPPABLE_HEADER = 8
 # Bytes of the last block of a file that is not compressed: up to Blender 4.5, and since.
 LAST_BLOCK = (24, 32)
+
+
+# What Blender and Python put before the sentence.
+_ABOUT_ERROR = re.compile(r"^((Error|OSError): |\[Errno \d+\] )+")
 
 
 def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> None:
@@ -65,10 +70,9 @@ def save_copy(source: Path, target: Path, name_others: Callable[[], None] = lamb
     unfinished = target.with_name(f".{target.stem}.unfinished.blend")
     save_beside(source, target, unfinished)
     try:
-        name_others()
-        os.replace(unfinished, target)
-    except OSError as error:
-        raise SinewError(f"{target}: can not be written: {error.strerror}") from None
+        with writing(target):
+            name_others()
+            os.replace(unfinished, target)
     finally:
         remove(unfinished)
 
@@ -148,7 +152,7 @@ def _is_compressed(path: Path) -> bool:
 def telling_line(error: Exception) -> str:
     """What was wrong, of all that Blender wrote."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    lines = [line.strip() for line in text.replace("Error: ", "").splitlines()]
+    lines = [_ABOUT_ERROR.sub("", line.strip()) for line in text.splitlines()]
     # Where in its own code Blender was is of no use to whoever reads this.
     lines = [line for line in lines if line and not line.startswith("Location: ")]
     if not lines:

@@ -120,7 +120,8 @@ def _signature(obj: bpy.types.Object) -> str:
     action = animation.action.session_uid if animation is not None and animation.action is not None else 0
     animated = tuple(path for path in animated_paths(obj) if path.startswith("modifiers["))
     modifiers = [_modifier_values(modifier, animated) for modifier in stack.in_front(obj)]
-    return repr((pinned, action, obj.parent_type, modifiers))
+    parent = (obj.parent_type, obj.parent and obj.parent.session_uid, obj.parent_bone)
+    return repr((pinned, action, parent, modifiers))
 
 
 def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) -> list:

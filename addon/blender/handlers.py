@@ -12,12 +12,14 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import drive, driven, events, overrides, points, properties, redraw
+from . import attach, drive, driven, events, note, overrides, points, properties, redraw, stack
 from .changes import Changes
 from .driven import Driven
-from .gate import Gate, is_allowed
+from .gate import Gate
 from .heat import heat_map, heat_view, measures
 from .in_evaluation import Answers
+from .plan import Plan, State
+from .updates import is_rendering_in_window, turn, updates_suspended
 
 log = logging.getLogger("sinew")
 
@@ -30,11 +32,15 @@ class Session:
     objects: list[bpy.types.Object] | None = None
     object_count: int = 0
     driven: dict[int, Driven] = field(default_factory=dict)
+    known: list[tuple[bpy.types.Object, Driven]] = field(default_factory=list)  # of both
     depsgraph: int = 0  # the address of the one last seen
     waiting: set[int] = field(default_factory=set)  # as _waiting()
     gate: Gate = field(default_factory=Gate)
-    updating: bool = False
-    settling: bool = False  # what Sinew itself changed is evaluated, and nothing else
+    missed: Changes | None = None  # of the evaluations that were not reacted to
+    expected: set[int] = field(default_factory=set)  # meshes that Blender touches for a setting of Sinew's
+    was_on: set[int] = field(default_factory=set)  # the objects that Sinew deformed before the file is saved
+    is_saving: bool = False  # Blender writes the file: nothing may change
+    is_late: bool = False  # something waits for the end of a render
     all_left: bool = False  # to Blender, and nothing but what they are told of can change that
 
     @property
@@ -43,22 +49,25 @@ class Session:
         return self.objects == [] and self.object_count == len(bpy.data.objects)
 
     def forget(self) -> None:
+        self.gate.restore()
         self.objects = None
         hear_frames()
         self.depsgraph = 0
         self.waiting = set()
+        self.missed = None
+        self.expected = set()
         self.driven.clear()
+        self.known = []
+        answers.give({})
 
 
 session = Session()
+answers = Answers()
 
 
 def state_of(obj: bpy.types.Object) -> Driven | None:
     """What the panel shows of a driven object; None before its first frame."""
     return session.driven.get(obj.session_uid)
-
-
-answers = Answers(state_of)
 
 
 def states_of(
@@ -82,53 +91,48 @@ def states_of(
 
 def refresh(context: bpy.types.Context) -> None:
     """Deforms all driven objects at the current frame, as after a change of settings."""
-    if session.updating:
-        # Held, or a handler turned an object off: another evaluation now could be from a render's thread.
+    if is_rendering_in_window():
+        # Without waiting for the render's thread, which would make its next frame beside what follows.
+        session.is_late = True
         return
-    session.objects = None
-    depsgraph = context.evaluated_depsgraph_get()
-    _update(depsgraph, Changes())
-    _ignore_frames()
-    # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
-    if bpy.app.background:
-        # Where all is known, only what was just written is new: weights need not be read again for that.
-        with contextlib.nullcontext() if _waiting() else held():
-            context.view_layer.update()
-
-
-@contextlib.contextmanager
-def held() -> Iterator[None]:
-    """Changes and events inside are not looked at before the refresh() that has to follow."""
-    before, session.updating = session.updating, True
-    try:
-        yield
-    finally:
-        session.updating = before
+    with turn() as is_ours:
+        if not is_ours or session.is_saving:
+            # Suspended, or a handler turned an object off: who did that goes on.
+            return
+        session.objects = None
+        for state in session.driven.values():
+            state.needs_apply = True
+        depsgraph = context.evaluated_depsgraph_get()
+        _update(depsgraph, Changes())
+        _ignore_frames()
+        # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
+        if bpy.app.background:
+            # Where all is known, only what was just changed is new: that needs no other look now.
+            with contextlib.nullcontext() if _waiting() else updates_suspended():
+                context.view_layer.update()
 
 
 @contextlib.contextmanager
 def changing(context: bpy.types.Context) -> Iterator[None]:
-    """Settings are changed inside, and all is deformed by them at the end."""
+    """Settings are changed inside, and nothing else; all is deformed by them at the end."""
     # What others changed before is seen apart from it.
     context.evaluated_depsgraph_get()
-    with held():
+    with updates_suspended():
         yield
-    session.settling = True
-    try:
-        refresh(context)
-    finally:
-        session.settling = False
+    for obj in filter(properties.is_driven, bpy.data.objects):
+        _expect_touched(obj)
+    refresh(context)
 
 
 @contextlib.contextmanager
 def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
-    """The same for a file that was opened to be saved so: at the end Sinew is laid down, too. To go on with
-    it, take_up() and refresh().
+    """The same for a file that was opened to be saved so: at the end it is prepared for that, too. To go on
+    with it, resume_after_save().
 
     Blender has the poses from opening the file, and has to evaluate only what was driven before or has
     something in front.
     """
-    with held():
+    with updates_suspended():
         yield
         session.objects = None
         depsgraph, changes = context.view_layer.depsgraph, Changes()
@@ -140,7 +144,7 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
         _update(depsgraph, changes)
         if _waiting():
             _update(context.evaluated_depsgraph_get(), changes)
-        lay_down()
+        prepare_for_save()
 
 
 def _waiting() -> set[int]:
@@ -149,56 +153,58 @@ def _waiting() -> set[int]:
     return {obj.session_uid for obj, settings in driven_now if settings.enabled and settings.standing_in}
 
 
-def lay_down() -> None:
-    """A saved file has the Armature modifiers' pointers: without Sinew they need only switching on."""
-    for obj in bpy.data.objects:
-        if properties.is_driven(obj):
-            keep_shown(obj)
-            drive.give_back(obj)
+def prepare_for_save() -> None:
+    """The file is made one that a Blender without Sinew plays, by the nearest shape that it has."""
+    session.gate.restore()
+    objects = [obj for obj in bpy.data.objects if properties.is_driven(obj) and obj.is_editable]
+    session.was_on = set()
+    for obj in objects:
+        try:
+            if drive.prepare_for_save(obj):
+                session.was_on.add(obj.session_uid)
             overrides.keep(obj)
+        except Exception as error:
+            # The others are in the same file.
+            log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
+    note.write([obj for obj in objects if properties.of(obj).is_saved])
 
 
-def keep_shown(obj: bpy.types.Object) -> None:
-    """What was given to the evaluated mesh alone becomes part of the file."""
-    state, depsgraph = state_of(obj), bpy.context.view_layer.depsgraph
-    if state is not None and not state.is_kept and depsgraph is not None:
-        points.keep_shown(obj, depsgraph)
-        state.is_kept = True
-
-
-def take_up() -> None:
-    """The way back from lay_down()."""
-    for obj in bpy.data.objects:
-        if properties.is_driven(obj) and properties.of(obj).standing_in:
-            drive.clear_pointers(obj)
-            state = state_of(obj)
-            if state is not None:
-                driven.hold_pose(obj, state)
-
-
-def _method_changed(_obj: bpy.types.Object, context: bpy.types.Context) -> None:
+def resume_after_save(context: bpy.types.Context) -> None:
+    """The way back from prepare_for_save()."""
+    note.remove()
+    with updates_suspended():
+        for obj in filter(properties.is_driven, bpy.data.objects):
+            _expect_touched(obj)
+            if obj.is_editable and stack.sinew_modifier(obj) is not None:
+                drive.switch(obj, on=obj.session_uid in session.was_on)
     refresh(context)
+
+
+def _setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    refresh(context)
+    # Blender touches the object's mesh next. In a window that is an evaluation of its own; a script may
+    # change weights before.
+    if not bpy.app.background:
+        _expect_touched(obj)
 
 
 def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     settings = properties.of(obj)
-    drive.switch(obj, settings.enabled)
-    if not settings.enabled:
-        points.put_away(obj)
+    if not settings.enabled and not is_rendering_in_window():
+        attach.apply(obj, attach.plan_of(obj))
     settings.error = ""
-    state = state_of(obj)
-    if settings.enabled and state is not None and settings.armature is not None:
-        driven.hold_pose(obj, state)
-    refresh(context)
+    _setting_changed(obj, context)
 
 
 def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     if not properties.is_driven(obj):
         return
+    if is_rendering_in_window():
+        session.is_late = True
+        return
     if not properties.of(obj).heat:
         heat_view.take_off(obj)
-    points.arrange(obj)
-    refresh(context)
+    _setting_changed(obj, context)
     heat_view.tidy()
 
 
@@ -214,9 +220,20 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 
 def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
-    with held():
+    with updates_suspended():
+        if session.missed is not None:
+            changes.add(session.missed)
+            session.missed = None
+        read_later = _take_expected(changes)
+        _adopt_copied_modifiers(changes)
         for obj in _driven_objects(changes):
             _update_or_turn_off(obj, depsgraph, changes)
+            state = state_of(obj)
+            if state is not None and obj.data.session_uid in read_later:
+                state.is_suspect = True
+        states = [(obj, state_of(obj)) for obj in _driven_objects(Changes())]
+        session.known = [(obj, state) for obj, state in states if state is not None]
+        answers.give({obj.name: state for obj, state in session.known})
         session.all_left = _are_all_left()
         _hear_needed_frames()
         heated = [obj for obj in session.objects or () if properties.of(obj).heat]
@@ -224,9 +241,44 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         redraw.tell()
 
 
+def _adopt_copied_modifiers(changes: Changes) -> None:
+    for obj in changes.edited if not is_rendering_in_window() else ():
+        # It may have been deleted since.
+        with contextlib.suppress(ReferenceError):
+            is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
+            if is_plain and not properties.is_driven(obj) and not properties.is_copy(obj):
+                changes.structure |= attach.adopt_copied_modifier(obj)
+
+
+def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
+    state = state_of(obj)
+    is_named = changes.structure or obj.session_uid in changes.objects or not changes.complete
+    if not is_named and (state is None or state.is_attached(obj)):
+        return False
+    if not obj.is_editable or is_rendering_in_window():
+        return False
+    if not attach.has_lost_modifier(obj):
+        return False
+    # The last shape is worked out where it is asked for: not at each pose.
+    known = (None, None) if state is None else (state.source.points, state.points)
+    attach.follow_removal(obj, *known)
+    session.driven.pop(obj.session_uid, None)
+    session.objects = None
+    return True
+
+
 def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     try:
-        if properties.of(obj).enabled:
+        if _follow_removal(obj, changes):
+            return
+        if not properties.of(obj).enabled:
+            state = state_of(obj)
+            if state is not None:
+                state.plan, state.needs_apply = Plan(State.OFF), True
+            if properties.of(obj).standing_in and obj.is_editable and not is_rendering_in_window():
+                # It was switched off while a window rendered.
+                attach.apply(obj, attach.plan_of(obj))
+        else:
             state = driven.update(obj, state_of(obj), depsgraph, changes)
             if state is None:
                 session.driven.pop(obj.session_uid, None)
@@ -253,6 +305,10 @@ def _driven_objects(changes: Changes) -> list[bpy.types.Object]:
 def _turn_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: Exception) -> None:
     """Hands a failing object back to its Armature modifier, and says why once."""
     session.driven.pop(obj.session_uid, None)
+    if is_rendering_in_window():
+        log.error("%s: %s; the last shape stays until the end of the render", obj.name, error)
+        session.is_late = True
+        return
     settings.enabled = False
     if isinstance(error, SinewError):
         settings.error = str(error)
@@ -298,7 +354,14 @@ def _are_all_answered(depsgraph: bpy.types.Depsgraph) -> bool:
             if state is None:
                 if properties.of(obj).enabled:
                     return False
-            elif not (state.is_answered(obj, depsgraph) and state.is_untouched_by_frame(obj, meshes)):
+            elif state.plan.state is State.OFF:
+                continue
+            elif not (
+                state.is_answered(obj, depsgraph)
+                and state.is_untouched_by_frame(obj, meshes)
+                # Up to Blender 5.1 a modifier without its node group has Sinew asked all the same.
+                and state.is_attached(obj)
+            ):
                 return False
     except ReferenceError:
         # Deleted since the objects were listed.
@@ -330,19 +393,25 @@ def _ignore_frames() -> None:
 
 @persistent
 def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
-    for state in session.driven.values():
-        state.answered = 0
+    for obj, state in session.known:
+        state.answered, state.is_announced, state.is_touched = 0, True, False
+        try:
+            state.is_alone = state.mesh_users == obj.data.users
+        except ReferenceError:
+            # Deleted since the objects were listed.
+            state.is_alone = False
 
 
 @persistent
 def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     before_update(scene, depsgraph)
-    if not any(state.dirtied_by_frames for state in session.driven.values()) or not is_allowed():
+    if not any(state.dirtied_by_frames for state in session.driven.values()) or is_rendering_in_window():
         return
-    for obj in session.objects or ():
-        state = state_of(obj)
-        if state is not None and state.dirtied_by_frames:
-            session.gate.close(obj)
+    with turn() as is_ours, contextlib.suppress(ReferenceError):
+        for obj in session.objects or () if is_ours and not session.is_saving else ():
+            state = state_of(obj)
+            if state is not None and state.dirtied_by_frames:
+                session.gate.suspend(obj)
 
 
 @persistent
@@ -350,15 +419,43 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     if session.all_left and Changes.are_motion_only(depsgraph):
         redraw.tell()
         return
-    gated = session.gate.open()
-    if session.idle or _are_all_answered(depsgraph):
+    with turn() as is_ours:
+        session.gate.restore()
+        if session.idle or _are_all_answered(depsgraph):
+            _end_of_announced()
+            return
+        _react(depsgraph, _read_changes(depsgraph, frame=True), is_ours)
+    _end_of_announced()
+
+
+def _end_of_announced() -> None:
+    """What Blender evaluates from here to the next event is for a handler that changed something."""
+    for _obj, state in session.known:
+        state.is_announced = state.is_touched
+
+
+@persistent
+def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    with turn() as is_ours:
+        if session.idle:
+            if is_ours:
+                _ignore_frames()
+            return
+        _react(depsgraph, _read_changes(depsgraph, frame=False), is_ours)
+        if is_ours:
+            _ignore_frames()
+    _end_of_announced()
+
+
+def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, is_ours: bool) -> None:
+    """To an evaluation. What Sinew itself causes, and what Blender evaluates while it saves, is only noted:
+    it may have listed what others changed, too."""
+    if not is_ours or session.is_saving:
+        if session.missed is None:
+            session.missed = changes
+        else:
+            session.missed.add(changes)
         return
-    changes = _read_changes(depsgraph, frame=True)
-    changes.gated = gated
-    _follow(depsgraph, changes)
-
-
-def _follow(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     _update(depsgraph, changes)
     known, session.waiting = session.waiting, _waiting()
     # What handlers change Blender evaluates without telling of it. Once for each: what is in another scene
@@ -367,32 +464,45 @@ def _follow(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         refresh(bpy.context)
 
 
-@persistent
-def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if session.updating:
-        return
-    if session.idle:
-        _ignore_frames()
-        return
-    changes = _read_changes(depsgraph, frame=False)
-    if session.settling:
-        # Settings touch the meshes. Nobody changed weights, and they take long to read.
-        changes.meshes.clear()
-    _follow(depsgraph, changes)
-    _ignore_frames()
+def _expect_touched(obj: bpy.types.Object) -> None:
+    """The next evaluation lists the object's mesh for what Sinew does itself."""
+    session.expected.add(obj.data.session_uid)
+
+
+def _take_expected(changes: Changes) -> set[int]:
+    """Takes the meshes out of the changes that are listed for what Sinew did. They are returned where
+    somebody else may have changed them in the same moment: then they are read with the next event."""
+    expected, session.expected = changes.meshes & session.expected, set()
+    if changes.frame:
+        return set()
+    changes.meshes -= expected
+    return expected if events.others_listen() or not bpy.app.background else set()
 
 
 @persistent
 def on_data_replaced(*_args: object) -> None:
-    """Undo, redo and loading: every reference is void and the attributes hold other points."""
-    session.forget()
+    """Undo, redo and loading: every reference is void and what holds points has others."""
+    with turn():
+        session.is_saving = False
+        session.forget()
 
 
 @persistent
 def on_loaded(*_args: object) -> None:
-    session.forget()
-    overrides.take_back()
-    refresh(bpy.context)
+    with turn():
+        session.forget()
+        overrides.take_back()
+        note.remove()
+        if not _driven_objects(Changes()):
+            session.all_left = True
+            _ignore_frames()
+            return
+        # This evaluation is the file's first: as the one that Blender makes otherwise it is one of time, too,
+        # or poses that differ from their keys would stay.
+        for obj in bpy.data.objects:
+            if obj.animation_data is not None:
+                obj.update_tag(refresh={"TIME"})
+        refresh(bpy.context)
 
 
 @persistent
@@ -403,20 +513,58 @@ def on_imported(*_args: object) -> None:
 
 @persistent
 def on_save(*_args: object) -> None:
-    if session.updating or session.idle:
-        return
-    # What the artist changed last is looked at now, for what saving changes will not be.
-    bpy.context.evaluated_depsgraph_get()
-    lay_down()
+    """From here to on_saved() nothing of Sinew's changes the file, whatever Blender evaluates for it, such as
+    its thumbnail."""
+    with turn() as is_ours:
+        if is_ours and not session.idle:
+            # What the artist changed last is seen apart from what is changed for the file.
+            bpy.context.evaluated_depsgraph_get()
+            prepare_for_save()
+            session.is_saving = True
 
 
 @persistent
 def on_saved(*_args: object) -> None:
-    if session.updating or session.idle:
-        return
-    take_up()
-    with held():
-        bpy.context.view_layer.update()
+    with turn() as is_ours:
+        if is_ours and session.is_saving:
+            session.is_saving = False
+            resume_after_save(bpy.context)
+
+
+def begin_export() -> None:
+    """From here to end_export() the file is as a saved one, and frames go on without Sinew."""
+    with turn() as is_ours:
+        if is_ours and not (session.idle or session.is_saving):
+            bpy.context.evaluated_depsgraph_get()
+            prepare_for_save()
+            note.remove()
+            session.is_saving = True
+            if not bpy.app.background:
+                # An exporter that fails does not say that it has ended.
+                bpy.app.timers.register(end_export, first_interval=0.0)
+
+
+def end_export() -> None:
+    on_saved()
+
+
+@persistent
+def on_render_end(*_args: object) -> None:
+    """In the render's thread, where it has one: what waited for its end is for the main one."""
+    with turn():
+        session.gate.restore()
+    if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
+        bpy.app.timers.register(_after_render, first_interval=0.05)
+
+
+def _after_render() -> float | None:
+    if is_rendering_in_window():
+        return 0.1
+    late = session.is_late or any(state.needs_apply for state in session.driven.values())
+    session.is_late = False
+    if late:
+        refresh(bpy.context)
+    return None
 
 
 _FRAME_HANDLERS = {"frame_change_pre": before_frame_change, "frame_change_post": on_frame_change}
@@ -432,6 +580,8 @@ _HANDLERS = {
     "save_pre": on_save,
     "save_post": on_saved,
     "save_post_fail": on_saved,
+    "render_complete": on_render_end,
+    "render_cancel": on_render_end,
 }
 if events.IMPORTS_ARE_TOLD:
     _HANDLERS["blend_import_post"] = on_imported
@@ -439,7 +589,7 @@ if events.IMPORTS_ARE_TOLD:
 
 def register() -> None:
     session.forget()
-    properties.listeners.method_changed = _method_changed
+    properties.listeners.method_changed = _setting_changed
     properties.listeners.enabled_changed = _enabled_changed
     properties.listeners.object_asked = answers.object_asked
     properties.listeners.mesh_asked = answers.mesh_asked
@@ -452,6 +602,7 @@ def adopt_open_file() -> None:
     """Takes over the driven objects of a file that was open before Sinew was registered."""
     # While Blender starts, its data is out of reach, and loading the first file takes care of it.
     if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
+        note.remove()
         refresh(bpy.context)
 
 

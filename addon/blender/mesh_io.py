@@ -124,28 +124,41 @@ def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
     return values
 
 
-def read_pinned_points(obj: bpy.types.Object) -> np.ndarray:
-    """float32 [vertices, 3]: the shape key shown alone, as it is stored; the basis where it is muted."""
-    keys = obj.data.shape_keys
-    block = obj.active_shape_key
-    if block is None or block.mute:
-        block = keys.reference_key
-    return _read_key_points(block)
+def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
+    """float32 [vertices, 3]: the shape key shown alone, as it is stored; the basis where it is muted.
+
+    active  its index
+    """
+    block = keys.key_blocks[active] if 0 <= active < len(keys.key_blocks) else keys.reference_key
+    return _read_key_points(keys.reference_key if block.mute else block)
 
 
-def write_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
-    """Stores float32 [vertices, 3] in the point attribute `name`, made where it is missing, and has Blender
-    evaluate the mesh."""
-    store_points(mesh, name, points)
-    mesh.update_tag()
+def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
+    """Stores float32 [vertices, 3] in the point attribute `name`, made where it is missing."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        if attribute is not None:
+            mesh.attributes.remove(attribute)
+        # A new attribute becomes the active one, which is the artist's choice.
+        active = mesh.attributes.active_index
+        attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+        mesh.attributes.active_index = active
+    attribute.data.foreach_set("vector", vectors.ravel())
 
 
-def points_in(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray | None:
-    """The memory of a vector attribute itself, float32 [elements, 3], which Blender then does not share with
-    another mesh; None where it is not in one piece. Valid until the mesh is evaluated again or changed."""
+def points_in(evaluated_mesh: bpy.types.Mesh, name: str) -> np.ndarray | None:
+    """The memory of the evaluated mesh's point attribute `name`, float32 [vertices, 3], which Blender then
+    does not share with another mesh. Valid until the mesh is evaluated again or changed.
+
+    None for a mesh that is not evaluated, without vertices, or without such an attribute of vectors, and
+    where the memory is not in one piece.
+    """
+    attribute = evaluated_mesh.attributes.get(name) if evaluated_mesh.is_evaluated else None
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        return None
     values = attribute.data
     count = len(values)
-    if count == 0:
+    if count == 0 or count != len(evaluated_mesh.vertices):
         return None
     first, last = values[0].as_pointer(), values[count - 1].as_pointer()
     if last - first != (count - 1) * _VECTOR_BYTES:
@@ -154,32 +167,7 @@ def points_in(attribute: bpy.types.FloatVectorAttribute) -> np.ndarray | None:
     return np.frombuffer(numbers, dtype=np.float32).reshape(count, 3)
 
 
-def store_points(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
-    """The same for what the evaluated mesh shows already."""
-    attribute = mesh.attributes.get(name)
-    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
-        if attribute is not None:
-            mesh.attributes.remove(attribute)
-        # A new attribute can push the others' memory elsewhere and become the active one; both are
-        # Blender's own business except the active index, which the artist chose.
-        active = mesh.attributes.active_index
-        attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
-        mesh.attributes.active_index = active
-    attribute.data.foreach_set("vector", points.ravel())
-
-
-def write_points_once(mesh: bpy.types.Mesh, name: str, points: np.ndarray) -> None:
-    """The same, unless it holds these points: writing tells Blender that the mesh changed."""
-    attribute = mesh.attributes.get(name)
-    if attribute is not None and len(attribute.data) == len(points):
-        held = np.empty_like(points)
-        attribute.data.foreach_get("vector", held.ravel())
-        if np.array_equal(held, points):
-            return
-    write_points(mesh, name, points)
-
-
-def remove_points(mesh: bpy.types.Mesh, name: str) -> None:
+def remove_attribute(mesh: bpy.types.Mesh, name: str) -> None:
     attribute = mesh.attributes.get(name)
     if attribute is not None:
         active = mesh.attributes.active_index

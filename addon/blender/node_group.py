@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group "Sinew": moves each vertex to the point that an attribute holds for it."""
+"""The Geometry Nodes group "Sinew": moves each vertex to the point that an attribute or a carrier holds for
+it."""
 
 from __future__ import annotations
 
@@ -8,9 +9,18 @@ import bpy
 # A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
 # where the group finds the points.
 MARK = "sinew_node_group"
-ATTRIBUTE, CARRIER = 6, 2
+ATTRIBUTE, CARRIER = 10, 8
 # An input that no node reads; pose_driver has its driver there.
 POSE = "Pose"
+# An input that is off in saved files: without Sinew the group then says what is missing.
+PRESENT = "Sinew Is There"
+MISSING = (
+    "The extension Sinew deforms this mesh, and is not there. Install it, or leave this modifier off: the "
+    "Armature modifier shows the nearest shape that Blender has."
+)
+
+
+PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
 
 
 def find(kind: int) -> bpy.types.NodeTree | None:
@@ -42,14 +52,16 @@ def remove_unused() -> None:
 def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
     """Gives a Sinew modifier its inputs, by name; those that it has already are left alone, as every change
     makes Blender evaluate the object."""
-    for name, value in values.items():
-        if get_input(modifier, name) == value:
-            continue
+    changed = [name for name, value in values.items() if get_input(modifier, name) != value]
+    for name in changed:
         identifier = _identifier(modifier, name)
         if hasattr(modifier, "properties"):  # Blender 5.2 moved the inputs
-            getattr(modifier.properties.inputs, identifier).value = value
+            getattr(modifier.properties.inputs, identifier).value = values[name]
         else:
-            modifier[identifier] = value
+            modifier[identifier] = values[name]
+    if changed:
+        # An input by itself tells Blender nothing, nor of an object that is to be evaluated first.
+        modifier.node_group = modifier.node_group
 
 
 def get_input(modifier: bpy.types.Modifier, name: str) -> object:
@@ -87,11 +99,13 @@ def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
 def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[MARK] = kind
-    group.is_modifier = True
+    # Blender's menu of modifiers must not offer it: on other objects it does nothing.
+    group.is_modifier = False
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     for socket, (socket_type, description) in inputs.items():
         made = group.interface.new_socket(socket, in_out="INPUT", socket_type=socket_type)
         made.description = description
+        made.hide_in_modifier = True
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     return group
 
@@ -110,6 +124,7 @@ def _make_for_attribute() -> bpy.types.NodeTree:
         {
             "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
             POSE: ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points"),
+            PRESENT: PRESENT_SOCKET,
         },
     )
     source, named, place, remove, result = add_nodes(
@@ -129,7 +144,9 @@ def _make_for_attribute() -> bpy.types.NodeTree:
     # Else a subdivision behind would work it out for each of its vertices, and exports would have it.
     group.links.new(source.outputs["Points"], remove.inputs["Name"])
     group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
-    group.links.new(remove.outputs["Geometry"], result.inputs["Geometry"])
+    group.links.new(
+        _say_what_is_missing(group, source, remove.outputs["Geometry"]), result.inputs["Geometry"]
+    )
     return group
 
 
@@ -143,6 +160,7 @@ def _make_for_carrier() -> bpy.types.NodeTree:
                 "NodeSocketObject",
                 "Object that has the modifiers in front, to be evaluated with this one",
             ),
+            PRESENT: PRESENT_SOCKET,
         },
     )
     source, info, index, position, sample, place, result = add_nodes(
@@ -171,8 +189,33 @@ def _make_for_carrier() -> bpy.types.NodeTree:
     link(source.outputs["Front"], front.inputs["Object"])
     link(place.outputs["Geometry"], choice.inputs["False"])
     link(front.outputs["Geometry"], choice.inputs["True"])
-    link(choice.outputs["Output"], result.inputs["Geometry"])
+    link(_say_what_is_missing(group, source, choice.outputs["Output"]), result.inputs["Geometry"])
     return group
+
+
+def _say_what_is_missing(
+    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """For those who open the file without Sinew: a frame in the node editor and, from Blender 4.3 on, a
+    warning at the modifier. Returns what the group is to give."""
+    frame = group.nodes.new("NodeFrame")
+    frame.label, frame.label_size = MISSING, 20
+    frame.location = (0, 300)
+    if not hasattr(bpy.types, "GeometryNodeWarning"):
+        return geometry
+    missing, warning, choice = add_nodes(
+        group, "FunctionNodeBooleanMath", "GeometryNodeWarning", "GeometryNodeSwitch"
+    )
+    missing.operation, choice.input_type = "NOT", "GEOMETRY"
+    warning.inputs["Message"].default_value = MISSING
+    link = group.links.new
+    link(source.outputs[PRESENT], missing.inputs[0])
+    link(missing.outputs[0], warning.inputs["Show"])
+    # A warning that nothing reads is not evaluated.
+    link(warning.outputs["Show"], choice.inputs["Switch"])
+    link(geometry, choice.inputs["False"])
+    link(geometry, choice.inputs["True"])
+    return choice.outputs["Output"]
 
 
 def same_count(

@@ -10,6 +10,7 @@ import bpy
 from ..core.errors import SinewError
 from . import drive, handlers, properties
 from .inbetween import inbetween, inbetween_bake
+from .updates import is_rendering_in_window
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -44,6 +45,19 @@ def driven_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in targets(context) if properties.is_driven(obj)]
 
 
+def waits_for_render() -> str:
+    """What a button has to wait for, as its thread reads what the button would change; else empty."""
+    return "Wait for the end of the render" if is_rendering_in_window() else ""
+
+
+def can_change(operator: type[bpy.types.Operator]) -> bool:
+    """For poll()."""
+    reason = waits_for_render()
+    if reason:
+        operator.poll_message_set(reason)
+    return not reason
+
+
 def _for_each(
     operator: bpy.types.Operator,
     objects: list[bpy.types.Object],
@@ -74,7 +88,7 @@ class SINEW_OT_add(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if any(not properties.is_driven(obj) for obj in targets(context)):
-            return True
+            return can_change(cls)
         others = drive.not_meshes(context.selected_objects)
         if others:
             cls.poll_message_set(f"{others[0].name} is no mesh: Sinew deforms meshes only")
@@ -94,7 +108,7 @@ class OnDriven:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if driven_targets(context):
-            return True
+            return can_change(cls)
         cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
         return False
 
@@ -144,7 +158,7 @@ class SINEW_OT_bake_inbetweens(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if any(inbetween.is_on(armature) for armature in armatures(context)):
-            return True
+            return can_change(cls)
         cls.poll_message_set("Choose a method for the in-betweens of a selected armature")
         return False
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 import bpy
 
 from ..core import inbetween as core_inbetween
-from . import drive, driven, handlers, operators, properties, small_meshes
+from . import drive, handlers, operators, properties, small_meshes
 from .inbetween import inbetween, inbetween_handlers
+from .plan import ObjectFacts, plan
 from .sidebar import Sidebar, draw_text
 
 
@@ -28,6 +29,11 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
             count = len(meshes) - len(driven)
             label = "Add Sinew" if count == 1 else f"Add Sinew to {count} Meshes"
             layout.operator("sinew.add", text=label, icon="MOD_ARMATURE")
+        waits = operators.waits_for_render()
+        if waits:
+            draw_text(layout, context, f"{waits}: until then nothing can be changed", icon="INFO")
+            layout = layout.column()
+            layout.enabled = False
         for obj in driven:
             box = layout.box()
             _draw_settings(box, context, obj)
@@ -51,11 +57,14 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
     if settings.error:
         draw_text(layout, context, settings.error, icon="ERROR", alert=True)
-    elif settings.enabled and obj.mode in driven.MODES_OF_THE_MODIFIER:
-        draw_text(layout, context, "In this mode the Armature modifier shows its own shape", icon="INFO")
-    elif settings.enabled and state is not None and state.is_left:
-        text = "Small: the Armature modifier has the same shape in less time, and deforms it"
-        draw_text(layout, context, text, icon="INFO")
+    elif settings.enabled:
+        facts = ObjectFacts(is_linked=obj.library is not None, mode=obj.mode)
+        reason = plan(facts).reason or (state.plan.reason if state is not None else "")
+        if reason:
+            draw_text(layout, context, reason, icon="INFO")
+    if state is not None and state.failures:
+        text = f"{state.failures} times not deformed within Blender's evaluation; last: {state.failure}"
+        draw_text(layout, context, text, icon="ERROR")
     layout.prop(settings, "method", text="")
     draw_text(layout, context, properties.METHODS[settings.method].description)
     if len(settings.armatures) > 1 or any(s.method != properties.SAME_METHOD for s in settings.stand_ins):

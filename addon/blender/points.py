@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the deformed points of a driven object are held, for Sinew's modifier to read: in an attribute of its
-mesh, which is faster, or in a carrier."""
+"""Where the deformed points of a driven object are held, for Sinew's modifier to read: in an attribute of the
+evaluated mesh, where Sinew deforms within Blender's evaluation, else in a carrier. In the mesh itself is
+nothing but a place for them, so that no frame of Sinew's touches a mesh."""
 
 from __future__ import annotations
 
@@ -11,92 +12,102 @@ from . import carrier, front, mesh_io, node_group, pose_driver, properties, stac
 from .heat import heat_nodes
 
 ATTRIBUTE = "sinew_points"
-# Beside them, while a heat map is shown: the colour of each vertex.
-COLOURS = "sinew_colours"
 
 
-def arrange(obj: bpy.types.Object) -> None:
-    """Makes what holds the points of a driven object as it is now, and tells Sinew's modifier of it.
+def arrange(obj: bpy.types.Object, in_depsgraph: bool) -> None:
+    """Makes what holds the points of a driven object, and tells Sinew's modifier of it.
 
     Raises SinewError where what stands in front can not be evaluated apart.
     """
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
-    made = front.ensure(obj)
-    # Points in an attribute of the mesh would make Blender evaluate again all that share it, and a comparison
-    # is to leave nothing in it.
-    if made is not None or not obj.data.is_editable or properties.is_copy(obj):
+    if in_depsgraph:
+        front.remove(obj)
+        carrier.remove(obj)
+        _ensure_attribute(obj)
+        kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
+    else:
+        made = front.ensure(obj)
         if settings.attribute:
             remove_attributes(obj)
             settings.attribute = ""
             # It is on an input that a carrier's modifier does not have.
             pose_driver.remove(obj)
-        kind = node_group.CARRIER
-        inputs = {"Points": carrier.ensure(obj), "Front": made}
-    else:
-        carrier.remove(obj)
-        if not settings.attribute:
-            settings.attribute = _free_attribute_name(obj)
-        kind = node_group.ATTRIBUTE
-        inputs = {"Points": settings.attribute}
-    if settings.heat:
-        group = heat_nodes.get_or_make(kind)
-        inputs["Colours"] = _colours_name(settings)
-    else:
-        group = node_group.get_or_make(kind)
+        kind, inputs = node_group.CARRIER, {"Points": carrier.ensure(obj), "Front": made}
+    group = heat_nodes.get_or_make() if settings.heat else node_group.get_or_make(kind)
     if nodes.node_group != group:
         nodes.node_group = group
-    node_group.set_inputs(nodes, inputs)
+        node_group.remove_unused()
+    node_group.set_inputs(nodes, {**inputs, node_group.PRESENT: True})
 
 
-def write(obj: bpy.types.Object, points: np.ndarray) -> None:
-    """Stores float32 [vertices, 3], object space."""
-    settings = properties.of(obj)
-    if settings.carrier is not None:
-        carrier.write(settings.carrier, points)
-    else:
-        mesh_io.write_points(obj.data, settings.attribute, points)
+def _ensure_attribute(obj: bpy.types.Object) -> None:
+    settings, mesh = properties.of(obj), obj.data
+    if not settings.attribute:
+        settings.attribute = _free_attribute_name(mesh)
+    attribute = mesh.attributes.get(settings.attribute)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        # What an evaluation shows that Sinew could not answer.
+        rest = mesh_io.read_points(mesh)
+        mesh_io.write_vectors(mesh, settings.attribute, _told_from(rest, rest))
 
 
-def keep_shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Stores in the mesh itself the points that were given to the evaluated one."""
-    name = properties.of(obj).attribute
-    shown = obj.data.evaluated_get(depsgraph).attributes.get(name) if name else None
-    if shown is not None and len(shown.data) == len(obj.data.vertices):
-        points = np.empty((len(shown.data), 3), dtype=np.float32)
-        shown.data.foreach_get("vector", points.ravel())
-        mesh_io.store_points(obj.data, name, points)
+def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
+    """Stores float32 [vertices, 3], object space, in the carrier, and has Blender evaluate it.
+
+    rest  the points as the mesh comes with them
+    """
+    carrier.write(properties.of(obj).carrier, _told_from(points, rest))
 
 
 def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
-    """Stores float32 [vertices, 3], linear."""
-    settings = properties.of(obj)
-    mesh_io.write_points(_holding_mesh(obj), _colours_name(settings), colours)
+    """Stores float32 [vertices, 3], linear, in the carrier, and has Blender evaluate it."""
+    mesh = properties.of(obj).carrier.data
+    mesh_io.write_vectors(mesh, heat_nodes.COLOURS, colours)
+    mesh.update_tag()
 
 
 def has_colours(obj: bpy.types.Object) -> bool:
-    return _colours_name(properties.of(obj)) in _holding_mesh(obj).attributes
+    carrier = properties.of(obj).carrier
+    return carrier is not None and heat_nodes.COLOURS in carrier.data.attributes
 
 
 def remove_colours(obj: bpy.types.Object) -> None:
-    mesh_io.remove_points(_holding_mesh(obj), _colours_name(properties.of(obj)))
-
-
-def _holding_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
-    carrier = properties.of(obj).carrier
-    return obj.data if carrier is None else carrier.data
-
-
-def _colours_name(settings: properties.SinewSettings) -> str:
-    return settings.attribute.replace(ATTRIBUTE, COLOURS) or COLOURS
+    if has_colours(obj):
+        mesh_io.remove_attribute(properties.of(obj).carrier.data, heat_nodes.COLOURS)
 
 
 def are_written(obj: bpy.types.Object, count: int) -> bool:
-    """Whether points of as many vertices are held."""
-    settings = properties.of(obj)
-    if settings.carrier is not None:
-        return len(settings.carrier.data.vertices) == count
-    attribute = obj.data.attributes.get(settings.attribute)
-    return attribute is not None and len(attribute.data) == count
+    """Whether the carrier holds points of as many vertices."""
+    carrier = properties.of(obj).carrier
+    return carrier is not None and len(carrier.data.vertices) == count
+
+
+def are_in_mesh(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> bool:
+    """Whether a mesh that has lost Sinew's modifier has its shape itself, as the modifier was applied: then
+    the attribute is gone, too.
+
+    rest, shown  float32 [vertices, 3], points as they were bound and as they were last; None where unknown
+    """
+    settings, own = properties.of(obj), mesh_io.read_points(obj.data)
+    if not settings.standing_in:
+        return False
+    if settings.carrier is None:
+        is_gone = bool(settings.attribute) and settings.attribute not in obj.data.attributes
+        return is_gone and (shown is None or np.array_equal(shown, own))
+    if rest is None or np.array_equal(rest, own):
+        return False
+    return np.array_equal(mesh_io.read_points(settings.carrier.data), own)
+
+
+def _told_from(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """The points; where they are the rest points to the last bit, one of them off by a rounding. So a mesh
+    that Sinew's modifier was applied to is told from one that it was deleted from, and points that Sinew
+    wrote from those that a mesh comes with."""
+    if not np.array_equal(points, rest):
+        return points
+    other = points.copy()
+    other[:1] = np.nextafter(other[:1], np.inf)
+    return other
 
 
 def put_away(obj: bpy.types.Object) -> None:
@@ -104,59 +115,44 @@ def put_away(obj: bpy.types.Object) -> None:
     and exports would have them."""
     if not obj.data.is_editmode:
         remove_attributes(obj)
+        if properties.of(obj).attribute:
+            properties.of(obj).attribute = ""
 
 
 def remove(obj: bpy.types.Object) -> None:
     """Takes away all that held points."""
     front.remove(obj)
     carrier.remove(obj)
-    remove_attributes(obj)
+    put_away(obj)
 
 
 def separate(objects: list[bpy.types.Object]) -> None:
-    """Gives each driven object points of its own where two share them, as copies of an object do."""
-    taken: set[tuple[str, str]] = set()
+    """Gives each driven object a carrier and a front of its own where two share them, as copies of an object
+    do: arrange() makes them."""
+    taken: set[str] = set()
     for obj in objects:
         settings = properties.of(obj)
-        held = {
-            ("carrier", settings.carrier.name_full)
-            if settings.carrier
-            else (obj.data.name_full, settings.attribute)
-        }
-        if settings.front is not None:
-            held.add(("front", settings.front.name_full))
+        held = {helper.name_full for helper in (settings.carrier, settings.front) if helper is not None}
         if held & taken and obj.is_editable:
             settings.carrier = settings.front = None
-            settings.attribute = settings.front_signature = ""
-            arrange(obj)
+            settings.front_signature = ""
         taken |= held
 
 
-def _free_attribute_name(obj: bpy.types.Object) -> str:
-    used = _attributes_of_others(obj) | {attribute.name for attribute in obj.data.attributes}
+def _free_attribute_name(mesh: bpy.types.Mesh) -> str:
     name, number = ATTRIBUTE, 0
-    while name in used:
+    while name in mesh.attributes:
         number += 1
         name = f"{ATTRIBUTE}.{number:03d}"
     return name
 
 
-def _attributes_of_others(obj: bpy.types.Object) -> set[str]:
-    """The attributes that the mesh's other driven users hold their points and colours in."""
-    others = [
-        properties.of(other)
-        for other in bpy.data.objects
-        if other != obj and properties.is_driven(other) and other.data == obj.data
-    ]
-    return {name for settings in others for name in (settings.attribute, _colours_name(settings))}
-
-
 def remove_attributes(obj: bpy.types.Object) -> None:
-    """Takes all attributes of ours off the mesh but those of its other users: a mesh that was copied with
-    its object's settings can have more than one."""
-    if not obj.data.is_editable:
+    """Takes all attributes of ours off the mesh: one that was copied, or saved by an earlier Sinew, can have
+    more than one."""
+    mesh = obj.data
+    if not mesh.is_editable:
         return
-    used = _attributes_of_others(obj)
-    for name in [attribute.name for attribute in obj.data.attributes]:
-        if name.startswith((ATTRIBUTE, COLOURS)) and name not in used:
-            mesh_io.remove_points(obj.data, name)
+    for name in [attribute.name for attribute in mesh.attributes]:
+        if name.startswith((ATTRIBUTE, heat_nodes.COLOURS)):
+            mesh_io.remove_attribute(mesh, name)

@@ -67,7 +67,9 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         variables += [_Variable(obj, ASK_FOR_OBJECT), _Variable(obj.data, ASK_FOR_MESH)]
     curve = _find(obj)
     if curve is not None:
-        if curve.data_path == path and _reads(curve.driver, variables):
+        # One that failed once, as while its modifier had no node group, Blender does not evaluate again.
+        is_valid = curve.is_valid and curve.driver.is_valid
+        if curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)
     driver = obj.driver_add(path).driver
@@ -108,10 +110,14 @@ def remove_empty_animation(obj: bpy.types.Object) -> None:
 
 
 def _find(obj: bpy.types.Object) -> bpy.types.FCurve | None:
-    """Known by its variables, as its path is that of a modifier which may have gone."""
+    """Known by what its last variables read, as its path is that of a modifier which may have gone."""
     animation = obj.animation_data
     for curve in animation.drivers if animation is not None else ():
-        variables = curve.driver.variables
-        if curve.data_path == PATH or (len(variables) and variables[0].name.startswith(_PREFIX)):
+        if curve.data_path == PATH or _asks(curve.driver):
             return curve
     return None
+
+
+def _asks(driver: bpy.types.Driver) -> bool:
+    asked = [variable.targets[0].data_path for variable in list(driver.variables)[-2:]]
+    return asked == [ASK_FOR_OBJECT, ASK_FOR_MESH]

@@ -92,6 +92,11 @@ class SinewStandIn(bpy.types.PropertyGroup):
     # The Armature modifier's own flags, given back on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    preserve_volume: bpy.props.BoolProperty(
+        description="The Armature modifier's own choice, while a saved file has the one nearest to Sinew's",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     method: bpy.props.EnumProperty(
         name="Method",
         description="How this modifier blends, where several chained Armature modifiers deform the mesh",
@@ -152,6 +157,11 @@ class SinewSettings(bpy.types.PropertyGroup):
     standing_in: bpy.props.BoolProperty(
         description="The Armature modifiers are switched off for Sinew's; not so while some of Blender's "
         "tools need them",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    is_saved: bpy.props.BoolProperty(
+        description="As saved files have it: the Armature modifiers deform, by their nearest shape",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
@@ -237,6 +247,13 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
                 target[name] = next(i.value for i in prop.enum_items if i.identifier == getattr(source, name))
             else:
                 setattr(target, name, getattr(source, name))
+
+
+def store(group: bpy.types.PropertyGroup, name: str, value: bool) -> None:
+    """Sets what Sinew keeps for itself: telling Blender would touch the object's mesh, as its weights' change
+    does."""
+    if getattr(group, name) != value:
+        group[name] = value
 
 
 def clear(obj: bpy.types.Object) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import gate
+from .updates import is_rendering_in_window
 
 # A panel that shows numbers was drawn since they last changed: it is open.
 wanted = False
@@ -14,7 +14,7 @@ wanted = False
 def tell() -> None:
     """The numbers have changed."""
     global wanted
-    if not wanted or not gate.is_allowed():
+    if not wanted or is_rendering_in_window():
         return
     wanted = False
     for window in bpy.context.window_manager.windows:

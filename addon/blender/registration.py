@@ -20,14 +20,16 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from . import handlers, operators, panels, properties
+    from . import exporters, handlers, operators, panels, preferences, properties
     from .bake import bake_operator
     from .comparison import comparison_labels, comparison_operators, comparison_panel, comparison_state
     from .diagnostics import diagnostics_panel
     from .heat import heat_panel, measures
     from .inbetween import inbetween_handlers
 
-    _register_classes((*properties.CLASSES, *measures.CLASSES, *operators.CLASSES, *panels.CLASSES))
+    _register_classes(
+        (*preferences.CLASSES, *properties.CLASSES, *measures.CLASSES, *operators.CLASSES, *panels.CLASSES)
+    )
     _register_classes(bake_operator.CLASSES)
     _register_classes((*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES))
     _register_classes((*heat_panel.CLASSES, *diagnostics_panel.CLASSES))
@@ -45,6 +47,7 @@ def register() -> None:
     inbetween_handlers.register()
     inbetween_handlers.adopt_open_file()
     handlers.register()
+    exporters.register()
     diagnostics_panel.register()
     handlers.adopt_open_file()
     # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
@@ -54,7 +57,7 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from . import drive, handlers, properties
+        from . import exporters, handlers, note, properties
         from .comparison import comparison_labels
         from .diagnostics import diagnostics_panel
         from .heat import heat_legend, measures
@@ -64,11 +67,10 @@ def unregister() -> None:
         comparison_labels.unregister()
         diagnostics_panel.unregister()
         heat_legend.show(False)
-        # As in a saved file: the last shape stays, and the Armature modifiers point to their armatures again.
-        for obj in bpy.data.objects:
-            if properties.is_driven(obj):
-                handlers.keep_shown(obj)
-                drive.give_back(obj)
+        # As in a saved file: the Armature modifiers deform.
+        handlers.prepare_for_save()
+        note.remove()
+        exporters.unregister()
         handlers.unregister()
         inbetween_handlers.unregister()
         measures.unregister()

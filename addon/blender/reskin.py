@@ -21,6 +21,7 @@ from . import drive, evaluate, files, handlers, properties, stack
 from .bake import bake_copy
 from .comparison import comparison
 from .pages import render
+from .updates import updates_suspended
 
 # Twice what the report shows them at.
 PICTURE_SIZE = 720
@@ -61,7 +62,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         driven, left_out = _drive(_meant(settings, source), settings)
     if not driven:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
-    with clock.doing("saving"), handlers.held():
+    with clock.doing("saving"), updates_suspended():
         files.save_beside(source, Path(task["target"]), Path(task["unfinished"]))
     outcome = {
         "meshes": [mesh for _obj, mesh in driven],
@@ -225,7 +226,7 @@ def _compare(task: dict, driven: list[tuple[bpy.types.Object, dict]], outcome: d
         return
     objects = [obj for obj, _mesh in shown]
     with clock.doing("comparing"):
-        handlers.take_up()
+        handlers.resume_after_save(bpy.context)
         evaluate.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]

@@ -78,7 +78,7 @@ def has_changed(
     if helper is not None:
         mesh = front.evaluated_mesh(obj, depsgraph)
         evaluated = helper.session_uid in changes.objects
-        if len(mesh.vertices) != len(source.points):
+        if len(mesh.vertices) != len(source.points) or obj.data.session_uid in changes.meshes:
             return True
         return evaluated and (not changes.frame or front.changes_weights(obj))
     mesh, keys, known = obj.data, obj.data.shape_keys, source.shape_keys
@@ -86,19 +86,20 @@ def has_changed(
         return True
     if keys is not None and tuple(block.name for block in keys.key_blocks) != known.names:
         return True
-    if mesh.session_uid not in changes.meshes:
-        return False
-    # An object that an animation moves dirties its mesh, and weights take long to read.
-    if changes.frame and obj.session_uid in changes.moved | changes.gated:
-        return False
-    if keys is None:
-        return True
-    # Shape keys dirty the mesh whenever one moves, and weights do not change by that: reading them again on
-    # every step of a slider or every frame of an animation would cost more than the frame.
-    if changes.frame and keys.animation_data is not None:
+    return mesh.session_uid in changes.meshes
+
+
+def is_slider_moved(
+    obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether the values of shape keys differ from those known: setting one touches the mesh as a change of
+    weights does, and reading them at each step of a slider would cost more than the frame."""
+    keys = obj.data.shape_keys
+    if keys is None or source.from_front or obj.data.session_uid not in changes.meshes:
         return False
     values = mesh_io.read_key_values(keys.evaluated_get(depsgraph))
-    return np.array_equal(values, source.known_key_values)
+    known = source.known_key_values
+    return known is not None and not np.array_equal(values, known)
 
 
 def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
@@ -111,19 +112,19 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
         if not np.array_equal(points, source.points):
             source.points = points
         return source.points
-    return keyed_points(obj, obj.data.evaluated_get(depsgraph), source)
+    return keyed_points(obj.evaluated_get(depsgraph), obj.data.evaluated_get(depsgraph), source)
 
 
-def keyed_points(obj: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
-    """The same for a source that is the mesh itself."""
+def keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
+    """The same for a source that is the mesh itself; from evaluated data alone."""
     if source.shape_keys is None:
         return source.points
     values = mesh_io.read_key_values(evaluated_mesh.shape_keys)
     if source.mixed_points is None or not np.array_equal(values, source.key_values):
         source.key_values = values
         source.mixed_points = source.shape_keys.mix(values)
-    if obj.show_only_shape_key:
-        pinned = mesh_io.read_pinned_points(obj)
+    if evaluated.show_only_shape_key:
+        pinned = mesh_io.read_pinned_points(evaluated_mesh.shape_keys, evaluated.active_shape_key_index)
         if not np.array_equal(pinned, source.mixed_points):
             source.mixed_points = pinned
             # Whatever the values are, leaving the pin mixes again.

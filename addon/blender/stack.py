@@ -52,7 +52,19 @@ def _start(obj: bpy.types.Object) -> int:
     start = next(known, behind_own)
     # Renamed, or new: between our own modifier and the first that is known.
     between = modifiers[behind_own:start]
-    return behind_own if all(m.type == "ARMATURE" for m in between) and between else start
+    if between and all(m.type == "ARMATURE" for m in between):
+        start = behind_own
+    # New, right in front of ours or of the first.
+    ahead = min(start, len(modifiers)) - 1
+    if ahead >= 0 and modifiers[ahead] == sinew_modifier(obj):
+        ahead -= 1
+    while ahead >= 0 and _deforms(modifiers[ahead]):
+        start, ahead = ahead, ahead - 1
+    return start
+
+
+def _deforms(modifier: bpy.types.Modifier) -> bool:
+    return modifier.type == "ARMATURE" and modifier.object is not None and is_on(modifier)
 
 
 def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:

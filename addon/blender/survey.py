@@ -9,7 +9,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.rig import RigFacts, Weighting, describe_rig
 from ..core.spaces import transformed
-from . import armature_io, drive, mesh_io, properties, stack
+from . import armature_io, drive, group_uses, mesh_io, properties, stack
 from .modifier_options import ModifierOptions, differences
 
 
@@ -27,7 +27,9 @@ def describe(
     space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     if space is not None and weighting.depends_on_points:
         points = transformed(points, space)
-    facts = describe_rig(weighting, points, [group.name for group in obj.vertex_groups])
+    boneless = weighting.bones.without_one([group.name for group in obj.vertex_groups])
+    masks = group_uses.used(obj, boneless)
+    facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
     return facts.with_warnings(differences(obj))
 
 

@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 import argparse
-import signal
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..batch.inputs import Job, plan_jobs
+from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..prepare import leave_blender
+from ..core.output import folder_to_write
 from .console import Console
 from .outcome import Outcome
 
@@ -44,7 +44,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
     parser.add_argument("--step", type=int, default=1, metavar="N", help="every Nth of the frames")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for what is written")
+    parser.add_argument(
+        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace what is there already")
     return parser
 
@@ -91,7 +93,7 @@ def _bake(
     import bpy
 
     from ..blender import drive, evaluate, files
-    from ..blender.bake import bake
+    from ..blender.bake import bake, bake_apart
 
     source, target = outcome.job.source, outcome.job.target
     if target.exists() and not args.overwrite:
@@ -118,15 +120,17 @@ def _bake(
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
         is_export = args.to in EXPORTS
+        # An exporter takes all frames in one call, that nothing stops, and can crash where a disk is full.
+        shares = bake_apart.sample(started) if is_export else started.sample()
         with (
             _whole_or_nothing(started, source),
             console.bar(what, len(chosen)) as show,
-            _ended_by_interrupt(started, console) if is_export else nullcontext(),
+            closing(shares),
         ):
-            if is_export:
-                started.told = show
-            for share in started.sample():
+            for share in shares:
                 show(share)
+                interrupt.check()
+            show(1.0)
     with _whole_or_nothing(started, source):
         started.place()
         if is_export:
@@ -145,20 +149,3 @@ def _whole_or_nothing(started, source: Path) -> Iterator[None]:
         if isinstance(error, SinewError):
             raise SinewError(f"{source}: {error}") from None
         raise
-
-
-@contextmanager
-def _ended_by_interrupt(started, console: Console) -> Iterator[None]:
-    """An exporter takes all frames in one call, which drops a KeyboardInterrupt: the process ends there."""
-
-    def on_interrupt(_signal: int, _frame: object) -> None:
-        started.discard()
-        console.close()
-        console.complain("stopped")
-        leave_blender(130)
-
-    before = signal.signal(signal.SIGINT, on_interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

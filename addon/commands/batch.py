@@ -16,12 +16,14 @@ from pathlib import Path
 
 from ..batch.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..batch.job_file import JobFile, Settings, read_job_file
-from ..batch.journal import Journal
+from ..batch.journal import Journal, tells_all
 from ..batch.report import PICTURES, write_report
 from ..batch.workers import run_here, run_in_dask, run_on_this_machine
 from ..blender_process import Limits
 from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
+from ..core.output import folder_to_write, writing
+from .arguments import count, seconds
 from .console import Console
 
 
@@ -51,7 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a file, a folder (all .blend files below it), a pattern such as 'chars/**/*.blend', or - for a "
         "list of paths on standard input",
     )
-    parser.add_argument("--out", metavar="DIR", help="folder for copies, journal and report")
+    parser.add_argument(
+        "--out", type=folder_to_write, metavar="DIR", help="folder for copies, journal and report"
+    )
     parser.add_argument(
         "--include",
         action="append",
@@ -61,11 +65,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--exclude", action="append", metavar="NAME", help="but not these")
     parser.add_argument("--resume", action="store_true", help="do only what is missing or has changed")
     parser.add_argument("--overwrite", action="store_true", help="replace copies that are there already")
-    parser.add_argument("--jobs", type=_count, metavar="N", help="Blenders at a time (default: one a core)")
+    parser.add_argument("--jobs", type=count, metavar="N", help="Blenders at a time (default: one a core)")
     parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="work on this dask cluster instead")
     parser.add_argument(
         "--timeout",
-        type=_seconds,
+        type=seconds,
         metavar="SECONDS",
         help="how long one file may take (default: 1800; 0: any time)",
     )
@@ -80,13 +84,13 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     """Exit status: 0 all went well, 1 something failed or was left as it was."""
     job_file = read_job_file(Path(action.job), action.methods) if action.job else JobFile()
     inputs = args.inputs or job_file.inputs
-    out = args.out or job_file.out
+    out = args.out or (job_file.out and folder_to_write(job_file.out))
     if not inputs:
         raise WrongUse("no input: name files, folders or patterns, or - for a list on standard input")
     if out is None:
         raise WrongUse("no --out: name a folder for the copies")
     out = Path(os.path.abspath(out))
-    jobs = plan_jobs(inputs, out, sys.stdin if STANDARD_INPUT in inputs else ())
+    jobs = plan_jobs(inputs, out, _lines_given() if STANDARD_INPUT in inputs else ())
     given = Settings(
         include=tuple(args.include) if args.include else None,
         exclude=tuple(args.exclude) if args.exclude else None,
@@ -157,7 +161,7 @@ class _Workers:
     """Who does the work; checked before anything is done."""
 
     def __init__(self, args: argparse.Namespace, files: int, console: Console) -> None:
-        self._args = args
+        self._args, self._console = args, console
         bpy = sys.modules.get("bpy")
         self._inside_blender = bpy is not None and bool(bpy.app.binary_path)
         if self._inside_blender:
@@ -187,7 +191,7 @@ class _Workers:
                 prepare_blender()
             return run_here(tasks, lambda task, _limits: worker.run(task, lambda _doing: None), _versions)
         if self._args.scheduler is not None:
-            return run_in_dask(tasks, self._limits, self._args.scheduler)
+            return run_in_dask(tasks, self._limits, self._args.scheduler, self._console.complain)
         return run_on_this_machine(tasks, self._limits, self._jobs)
 
     def _memory(self, text: str | None) -> int:
@@ -200,9 +204,17 @@ class _Workers:
         import dask.utils
 
         try:
-            return dask.utils.parse_bytes(text)
-        except ValueError:
-            raise WrongUse(f"--memory: expected a size such as 4GiB, got {text!r}") from None
+            size = dask.utils.parse_bytes(text) if text else -1
+        except (ValueError, OverflowError):
+            size = -1
+        if size < 0:
+            raise WrongUse(f"--memory: expected a size such as 4GiB, got {text!r}")
+        return size
+
+
+def _lines_given() -> Iterator[str]:
+    """Of standard input, where a path need not be text."""
+    return map(os.fsdecode, sys.stdin.buffer)
 
 
 def _processors() -> int:
@@ -251,7 +263,7 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
         )
     same = ("command", "source", "settings")
     stands = args.resume and is_ours and "error" not in record and journal.holds_all(job.target, record)
-    if stands and all(record[k] == task[k] for k in same):
+    if stands and tells_all(record) and all(record.get(k) == task[k] for k in same):
         return {"hash": record["hash"], "versions": record["versions"]}
     return None
 
@@ -272,9 +284,10 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
         return record
     journal.record(target, record)
     try:
-        journal.finish(target, record)
-    except OSError as error:
-        record["error"] = f"{target}: can not be written: {error.strerror}"
+        with writing(target):
+            journal.finish(target, record)
+    except SinewError as error:
+        record["error"] = str(error)
         _record_failure(journal, target, record, before)
     return record
 
@@ -347,17 +360,3 @@ def _reason(row: dict) -> str:
     if "error" in row:
         return row["error"].removeprefix(f"{row['source']}: ")
     return f"left as they were: {'; '.join(row['left_out'])}"
-
-
-def _count(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"expected at least 1, got {number}")
-    return number
-
-
-def _seconds(text: str) -> float:
-    number = float(text)
-    if not 0 <= number < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected 0 or more, got {text}")
-    return number

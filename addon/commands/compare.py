@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +11,10 @@ from ..core.comparison import Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..core.output import check_folder, write_text
+from ..core.names import as_file_name
+from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page
+from ..core.scratch import scratch_folder
 from ..core.sheet import require_pillow
 from . import sheet
 from .console import Console
@@ -70,8 +71,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         default="auto",
         help="auto: Workbench, or Cycles where there is no OpenGL",
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="a folder, or SHEET.png")
+    parser.add_argument(
+        "--out", required=True, type=_folder_or_sheet, metavar="DIR", help="a folder, or SHEET.png"
+    )
     return parser
+
+
+def _folder_or_sheet(given: str) -> Path:
+    is_sheet = Path(given).suffix.lower() in sheet.PICTURES
+    return file_to_write(given, (".png",)) if is_sheet else folder_to_write(given)
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -89,7 +97,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
         if getattr(args, option) < 0:
             raise WrongUse(f"{option}: expected 0 or more, got {getattr(args, option)}")
     _check_names(args.files)
-    check_folder(args.out)
     if args.video:
         require_pillow()
         video.check_can_encode()
@@ -137,7 +144,7 @@ def _compare(
         console.complain(f"{path}: left out: {reason}")
     subject = measure.gather(scene, meshes)
     comparison = _measure(path, subject, methods, frames, args, console)
-    folder = args.out / path.stem
+    folder = args.out / as_file_name(path.stem)
     write_text(folder / "metrics.csv", comparison.to_csv())
     write_text(folder / "metrics.json", comparison.to_json())
     sheets = []
@@ -164,8 +171,8 @@ def _write_video(
     from ..blender.pages import illustrate, video
 
     render = subject.scene.render
-    with tempfile.TemporaryDirectory() as folder:
-        pictures = illustrate.film(subject, comparison, studio, Path(folder))
+    with scratch_folder() as folder:
+        pictures = illustrate.film(subject, comparison, studio, folder)
         count = len(comparison.frames)
         filmed = list(console.progress(pictures, count, f"Filming {comparison.file}"))
         video.encode(filmed, render.fps, render.fps_base, path)

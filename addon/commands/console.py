@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TextIO, TypeVar
 
 from ..core import interrupt
+from ..core.errors import SinewError
 
 Item = TypeVar("Item")
+_CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 class Console:
@@ -31,16 +34,19 @@ class Console:
             self._rich = rich.console.Console(file=err, highlight=False)
 
     def say(self, text: str) -> None:
-        """A result, on standard output."""
-        print(text, file=self.out, flush=True)
+        """A result, on standard output. Raises SinewError where nobody takes it, as on a full disk."""
+        with self._given_out():
+            print(_shown(text) if self.out.isatty() else text, file=self.out, flush=True)
 
     def note(self, text: str) -> None:
         """A word about the work, on standard error."""
         if self._has_bar:
             # Above the bar, which would otherwise be written into.
-            self._rich.print(text, markup=False, soft_wrap=True)
+            self._rich.print(_shown(text), markup=False, soft_wrap=True)
         else:
-            print(text, file=self.err, flush=True)
+            # What nobody hears is no reason to stop.
+            with suppress(OSError):
+                print(_shown(text), file=self.err, flush=True)
 
     def complain(self, text: object) -> None:
         """One sentence on what went wrong, on standard error."""
@@ -55,10 +61,11 @@ class Console:
             # A path is nothing without its end.
             table = rich.table.Table(*(rich.table.Column(name, overflow="fold") for name in columns))
             for row in rows:
-                table.add_row(*(rich.text.Text(cell) for cell in row))
+                table.add_row(*(rich.text.Text(_shown(cell)) for cell in row))
             # Not cut to 80 columns where there is no terminal to fit.
             width = None if self.out.isatty() else 200
-            rich.console.Console(file=self.out, highlight=False, width=width).print(table)
+            with self._given_out():
+                rich.console.Console(file=self.out, highlight=False, width=width).print(table)
             return
         widths = [max(len(row[i]) for row in [columns, *rows]) for i in range(len(columns))]
         for row in [columns, *rows]:
@@ -90,6 +97,15 @@ class Console:
             finally:
                 self._close_bar = None
 
+    @contextmanager
+    def _given_out(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            # What is left of it would be tried again, with a traceback, at the end of the process.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
+            raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
+
     def close(self) -> None:
         """Gives the terminal back where the process is about to end at once."""
         if self._close_bar is not None:
@@ -119,6 +135,11 @@ class Console:
                 yield BatchProgress(self, total, bar, bar.add_task(what, total=total, meshes=0, failed=0))
             finally:
                 self._has_bar = False
+
+
+def _shown(text: str) -> str:
+    """Without what would steer a terminal: names in files can hold anything."""
+    return _CONTROLS.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
 class BatchProgress:

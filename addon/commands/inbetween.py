@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from ..batch.inputs import Job, plan_jobs
 from ..core.errors import SinewError, WrongUse
+from ..core.output import folder_to_write
 from .console import Console
 from .outcome import Outcome
 
@@ -42,7 +42,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--step", type=int, default=1, metavar="FRAMES", help="from one baked key to the next (default: 1)"
     )
     parser.add_argument("--live", action="store_true", help="keep the action, do not bake: for Sinew to play")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the copies")
+    parser.add_argument(
+        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the copies"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace copies that are there already")
     return parser
 

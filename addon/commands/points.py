@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import argparse
-import os
 import zipfile
+from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
+from ..core.names import as_file_name
+from ..core.output import file_to_write, write_whole
 from .console import Console
 
 
@@ -20,8 +23,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "points",
         help="write the deformed vertices of chosen frames",
         description="Writes an .npz: for each armature-deformed mesh one float32 array [frames, vertices, "
-        "3], its key the object's name: the vertices of the final evaluated mesh in object space; and an "
-        "array `frames`.",
+        "3], its key the object's name (with %2F for /): the vertices of the final evaluated mesh in object "
+        "space; and an array `frames`.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument(
@@ -29,7 +32,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     )
     parser.add_argument("--frames", required=True, help="such as 1,12,40-48")
     parser.add_argument("--object", metavar="NAME", help="only this mesh")
-    parser.add_argument("--out", required=True, type=Path, metavar="POINTS.npz")
+    parser.add_argument(
+        "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
+    )
     return parser
 
 
@@ -60,13 +65,16 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     if "frames" in (obj.name for obj in taken):
         raise SinewError(f"{args.file}: an object is called frames, as the array of frames is; rename it")
-    points: dict[str, list[np.ndarray]] = {obj.name: [] for obj in taken}
+    # A linked object can have the name of one of the file's own.
+    names = Counter(obj.name for obj in taken)
+    keys = {obj: obj.name if names[obj.name] == 1 else obj.name_full for obj in taken}
+    points: dict[str, list[np.ndarray]] = {key: [] for key in keys.values()}
     for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
         evaluate.set_frame(bpy.context.scene, frame)
         for obj in taken:
             if args.method != evaluate.BLENDER and not obj.sinew.enabled:
                 raise SinewError(f"{args.file}: frame {frame}: {obj.sinew.error}")
-            points[obj.name].append(evaluate.final_points(obj))
+            points[keys[obj]].append(evaluate.final_points(obj))
     arrays = {name: _stack(name, per_frame, frames) for name, per_frame in points.items()}
     _write(args.out, {**arrays, "frames": np.array(frames)})
     for name, array in arrays.items():
@@ -86,15 +94,11 @@ def _stack(name: str, per_frame: list[np.ndarray], frames: list[float]) -> np.nd
 
 
 def _write(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    unfinished = path.with_name(f".{path.name}.unfinished")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    def write(unfinished: Path) -> None:
         # Not np.savez, whose own arguments' names an object could have.
         with zipfile.ZipFile(unfinished, "w") as archive:
             for name, array in arrays.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                with archive.open(f"{as_file_name(name)}.npy", "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, np.ascontiguousarray(array))
-        os.replace(unfinished, path)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise SinewError(f"{path}: can not be written: {error.strerror}") from None
+
+    write_whole(path, write)

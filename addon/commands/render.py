@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from ..core.errors import SinewError, WrongUse
@@ -17,7 +16,7 @@ from ..core.golden import (
     differing_share,
     picture_name,
 )
-from ..core.output import check_folder, write_text, write_whole
+from ..core.output import folder_to_write, remove, write_text
 from .console import Console
 
 # In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
@@ -56,7 +55,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         metavar="PERCENT",
         help="how many of the pixels may differ visibly (default: %(default)s percent)",
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the pictures")
+    parser.add_argument(
+        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the pictures"
+    )
     return parser
 
 
@@ -77,9 +78,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     evaluate.check_methods([method])
     if golden is not None:
         _check_fits(args, golden, frames)
-    check_folder(args.out)
-    settings = _draw(args, method, frames, golden, console)
-    write_text(args.out / SETTINGS, settings.to_json())
+    _check_free(args.out, frames)
+    _draw(args, method, frames, golden, console)
     console.say(f"{len(frames)} picture{'s' if len(frames) > 1 else ''} in {args.out}")
     return _judge(args, frames, console) if golden is not None else 0
 
@@ -97,13 +97,24 @@ def _check_fits(args: argparse.Namespace, golden: RenderSettings, frames: list[f
         )
 
 
+def _check_free(out: Path, frames: list[float]) -> None:
+    """Raises SinewError where pictures are in the way that somebody else made: names such as 0001.png are not
+    ours alone."""
+    if (out / SETTINGS).exists():
+        return
+    for frame in frames:
+        path = out / picture_name(frame)
+        if path.exists():
+            raise SinewError(f"{path}: is there already, and not of `sinew render`; choose another --out")
+
+
 def _draw(
     args: argparse.Namespace,
     method: str,
     frames: list[float],
     golden: RenderSettings | None,
     console: Console,
-) -> RenderSettings:
+) -> None:
     import bpy
 
     from ..blender import evaluate, files
@@ -128,12 +139,13 @@ def _draw(
         else:
             views = evaluate.whole_views(meshes, [method], frames)
         studio = render.Studio(scene, meshes, engine, size)
+    names = [obj.name for obj in meshes]
+    settings = RenderSettings(args.file.name, method, frames, engine, size, args.own_look, names, views)
+    # First: it tells that the pictures are ours, also where this is stopped half-way.
+    write_text(args.out / SETTINGS, settings.to_json())
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
         evaluate.set_frame(scene, frame)
-        draw = partial(studio.picture, views[index] if views else None)
-        write_whole(args.out / picture_name(frame), draw)
-    names = [obj.name for obj in meshes]
-    return RenderSettings(args.file.name, method, frames, engine, size, args.own_look, names, views)
+        studio.picture(views[index] if views else None, args.out / picture_name(frame))
 
 
 def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> int:
@@ -146,7 +158,7 @@ def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> i
         drawn = pictures.read_picture(args.out / name)
         golden = pictures.read_picture(args.against / name)
         shown = args.out / f"{Path(name).stem}.difference.png"
-        shown.unlink(missing_ok=True)
+        remove(shown)
         if drawn.shape != golden.shape:
             failures += 1
             (height, width), (golden_height, golden_width) = drawn.shape[:2], golden.shape[:2]

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 
 from ..core.errors import SinewError
+from ..core.output import folder_to_write
 from ..core.report.model import Figure, Page
+from ..core.scratch import scratch_folder
 from .console import Console
 
 PICTURE_SIZE, QUICK_PICTURE_SIZE = 520, 64
@@ -30,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "built against GLM and Eigen, and pictures (Figures 3.6 to 3.11) Sinew's example rigs: ./dev report "
         "in a checkout builds the ones and passes on both. The page says what was left out and why.",
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="FOLDER")
+    parser.add_argument("--out", required=True, type=folder_to_write, metavar="FOLDER")
     parser.add_argument(
         "--programs",
         type=Path,
@@ -62,8 +63,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for folder in (args.programs, args.blend_files):
         if folder is not None and not folder.is_dir():
             raise SinewError(f"{folder}: no such folder")
-    if args.out.exists() and not args.out.is_dir():
-        raise SinewError(f"{args.out}: is a file, expected a folder")
     measurements = None
     if args.programs is not None:
         measurements = measure.measure(args.programs, args.quick, console.note)
@@ -106,5 +105,5 @@ def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
 
     engine = render.chosen_engine(args.engine)
     size = QUICK_PICTURE_SIZE if args.quick else PICTURE_SIZE
-    with tempfile.TemporaryDirectory() as scratch:
-        return report_figures.figures(args.blend_files, engine, size, Path(scratch), console.note)
+    with scratch_folder() as scratch:
+        return report_figures.figures(args.blend_files, engine, size, scratch, console.note)

@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
 from ..core.errors import WrongUse
 from ..core.frames import parse_frames
-from ..core.output import check_folder
+from ..core.scratch import scratch_folder
 from ..core.sheet import Column, require_pillow, write_sheet
 from ..core.views import close_view, place_of_difference
 from .console import Console
@@ -29,14 +27,11 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     from ..blender.pages import measure, render
 
     require_pillow()
-    if args.out.suffix.lower() != ".png":
-        raise WrongUse(f"{args.out}: a sheet is a PNG; give a name ending in .png, or a folder for pages")
     if len(args.files) != 1:
         raise WrongUse(f"{args.out}: a sheet shows one file, got {len(args.files)}; give a folder for pages")
     frames = parse_frames(args.frames or "")
     if len(frames) != 1:
         raise WrongUse(f"frame: expected one frame, got {args.frames!r}")
-    check_folder(args.out.parent)
     (path,), (frame,) = args.files, frames
     files.open_file(path)
     scene = bpy.context.scene
@@ -58,12 +53,12 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
 
     studio = render.Studio(scene, meshes, render.chosen_engine(args.engine), args.size or 640)
     columns = []
-    with tempfile.TemporaryDirectory() as folder:
+    with scratch_folder() as folder:
         for method in console.progress(methods, len(methods), f"Drawing {path.name}"):
             evaluate.use_method_on(meshes, method)
             pictures = []
             for index, (_title, view) in enumerate(views):
-                pictures.append(Path(folder) / f"{method}-{index}.png")
+                pictures.append(folder / f"{method}-{index}.png")
                 studio.picture(view, pictures[-1])
             note = f"volume {100 * volumes[method] / rest:.1f} % of rest" if rest else "no volume"
             columns.append(Column(f"{properties.method_label(method)} ({method})", note, pictures))

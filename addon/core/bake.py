@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import SinewError, WrongUse
-from .output import remove
+from .output import remove, writing
 
 # Bakes that a .blend plays, and those that are files of their own.
 IN_FILE = ("shape-keys", "mdd", "pc2")
@@ -57,26 +57,21 @@ class PointCache:
         self.path = path
         header, self._coordinate = FORMATS[kind]
         self.unfinished = path.with_name(f".{path.name}.unfinished")
-        try:
+        remove(self.unfinished)
+        with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = self.unfinished.open("wb")
             self._file.write(header(frames, vertices, rate))
-        except OSError as error:
-            raise _unwritable(path, error) from None
 
     def write(self, points: np.ndarray) -> None:
         """The next sample, [vertices, 3]."""
-        try:
+        with writing(self.path):
             self._file.write(points.astype(self._coordinate).tobytes())
-        except OSError as error:
-            raise _unwritable(self.path, error) from None
 
     def close(self) -> None:
         """All samples are on disk from here on."""
-        try:
+        with writing(self.path):
             self._file.close()
-        except OSError as error:
-            raise _unwritable(self.path, error) from None
 
     def discard(self) -> None:
         """Leaves nothing behind, also where the disk is full."""
@@ -87,10 +82,8 @@ class PointCache:
 
 
 def publish(unfinished: Path, path: Path) -> None:
-    try:
+    with writing(path):
         os.replace(unfinished, path)
-    except OSError as error:
-        raise _unwritable(path, error) from None
 
 
 def check_space(folder: Path, needed: int) -> None:
@@ -115,6 +108,28 @@ def check_frames(kind: str, frames: Sequence[float]) -> None:
         raise WrongUse(f"{kind}: Blender exports no frames before 0; give others, or bake to alembic")
 
 
+def is_whole(path: Path, kind: str) -> bool:
+    """Whether all that an exporter wrote is in its file: of USD Blender does not notice that a disk is full
+    (seen on 4.5)."""
+    with path.open("rb") as file:
+        start = file.read(24)
+        size = file.seek(0, os.SEEK_END)
+        if len(start) < 24:
+            return False
+        if kind == "alembic":
+            # Ogawa: the sixth byte is set when the file is closed.
+            return start[:6] == b"Ogawa\xff"
+        if kind == "gltf":
+            return start[:4] == b"glTF" and struct.unpack("<I", start[8:12])[0] == size
+        # USD's crate: where its table of contents is, which comes last; how many parts it lists, of 32 bytes.
+        (contents,) = struct.unpack("<q", start[16:])
+        if start[:8] != b"PXR-USDC" or not 24 <= contents <= size - 8:
+            return False
+        file.seek(contents)
+        (count,) = struct.unpack("<Q", file.read(8))
+        return contents + 8 + 32 * count <= size
+
+
 def is_even(frames: Sequence[float], step: float | None = None) -> bool:
     """Whether the frames are equally far apart, by `step` where it is given."""
     gaps = np.diff(frames)
@@ -133,7 +148,3 @@ def ramps(frames: Sequence[float]) -> list[tuple[list[float], list[float]]]:
 
 def _megabytes(count: int) -> str:
     return f"{count / 1e6:,.1f} MB"
-
-
-def _unwritable(path: Path, error: OSError) -> SinewError:
-    return SinewError(f"{path}: can not be written: {error.strerror}")

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -71,12 +71,14 @@ def check_weights(
     weights: GroupWeights,
     group_names: Sequence[str],
     most_influences: int = USUAL_INFLUENCES,
+    masks: Collection[str] = (),
 ) -> list[Finding]:
     """What is found without looking at a pose; only what there is.
 
     points       [vertices, 3], rest points in armature space
     weights      the mesh's groups as stored
     group_names  of those groups
+    masks        names of groups that something else than a bone uses
     """
     counts, entries = weighting.influences(points).counts, weighting.entries
     painted = np.bincount(entries.vertices, weights=entries.weights, minlength=len(counts))
@@ -106,7 +108,7 @@ def check_weights(
             f"Use Weights > Limit Total with a limit of {most_influences}, then Normalize All.",
         ),
     ]
-    boneless = [name for name in group_names if name not in weighting.bones.names]
+    boneless = [name for name in weighting.bones.without_one(group_names) if name not in masks]
     if boneless:
         numbers = [number for number, name in enumerate(group_names) if name in boneless]
         vertices = np.repeat(np.arange(len(weights.counts)), weights.counts)
@@ -116,8 +118,9 @@ def check_weights(
                 "boneless_groups",
                 "Groups without a bone",
                 np.unique(held),
-                "No bone of the armature has the name of these groups: their weights move nothing.",
-                "Rename the group to its bone's name, or delete it; leave it where a modifier uses it.",
+                "No bone of the armature has the name of these groups, and nothing else uses them: their "
+                "weights do nothing.",
+                "Rename the group to its bone's name, or delete it.",
                 groups=tuple(boneless),
             )
         )

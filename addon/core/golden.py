@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,18 @@ class RenderSettings:
     def to_json(self) -> str:
         return json.dumps(asdict(self), indent=1, default=lambda array: array.tolist())
 
+    def _check_types(self) -> None:
+        """Raises TypeError or ValueError where a value is none that to_json() wrote."""
+        kinds = {"file": str, "method": str, "engine": str, "size": int, "own_look": bool}
+        if not all(isinstance(getattr(self, name), kind) for name, kind in kinds.items()):
+            raise TypeError
+        if not self.frames or not all(
+            type(frame) in (int, float) and abs(frame) < 1e9 for frame in self.frames
+        ):
+            raise TypeError
+        if not self.own_look and len(self.views) != len(self.frames):
+            raise ValueError
+
     @classmethod
     def read(cls, folder: Path) -> RenderSettings:
         """Raises SinewError where `folder` was not written by `sinew render`."""
@@ -50,7 +63,9 @@ class RenderSettings:
                 View(np.array(v.pop("direction")), np.array(v.pop("target")), **v)
                 for v in values.pop("views")
             ]
-            return cls(views=views, **values)
+            settings = cls(views=views, **values)
+            settings._check_types()
+            return settings
         except OSError as error:
             raise SinewError(
                 f"{path}: can not be read: {error.strerror}; make golden pictures with `sinew render … --out "
@@ -61,9 +76,11 @@ class RenderSettings:
 
 
 def picture_name(frame: float) -> str:
-    """Sorts by frame: 0001.png, 0006.50.png."""
+    """Sorts by frame: 0001.png, 0006.50.png; another one for each frame."""
     whole = int(np.floor(frame))
-    part = f"{frame - whole:.2f}"[1:] if frame != whole else ""
+    # Two digits, and more only where they are needed.
+    exact = f"{Decimal(repr(float(frame))) - whole:f}"[2:]
+    part = f".{exact.ljust(2, '0')}" if frame != whole else ""
     return f"{whole:04d}{part}.png"
 
 

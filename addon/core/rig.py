@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -76,6 +77,11 @@ class Bones:
             and self.envelopes.equals(other.envelopes)
         )
 
+    def without_one(self, group_names: Sequence[str]) -> list[str]:
+        """Those of the groups that no bone is called by."""
+        names = set(self.names)
+        return [name for name in group_names if name not in names]
+
     def of_groups(self, group_names: list[str]) -> np.ndarray:
         """int32 [groups]: the deforming bone of each group's name, -1 for none."""
         index = {name: bone for bone, name in enumerate(self.names) if self.deform[bone]}
@@ -147,10 +153,11 @@ class RigFacts:
         return replace(self, warnings=(*self.warnings, *more))
 
 
-def describe_rig(weighting: Weighting, points: np.ndarray, group_names: list[str]) -> RigFacts:
+def describe_rig(weighting: Weighting, points: np.ndarray, boneless: Sequence[str]) -> RigFacts:
     """Counts and warnings. `weighted_bones` counts those that move at least one vertex.
 
-    points  [vertices, 3], rest points: see Weighting.influences
+    points    [vertices, 3], rest points: see Weighting.influences
+    boneless  names of groups that are neither a bone's nor of any other use
     """
     influences, bones = weighting.influences(points), weighting.bones
     counts = influences.counts
@@ -158,7 +165,6 @@ def describe_rig(weighting: Weighting, points: np.ndarray, group_names: list[str
     bare = int((counts == 0).sum())
     if bare:
         warnings.append(f"{bare} of {len(counts)} vertices have no weights and stay at rest")
-    boneless = [name for name in group_names if name not in bones.names]
     if boneless:
         warnings.append(f"Groups without a bone: {_shortened(boneless)}")
     return RigFacts(
@@ -171,6 +177,6 @@ def describe_rig(weighting: Weighting, points: np.ndarray, group_names: list[str
     )
 
 
-def _shortened(names: list[str]) -> str:
+def _shortened(names: Sequence[str]) -> str:
     rest = len(names) - NAMES_SHOWN
     return ", ".join(names[:NAMES_SHOWN]) + (f" and {rest} more" if rest > 0 else "")

@@ -97,9 +97,12 @@ def _copy(started: Export) -> Iterator[Path]:
 
 def _link_caches(link: Path) -> None:
     """Simulations look for their caches on disk by the name of the file."""
+    if not bpy.data.filepath:
+        # Imported, and never saved.
+        return
     source = Path(bpy.data.filepath)
     caches = source.with_name(f"blendcache_{source.stem}").absolute()
-    if not bpy.data.filepath or not caches.is_dir():
+    if not caches.is_dir():
         return
     try:
         link.symlink_to(caches, target_is_directory=True)

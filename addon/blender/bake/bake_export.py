@@ -6,6 +6,7 @@ Like bake.Bake they go in steps: sample(), place(), publish(), discard().
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -16,7 +17,7 @@ from mathutils import Matrix
 
 from ...core import bake as core
 from ...core.errors import SinewError
-from ...core.output import remove
+from ...core.output import remove, writing
 from ...core.spaces import transformed
 from .. import evaluate, files
 from . import shape_animation, usd_textures
@@ -258,13 +259,12 @@ def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(frames))
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
-    try:
+    remove(unfinished)
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         # Known before the frames are read, and not from an exporter's traceback.
         unfinished.touch()
         unfinished.unlink()
-    except OSError as error:
-        raise SinewError(f"{path}: can not be written: {error.strerror}") from None
     return unfinished
 
 
@@ -280,6 +280,9 @@ def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> Non
         raise SinewError(f"{export.path}: can not be written: {files.telling_line(error)}") from None
     if not export.unfinished.exists():
         raise SinewError(f"{export.path}: can not be written: Blender's exporter made no file")
+    with writing(export.path):
+        if not core.is_whole(export.unfinished, export.kind):
+            raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from ...core import side_by_side
 from ...core.errors import SinewError
 from ...core.spaces import transformed
 from .. import actions, carrier, drive, evaluate, front, handlers, node_group, properties, stack
+from ..updates import updates_suspended
 from . import comparison_state, offset_nodes
 
 # Of a colour-blind-safe set (Okabe and Ito, 2008), in the order of the methods.
@@ -60,7 +61,7 @@ def start(
     state = scene.sinew_comparison
     state.collection = collection
     try:
-        with handlers.held():
+        with updates_suspended():
             for obj in taken:
                 for method in methods:
                     collection.objects.link(_copy(obj, method))

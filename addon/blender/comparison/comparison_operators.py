@@ -71,7 +71,7 @@ class SINEW_OT_compare(bpy.types.Operator):
             cls.poll_message_set("Leave edit mode first")
             return False
         if operators.armatures(context) or _compared(context):
-            return True
+            return operators.can_change(cls)
         cls.poll_message_set("Select a mesh that an armature deforms, or the armature")
         return False
 
@@ -148,7 +148,7 @@ class SINEW_OT_end_comparison(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if comparison.is_on():
-            return True
+            return operators.can_change(cls)
         cls.poll_message_set("There is no comparison")
         return False
 

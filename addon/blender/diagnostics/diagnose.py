@@ -17,7 +17,7 @@ from ...core.errors import SinewError
 from ...core.influences import GroupWeights
 from ...core.quaternions import rotations_of
 from ...core.rig import Bones, Weighting
-from .. import armature_io, drive, evaluate, events, handlers, mesh_io, stepped
+from .. import armature_io, drive, evaluate, events, group_uses, handlers, mesh_io, stepped
 from ..pages import measure
 
 
@@ -164,7 +164,8 @@ def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:
 def _keep(reading: _Reading, most_influences: int, frames: str) -> None:
     obj = reading.obj
     groups = tuple(group.name for group in obj.vertex_groups)
-    found = check_weights(reading.weighting, reading.points, reading.weights, groups, most_influences)
+    masks = group_uses.used(obj, reading.weighting.bones.without_one(groups))
+    found = check_weights(reading.weighting, reading.points, reading.weights, groups, most_influences, masks)
     _checks[obj.session_uid] = Check(
         [*found, *reading.poses.findings()],
         frames,

@@ -11,17 +11,19 @@ from __future__ import annotations
 import bpy
 
 from .. import node_group
-from ..node_group import ATTRIBUTE, CARRIER, add_nodes, enabled_socket
+from ..node_group import CARRIER, add_nodes, enabled_socket
 
 # The colour attribute of evaluated meshes.
 NAME = "Sinew Heat"
+# The attribute of a carrier that holds each vertex's colour.
+COLOURS = "sinew_colours"
 MARK = "sinew_heat"
-_HEAT = {ATTRIBUTE: 7, CARRIER: 4}
+_KIND = 9
 
 
-def get_or_make(kind: int) -> bpy.types.NodeTree:
-    """The group that takes points and colours from an ATTRIBUTE or from a CARRIER."""
-    return node_group.find(_HEAT[kind]) or _make(kind)
+def get_or_make() -> bpy.types.NodeTree:
+    """The group that takes points and colours from a carrier."""
+    return node_group.find(_KIND) or _make()
 
 
 def remove_unused_material() -> None:
@@ -29,65 +31,50 @@ def remove_unused_material() -> None:
         bpy.data.materials.remove(material)
 
 
-def _make(kind: int) -> bpy.types.NodeTree:
-    points = node_group.get_or_make(kind)
+def _make() -> bpy.types.NodeTree:
+    points = node_group.get_or_make(CARRIER)
     inputs = {
         item.name: (item.socket_type, item.description)
         for item in points.interface.items_tree
         if item.in_out == "INPUT" and item.name != "Geometry"
     }
-    inputs["Colours"] = (
-        "NodeSocketString",
-        "Attribute that holds the colour of each vertex, beside the points",
-    )
-    group = node_group.new_group(f"{points.name} Heat", _HEAT[kind], inputs)
-    source, place, named, store, paint, result = add_nodes(
+    group = node_group.new_group(f"{points.name} Heat", _KIND, inputs)
+    source, place, info, index, named, sample, store, paint, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeGroup",
+        "GeometryNodeObjectInfo",
+        "GeometryNodeInputIndex",
         "GeometryNodeInputNamedAttribute",
+        "GeometryNodeSampleIndex",
         "GeometryNodeStoreNamedAttribute",
         "GeometryNodeSetMaterial",
         "NodeGroupOutput",
     )
     place.node_tree = points
     named.data_type = "FLOAT_VECTOR"
+    named.inputs["Name"].default_value = COLOURS
+    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
     store.data_type, store.domain = "FLOAT_COLOR", "POINT"
     store.inputs["Name"].default_value = NAME
     paint.inputs["Material"].default_value = _material()
     link = group.links.new
     for name in ("Geometry", *inputs):
-        if name != "Colours":
-            link(source.outputs[name], place.inputs[name])
-    link(source.outputs["Colours"], named.inputs["Name"])
-    colour, exists = named.outputs["Attribute"], named.outputs["Exists"]
-    if kind == CARRIER:
-        colour, exists = _from_carrier(group, source, colour)
-    link(colour, enabled_socket(store.inputs, "Value"))
+        link(source.outputs[name], place.inputs[name])
+    # Each vertex takes the colour of the carrier's vertex of that index.
+    link(source.outputs["Points"], info.inputs["Object"])
+    link(info.outputs["Geometry"], sample.inputs["Geometry"])
+    link(named.outputs["Attribute"], enabled_socket(sample.inputs, "Value"))
+    link(index.outputs["Index"], sample.inputs["Index"])
+    link(enabled_socket(sample.outputs, "Value"), enabled_socket(store.inputs, "Value"))
     # Without colours, as before the first are written, the material is left alone too.
-    link(exists, store.inputs["Selection"])
-    link(exists, paint.inputs["Selection"])
+    same = node_group.same_count(group, source.outputs["Geometry"], info.outputs["Geometry"])
+    link(same, store.inputs["Selection"])
+    link(same, paint.inputs["Selection"])
     link(place.outputs["Geometry"], store.inputs["Geometry"])
     link(store.outputs["Geometry"], paint.inputs["Geometry"])
     link(paint.outputs["Geometry"], result.inputs["Geometry"])
     return group
-
-
-def _from_carrier(
-    group: bpy.types.NodeTree, source: bpy.types.Node, colour: bpy.types.NodeSocket
-) -> tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]:
-    """Each vertex's colour from the carrier's vertex of that index, and whether there are as many."""
-    info, index, sample = add_nodes(
-        group, "GeometryNodeObjectInfo", "GeometryNodeInputIndex", "GeometryNodeSampleIndex"
-    )
-    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
-    link = group.links.new
-    link(source.outputs["Points"], info.inputs["Object"])
-    link(info.outputs["Geometry"], sample.inputs["Geometry"])
-    link(colour, enabled_socket(sample.inputs, "Value"))
-    link(index.outputs["Index"], sample.inputs["Index"])
-    same = node_group.same_count(group, source.outputs["Geometry"], info.outputs["Geometry"])
-    return enabled_socket(sample.outputs, "Value"), same
 
 
 def _material() -> bpy.types.Material:

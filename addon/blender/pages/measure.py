@@ -23,7 +23,7 @@ from ...core.metrics import FrameOfRig, Gauge, Summary, bone_axes
 from ...core.rig import Bones, Weighting
 from ...core.spaces import transformed
 from ...core.surface import joined
-from .. import armature_io, drive, evaluate, handlers, mesh_io, stack
+from .. import armature_io, drive, evaluate, group_uses, handlers, mesh_io, stack
 from ..modifier_options import ModifierOptions
 
 # Shapes of as many frames are kept as fit into this: methods take turns on them.
@@ -50,7 +50,8 @@ class Part:
 
     def check_weights(self, most_influences: int) -> list[Finding]:
         names = [group.name for group in self.obj.vertex_groups]
-        return check_weights(self.weighting, self.rest_points, self.weights, names, most_influences)
+        masks = group_uses.used(self.obj, self.weighting.bones.without_one(names))
+        return check_weights(self.weighting, self.rest_points, self.weights, names, most_influences, masks)
 
 
 @dataclass

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.errors import SinewError
 from ...core.output import write_whole
+from ..files import telling_line
 
 
 def read_picture(path: Path) -> np.ndarray:
@@ -40,7 +41,10 @@ def write_picture(path: Path, pixels: np.ndarray) -> None:
 
         def write(unfinished: Path) -> None:
             image.filepath_raw = str(unfinished)
-            image.save()
+            try:
+                image.save()
+            except RuntimeError as error:
+                raise OSError(telling_line(error)) from None
 
         write_whole(path, write)
     finally:

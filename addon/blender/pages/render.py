@@ -7,6 +7,7 @@ looked at.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -18,10 +19,14 @@ from mathutils import Matrix
 from ...core.errors import SinewError, WrongUse
 from ...core.heat import linear
 from ...core.opengl import usual_engine
+from ...core.output import write_whole
+from ...core.scratch import scratch_folder
 from ...core.views import View, camera_axes
+from ..files import telling_line
 
 CLAY = (0.72, 0.66, 0.6)
 HEAT = "sinew_heat"
+PNG_END = b"IEND\xaeB`\x82"
 
 
 def check_size(size: int) -> None:
@@ -129,8 +134,7 @@ class Studio:
         camera.data.clip_end = 2 * view.depth
         render = self.scene.render
         render.resolution_x, render.resolution_y = view.pixels(self._size)
-        render.filepath = str(path)
-        bpy.ops.render.render(write_still=True, scene=self.scene.name)
+        _render(self.scene, path)
 
     def _shade(self, colour: str, light: str, gloss: bool) -> None:
         shading = self.scene.display.shading
@@ -155,8 +159,23 @@ class OwnLook:
 
     def picture(self, _view: None, path: Path) -> None:
         """Renders to the PNG `path`."""
-        self._scene.render.filepath = str(path)
-        bpy.ops.render.render(write_still=True, scene=self._scene.name)
+        _render(self._scene, path)
+
+
+def _render(scene: bpy.types.Scene, path: Path) -> None:
+    """Renders the current frame to the PNG `path`; raises SinewError where it can not be written."""
+    with scratch_folder() as folder:
+        # Not to `path` itself: Blender replaces each # and {} in it.
+        drawn = folder / "picture.png"
+        scene.render.filepath = str(drawn)
+        try:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        except RuntimeError as error:
+            raise SinewError(f"{path}: can not be drawn: {telling_line(error)}") from None
+        # Up to 5.2 it does not notice that a disk is full.
+        if not drawn.exists() or not drawn.read_bytes().endswith(PNG_END):
+            raise SinewError(f"{path}: can not be drawn: {folder.parent} did not take all of it; is it full?")
+        write_whole(path, lambda unfinished: shutil.copyfile(drawn, unfinished))
 
 
 def _painted_copy(obj: bpy.types.Object, colours: np.ndarray) -> bpy.types.Object:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import bpy
 
 from ...core.errors import SinewError
 from ...core.output import write_whole
+from ...core.scratch import scratch_folder
+from ..files import telling_line
 
 
 def check_can_encode() -> None:
@@ -32,13 +35,37 @@ def encode(pictures: Sequence[Path], fps: int, fps_base: float, path: Path) -> N
         _prepare_output(scene, size)
         scene.render.fps, scene.render.fps_base = fps, fps_base
 
-        def write(unfinished: Path) -> None:
-            scene.render.filepath = str(unfinished)
-            bpy.ops.render.render(animation=True, scene=scene.name)
-
-        write_whole(path, write)
+        with scratch_folder() as folder:
+            # Not to `path` itself: Blender replaces each # and {} in it.
+            encoded = folder / "video.mp4"
+            scene.render.filepath = str(encoded)
+            try:
+                bpy.ops.render.render(animation=True, scene=scene.name)
+            except RuntimeError as error:
+                raise SinewError(f"{path}: can not be encoded: {telling_line(error)}") from None
+            if not _is_whole(encoded):
+                raise SinewError(
+                    f"{path}: can not be encoded: {folder.parent} did not take all of it; is it full?"
+                )
+            write_whole(path, lambda unfinished: shutil.copyfile(encoded, unfinished))
     finally:
         bpy.data.scenes.remove(scene)
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether an mp4 is there with all its parts, of which the index comes last."""
+    if not path.exists():
+        return False
+    content, place, kinds = path.read_bytes(), 0, set()
+    while 0 <= place <= len(content) - 8:
+        size = int.from_bytes(content[place : place + 4], "big")
+        kinds.add(content[place + 4 : place + 8])
+        if size == 1:
+            size = int.from_bytes(content[place + 8 : place + 16], "big")
+        if size < 8:
+            return False
+        place += size
+    return place == len(content) and b"moov" in kinds
 
 
 def _show_one_after_the_other(scene: bpy.types.Scene, pictures: Sequence[Path]) -> None:

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from html import escape
 from pathlib import Path
 
-from ..errors import SinewError
+from ..output import write_text
 from .model import Answer, Figure, Page, Picture, Row, Table
 
 TITLE = "Dual quaternions in transformation and interpolation: the report's experiments, done again"
@@ -37,19 +37,10 @@ dt { font-weight: 600; margin-top: .8em; } dd { margin-left: 0; }
 
 
 def write(page: Page, folder: Path) -> tuple[Path, Path]:
-    """report.html and report.json in `folder`; each beside its name first, then renamed.
-
-    Raises SinewError where they can not be written.
-    """
+    """report.html and report.json in `folder`. Raises SinewError where they can not be written."""
     paths = folder / "report.html", folder / "report.json"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path, text in zip(paths, (to_html(page), to_json(page)), strict=True):
-            unfinished = path.with_name(f".{path.name}.unfinished")
-            unfinished.write_text(text, encoding="utf-8")
-            unfinished.replace(path)
-    except OSError as error:
-        raise SinewError(f"{folder}: can not be written: {error.strerror or error}") from None
+    for path, text in zip(paths, (to_html(page), to_json(page)), strict=True):
+        write_text(path, text)
     return paths
 
 

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The text block that tells those who open a saved file without Sinew what is missing."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import properties
+
+NAME = "Sinew"
+MARK = "sinew_note"
+TEXT = """\
+This file uses Sinew, an extension for Blender that deforms these meshes:
+
+{names}
+
+Where Sinew is installed it goes on by itself when the file is opened. Where it is not, the Armature
+modifiers deform them, by the nearest shape that Blender has. Leave the modifiers called "Sinew" off then.
+"""
+
+
+def write(objects: list[bpy.types.Object]) -> None:
+    """Before the file is saved; without objects there is nothing to tell."""
+    remove()
+    if objects:
+        text = bpy.data.texts.new(NAME)
+        text[MARK] = True
+        lines = (
+            f"    {obj.name}, by {properties.method_label(properties.of(obj).method)}" for obj in objects
+        )
+        text.write(TEXT.format(names="\n".join(lines)))
+
+
+def remove() -> None:
+    """Nobody who has Sinew needs it."""
+    for text in [text for text in bpy.data.texts if text.get(MARK) and text.library is None]:
+        bpy.data.texts.remove(text)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What decides how an object is deformed: one function of plain facts, without Blender."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+# Tools of these modes work through the Armature modifier, which shows its own shape meanwhile.
+MODES_OF_THE_MODIFIER = frozenset({"EDIT", "SCULPT"})
+
+
+class State(Enum):
+    """Who deforms an object, and when."""
+
+    OFF = "off"  # the user switched Sinew off, or it failed
+    BUILT_IN = "built-in"  # the Armature modifier deforms, while Sinew is on
+    IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the rule
+    AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
+
+
+@dataclass(frozen=True)
+class Plan:
+    """reason: one clause for the panel; empty for the rule and for what the user chose."""
+
+    state: State
+    reason: str = ""
+
+    @property
+    def uses_builtin(self) -> bool:
+        return self.state in (State.OFF, State.BUILT_IN)
+
+
+@dataclass(frozen=True)
+class ObjectFacts:
+    """What plan() has to know of an object.
+
+    is_linked            it belongs to another file, without a library override
+    builtin_is_faster    its Armature modifiers have the same shape in less time
+    has_upstream         modifiers, absolute shape keys or a parent change the mesh ahead of Sinew
+    mesh_is_shared       other objects use the mesh
+    mesh_is_editable     attributes can be added to the mesh: it is not linked
+    is_comparison_copy   a copy that a comparison shows
+    visibility_is_keyed  an animation decides when one of the Armature modifiers is on
+    views_differ         one of them is on in the viewport alone or in renders alone
+    safe_mode            nothing of Sinew may run within Blender's evaluation
+    failure              what failed there; empty where nothing did
+    """
+
+    enabled: bool = True
+    is_linked: bool = False
+    mode: str = "OBJECT"
+    builtin_is_faster: bool = False
+    has_upstream: bool = False
+    mesh_is_shared: bool = False
+    mesh_is_editable: bool = True
+    is_comparison_copy: bool = False
+    has_heat_map: bool = False
+    visibility_is_keyed: bool = False
+    views_differ: bool = False
+    safe_mode: bool = False
+    failure: str = ""
+
+
+def plan(facts: ObjectFacts) -> Plan:
+    if not facts.enabled:
+        return Plan(State.OFF)
+    if facts.is_linked:
+        reason = (
+            "Linked from another file: its Armature modifier deforms it; make a library override to use Sinew"
+        )
+        return Plan(State.BUILT_IN, reason)
+    if facts.mode in MODES_OF_THE_MODIFIER:
+        return Plan(State.BUILT_IN, "In this mode the Armature modifier shows its own shape")
+    if facts.builtin_is_faster:
+        reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
+        return Plan(State.BUILT_IN, reason)
+    reason = _why_not_in_depsgraph(facts)
+    return Plan(State.AFTER_UPDATE, reason) if reason else Plan(State.IN_DEPSGRAPH)
+
+
+def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
+    """Empty where Sinew can deform within Blender's evaluation."""
+    reasons = (
+        (facts.safe_mode, "Safe mode"),
+        (bool(facts.failure), f"Within Blender's evaluation it failed: {facts.failure}"),
+        (facts.is_comparison_copy, "A copy for comparison"),
+        (not facts.mesh_is_editable, "The mesh is linked from another file"),
+        (facts.mesh_is_shared, "Other objects use the same mesh"),
+        (facts.has_upstream, "Modifiers in front of the Armature modifier change the mesh"),
+        (facts.has_heat_map, "It shows a heat map"),
+        (facts.visibility_is_keyed, "The visibility of its Armature modifier is animated"),
+        (facts.views_differ, "Its Armature modifier is on in the viewport or in renders alone"),
+    )
+    return next((reason for holds, reason in reasons if holds), "")

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Locks on files, which the system releases however a process ends."""
+
+from __future__ import annotations
+
+import os
+
+
+def try_lock(descriptor: int) -> bool:
+    """Locks a file for this process alone. False where another process has it, or files can not be locked."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        # Beyond any file's end, as Windows lets nobody read what is locked.
+        os.lseek(descriptor, 1 << 40, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

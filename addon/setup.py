@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""This folder is the package sinew_addon, and each folder in it with an __init__.py is a package below."""
+
+from setuptools import find_packages, setup
+from setuptools.command.build_py import build_py
+
+
+class Modules(build_py):
+    """All but this file, which setuptools knows as the build's only where it is run as a program."""
+
+    def find_package_modules(self, package, package_dir):
+        return [found for found in super().find_package_modules(package, package_dir) if found[1] != "setup"]
+
+
+setup(
+    packages=["sinew_addon", *(f"sinew_addon.{name}" for name in find_packages())],
+    package_dir={"sinew_addon": "."},
+    cmdclass={"build_py": Modules},
+)
