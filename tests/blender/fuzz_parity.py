@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Random rigs, posed at random: Sinew against Blender's Armature modifier.
 
-    python tests/blender/fuzz_parity.py --rigs 10000 [--first 0] [--keep DIR]
+    python tests/blender/fuzz_parity.py --rigs 10000 [--first 0] [--route both] [--keep DIR]
+
+Each rig goes by both routes: within Blender's evaluation, as far as the rig allows, and after the update, as
+in safe mode. A shape that Sinew did not make is a failure.
 
 A rig is made from its seed and a set of features, each with random numbers of its own, so that leaving one
 out changes nothing else: a failing rig is made smaller by leaving out all features that the failure does
@@ -18,14 +21,17 @@ from __future__ import annotations
 import argparse
 import sys
 import zlib
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
 import numpy as np
+import routes
 import scenes
 from mathutils import Euler, Matrix, Vector
-from sinew_addon.blender import drive, handlers, properties
+from sinew_addon.blender import drive, handlers
 from sinew_addon.core import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
@@ -55,14 +61,23 @@ FEATURES = (
     "absolute keys",
 )
 ORACLES = (("lbs", False), ("dq", True))
+NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
 
 
 @dataclass
 class Outcome:
-    """The worst error of one rig, as a part of the diagonal, and how many vertices were left out."""
+    """What came out for one rig.
+
+    errors    the worst by (route wanted, method), as a part of the diagonal
+    taken     the route that was taken for each that was wanted
+    reason    why a shape is not Sinew's, if one is not
+    left_out  how many vertices were
+    """
 
     seed: int
-    errors: dict[str, float] = field(default_factory=dict)
+    errors: dict[tuple[str, str], float] = field(default_factory=dict)
+    taken: dict[str, str] = field(default_factory=dict)
+    reason: str = ""
     left_out: int = 0
     vertices: int = 0
 
@@ -338,8 +353,9 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
 
 
-def check(seed: int, features: set[str]) -> Outcome:
-    obj, _armature = make_rig(seed, features)
+def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) -> Outcome:
+    """wanted  the routes"""
+    obj, armature = make_rig(seed, features)
     expected = {}
     for method, preserve_volume in ORACLES:
         for modifier in obj.modifiers:
@@ -347,62 +363,104 @@ def check(seed: int, features: set[str]) -> Outcome:
                 modifier.use_deform_preserve_volume = preserve_volume
         bpy.context.view_layer.update()
         expected[method] = scenes.final_points(obj)
-    drive.add(obj)
-    handlers.refresh(bpy.context)
     outcome = Outcome(seed, vertices=len(expected["lbs"]))
-    for method, _preserve_volume in ORACLES:
-        drive.use_one_method(obj, method)
-        if not properties.of(obj).enabled:
-            outcome.errors[method] = float("inf")
-            continue
-        shown = scenes.final_points(obj)
-        if shown.shape != expected[method].shape:
-            outcome.errors[method] = float("inf")
-            continue
-        # A pose with scale makes the mesh larger, and its rounding with it.
-        extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected[method], axis=0))))
-        left_out = undecided(obj) | unstable(obj, extent)
-        outcome.left_out = int(left_out.sum())
-        error = np.abs(shown - expected[method])[~left_out].max(initial=0.0)
-        outcome.errors[method] = float(error) / extent
+    for route in wanted:
+        routes.force(route)
+        scenes.add_sinew(obj)
+        for method, _preserve_volume in ORACLES:
+            try:
+                error = error_of(obj, armature, method, expected[method], outcome, route)
+            except routes.NotBySinewError as why:
+                error, outcome.reason = float("inf"), str(why)
+            outcome.errors[route, method] = error
+        drive.remove(obj)
+        handlers.session.forget()
+    routes.release()
     return outcome
 
 
-def shrink(seed: int) -> set[str]:
+def error_of(
+    obj: bpy.types.Object,
+    armature: bpy.types.Object,
+    method: str,
+    expected: np.ndarray,
+    outcome: Outcome,
+    route: str,
+) -> float:
+    """The worst of a rig under one method, as a part of the diagonal; notes the route that was taken.
+
+    Raises routes.NotBySinewError.
+    """
+    drive.use_one_method(obj, method)
+    # Another pose and back, so that the shape has to be made.
+    before = [bone.location.copy() for bone in armature.pose.bones]
+    for bone in armature.pose.bones:
+        bone.location.x += 1.0
+    bpy.context.view_layer.update()
+    state = handlers.state_of(obj)
+    shapes = state.shapes if state is not None else 0
+    for bone, location in zip(armature.pose.bones, before, strict=True):
+        bone.location = location
+    bpy.context.view_layer.update()
+    shown = scenes.final_points(obj)
+    outcome.taken[route] = routes.taken(obj, shapes)
+    if shown.shape != expected.shape:
+        return float("inf")
+    # A pose with scale makes the mesh larger, and its rounding with it.
+    extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected, axis=0))))
+    left_out = undecided(obj) | unstable(obj, extent)
+    outcome.left_out = int(left_out.sum())
+    return float(np.abs(shown - expected)[~left_out].max(initial=0.0)) / extent
+
+
+def shrink(seed: int, wanted: Sequence[str]) -> set[str]:
     """The features that the failure of a seed needs."""
     features = set(FEATURES)
     for feature in FEATURES:
-        if check(seed, features - {feature}).failed:
+        if check(seed, features - {feature}, wanted).failed:
             features.discard(feature)
     return features
 
 
-def run(first: int, count: int, keep: Path) -> list[Outcome]:
+def run(first: int, count: int, keep: Path, wanted: Sequence[str] = routes.ROUTES) -> list[Outcome]:
     """Checks `count` seeds from `first`; saves those that fail, made small, in `keep`."""
     outcomes = []
     for seed in range(first, first + count):
-        outcome = check(seed, set(FEATURES))
+        outcome = check(seed, set(FEATURES), wanted)
         outcomes.append(outcome)
         if outcome.failed:
-            features = shrink(seed)
+            features = shrink(seed, wanted)
             make_rig(seed, features)
             keep.mkdir(parents=True, exist_ok=True)
             bpy.ops.wm.save_as_mainfile(filepath=str(keep / f"seed-{seed}.blend"))
             needed = sorted(f for f in features if has(seed, f, features) or f == "mirror")
-            print(f"seed {seed} fails: {outcome.errors}; needs {needed}; saved in {keep}", flush=True)
+            errors = {f"{route} {method}": error for (route, method), error in outcome.errors.items()}
+            why = outcome.reason or "another shape"
+            print(f"seed {seed} fails: {errors}; {why}; needs {needed}; saved in {keep}", flush=True)
     return outcomes
 
 
 def summarise(outcomes: list[Outcome]) -> str:
-    worst = {method: max(outcomes, key=lambda o: o.errors[method]) for method, _volume in ORACLES}
+    worst = {key: max(outcomes, key=lambda o: o.errors[key]) for key in outcomes[0].errors}
     left_out = sum(o.left_out for o in outcomes)
     vertices = sum(o.vertices for o in outcomes)
     touched = sum(o.left_out > 0 for o in outcomes)
-    errors = ", ".join(f"{m} {o.errors[m]:.1e} (seed {o.seed})" for m, o in worst.items())
+    errors = ", ".join(f"{m} by {r} {o.errors[r, m]:.1e} (seed {o.seed})" for (r, m), o in worst.items())
     return (
         f"{len(outcomes)} rigs, {sum(o.failed for o in outcomes)} failed; worst error as a part of the "
-        f"diagonal: {errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a discontinuity"
+        f"diagonal: {errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a "
+        "discontinuity\n" + "\n".join(routes_taken(outcomes))
     )
+
+
+def routes_taken(outcomes: list[Outcome]) -> list[str]:
+    """A line for each route that was wanted: by which the rigs went."""
+    lines = []
+    for route in dict.fromkeys(route for o in outcomes for route, _method in o.errors):
+        taken = Counter(o.taken.get(route, "none of Sinew's") for o in outcomes)
+        counts = ", ".join(f"{count} {NAMES.get(name, name)}" for name, count in taken.most_common())
+        lines.append(f"wanted {NAMES[route]}: {counts}")
+    return lines
 
 
 def main() -> int:
@@ -411,14 +469,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rigs", type=int, default=500)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--route", choices=("both", *routes.ROUTES), default="both")
     parser.add_argument("--keep", type=Path, default=Path("build/fuzz"), help="folder for rigs that fail")
     args = parser.parse_args()
     sinew_addon.register()
     try:
-        outcomes = run(args.first, args.rigs, args.keep)
+        wanted = routes.ROUTES if args.route == "both" else (args.route,)
+        outcomes = run(args.first, args.rigs, args.keep, wanted)
     finally:
         sinew_addon.unregister()
-    print(summarise(outcomes))
+    print(f"Blender {bpy.app.version_string}: {summarise(outcomes)}")
     return int(any(outcome.failed for outcome in outcomes))
 
 

@@ -11,12 +11,15 @@ COMMAND = [sys.executable, "-c", "from sinew_addon.cli import run; run()"]
 ENVIRONMENT = {**os.environ, "PYTHONIOENCODING": "utf-8"}
 
 
-def start_sinew(*args: object, **options: object) -> subprocess.Popen:
+def start_sinew(*args: object, env_more: dict[str, str] | None = None, **options: object) -> subprocess.Popen:
     """options  of subprocess.Popen, such as its pipes"""
-    return subprocess.Popen([*COMMAND, *map(str, args)], env=ENVIRONMENT, **options)
+    environment = {**ENVIRONMENT, **(env_more or {})}
+    return subprocess.Popen([*COMMAND, *map(str, args)], env=environment, **options)
 
 
-def run_sinew(*args: object, status: int = 0) -> subprocess.CompletedProcess:
+def run_sinew(
+    *args: object, status: int = 0, env_more: dict[str, str] | None = None
+) -> subprocess.CompletedProcess:
     result = subprocess.run(
         [*COMMAND, *map(str, args)],
         capture_output=True,
@@ -24,7 +27,7 @@ def run_sinew(*args: object, status: int = 0) -> subprocess.CompletedProcess:
         encoding="utf-8",
         timeout=300,
         check=False,
-        env=ENVIRONMENT,
+        env={**ENVIRONMENT, **(env_more or {})},
     )
     assert result.returncode == status, result.stdout + result.stderr
     assert "Traceback" not in result.stderr, result.stderr

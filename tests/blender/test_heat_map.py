@@ -161,7 +161,7 @@ def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     bpy.ops.sinew.add()
     choose("bulge")
     bpy.ops.sinew.heat_map()
-    assert properties.of(first).attribute != properties.of(second).attribute
+    assert properties.of(first).carrier != properties.of(second).carrier
     bent, straight = shown_colours(first), shown_colours(second)
     assert np.ptp(bent, axis=0).max() > 0.1
     assert np.ptp(straight, axis=0).max() < 1e-3
@@ -340,8 +340,8 @@ def test_a_duplicate_has_colours_of_its_own():
     assert not properties.of(twin).heat
     bpy.context.scene.frame_set(7)
     assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
-    names = [a.name for a in obj.data.attributes if a.name.startswith("sinew_")]
-    assert len(names) == 3, names
+    carriers = [properties.of(each).carrier for each in (obj, twin)]
+    assert [heat_nodes.COLOURS in carrier.data.attributes for carrier in carriers] == [True, False]
 
 
 def test_a_render_shows_it(tmp_path):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a batch reads, writes and remembers, without a Blender: inputs, job files, journals."""
 
+import glob
 import json
 import os
 from pathlib import Path
@@ -362,3 +363,69 @@ def test_a_journal_that_can_not_be_written(tmp_path):
         journal.record(tmp_path / os.fsdecode(b"\xff.blend"), {"error": "names need not be text"})
     with Journal(tmp_path) as journal:
         assert list(journal.latest) == [os.fsdecode(b"\xff.blend")]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        {"file": "../out.blend", "unfinished": ".1.unfinished.blend"},
+        {"file": "/tmp/out.blend"},
+        {"file": "a.blend", "unfinished": "../../.1.unfinished.blend"},
+        {"file": "a.blend", "unfinished": 7},
+        {"file": "a.blend", "beside": [["../x", "../y", [1, 2]]]},
+        {"file": "a.blend", "beside": [["x", "/etc/y", [1, 2]]]},
+        {"file": "a.blend", "beside": [["x"]]},
+        {"file": "a.blend", "beside": "x"},
+        {"file": ["a.blend"]},
+        ["a.blend"],
+        "a.blend",
+    ],
+)
+def test_a_journal_leads_nowhere_else(tmp_path, line):
+    """A folder can come from anybody, with a journal in it that moves files about."""
+    out = tmp_path / "deep" / "out"
+    out.mkdir(parents=True)
+    for path in (out / ".1.unfinished.blend", tmp_path / "deep" / "x"):
+        path.write_bytes(b"a copy")
+    if isinstance(line, dict):
+        line = {"written": stamp(out / ".1.unfinished.blend"), **line}
+        line["unfinished"] = line.get("unfinished", ".1.unfinished.blend")
+        for one in line["beside"] if isinstance(line.get("beside"), list) else ():
+            one[2:] = [stamp(tmp_path / "deep" / "x")] if len(one) > 1 else []
+    (out / NAME).write_text(json.dumps(line) + "\n")
+    before = sorted(path for path in tmp_path.rglob("*"))
+    with Journal(out) as journal:
+        journal.recover()
+        assert journal.latest == {}
+    assert sorted(path for path in tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("pattern", "expected"),
+    [
+        ("tree/**/*.blend", ["a.blend", "sub/b.blend", "sub/deep/c.blend"]),
+        ("tree/**/c.blend", ["sub/deep/c.blend"]),
+        ("tree/**/deep/**/*.blend", ["sub/deep/c.blend"]),
+        ("tree/*/**/*.blend", ["sub/b.blend", "sub/deep/c.blend"]),
+        ("tree/**/.hidden/*.blend", [".hidden/d.blend"]),
+        ("tree/**", ["a.blend", "sub/b.blend", "sub/deep/c.blend"]),
+        ("tree/s*/**/[bc].blend", ["sub/b.blend", "sub/deep/c.blend"]),
+    ],
+)
+def test_patterns_end_where_links_lead_up_again(tmp_path, monkeypatch, pattern, expected):
+    """Two such links take glob 2 ** 40 steps."""
+    for name in ("a.blend", "sub/b.blend", "sub/deep/c.blend", ".hidden/d.blend"):
+        (tmp_path / "tree" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "tree" / name).touch()
+    monkeypatch.chdir(tmp_path)
+    found = {Path(path) for path in glob.glob(pattern, recursive=True) if Path(path).is_file()}
+    assert found == {Path("tree") / name for name in expected}
+    (tmp_path / "tree" / "round").symlink_to(".")
+    (tmp_path / "tree" / "sub" / "up").symlink_to("..")
+    jobs = plan_jobs([pattern], tmp_path / "out")
+    assert sorted(job.source.relative_to(tmp_path / "tree").as_posix() for job in jobs) == expected
+
+
+def test_a_list_separated_by_zeros(tmp_path):
+    with pytest.raises(WrongUse, match="not separated by zeros"):
+        plan_jobs(["-"], tmp_path / "out", ["a.blend\0b.blend\0"])

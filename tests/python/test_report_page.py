@@ -164,7 +164,7 @@ def test_a_folder_that_is_not_there_is_said_to_be(tmp_path):
 def test_a_file_in_the_place_of_the_folder_is_left(tmp_path):
     path = tmp_path / "out"
     path.write_text("mine")
-    assert "is a file, expected a folder" in run_report(path, status=1).stderr
+    assert f"{path} is a file" in run_report(path, status=1).stderr
     assert path.read_text() == "mine"
 
 

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The two routes by which Sinew deforms: within Blender's evaluation, and after the update."""
+
+from __future__ import annotations
+
+import bpy
+from sinew_addon.blender import handlers, properties, safe_mode, small_meshes
+
+EVALUATION, UPDATE = "evaluation", "update"
+ROUTES = (EVALUATION, UPDATE)
+
+
+def force(route: str) -> None:
+    """From now on Sinew takes this route; EVALUATION as far as it goes, as some rigs can not."""
+    safe_mode.set_forced(route == UPDATE)
+    # Small meshes would be left to the Armature modifier, and compared with itself.
+    small_meshes.is_used = False
+
+
+def release() -> None:
+    """As without force()."""
+    safe_mode.set_forced(None)
+    small_meshes.is_used = True
+
+
+class NotBySinewError(AssertionError):
+    """A shape that something else than Sinew made."""
+
+
+def taken(obj: bpy.types.Object, shapes_before: int) -> str:
+    """By which route Sinew made the shape that is shown.
+
+    shapes_before  how many it had made when the pose changed last
+
+    Raises NotBySinewError where it is not Sinew's.
+    """
+    settings, state = properties.of(obj), handlers.state_of(obj)
+    if not settings.enabled:
+        raise NotBySinewError(f"Sinew is off: {settings.error}")
+    if state is None or state.frames is None:
+        raise NotBySinewError("Sinew has not deformed it")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for modifier in obj.evaluated_get(depsgraph).modifiers:
+        replaced = modifier.type == "ARMATURE" and modifier.name in settings.stand_ins
+        if replaced and modifier.show_viewport:
+            raise NotBySinewError(f"the Armature modifier {modifier.name} is on")
+    if state.shapes <= shapes_before:
+        raise NotBySinewError("Sinew made no shape for this pose")
+    return EVALUATION if state.answered else UPDATE

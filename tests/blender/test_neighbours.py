@@ -1,0 +1,397 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What artists, scripts and other add-ons do to an object while Sinew is on it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.blender import drive, driven, handlers, properties, safe_mode, stack
+from sinew_addon.blender.plan import State
+from sinew_addon.blender.updates import turn, updates_suspended
+from sinew_addon.core.scale_rule import BLENDER_3
+
+FRAMES = [1, 6, 11]
+
+
+@pytest.fixture(params=[False, True], ids=["in depsgraph", "after update"])
+def route(request, monkeypatch) -> State:
+    """Each test once on each route."""
+    monkeypatch.setattr(safe_mode, "_forced", request.param)
+    return State.AFTER_UPDATE if request.param else State.IN_DEPSGRAPH
+
+
+@pytest.fixture
+def arm(route) -> bpy.types.Object:
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(6)
+    assert handlers.state_of(obj).plan.state is route
+    return obj
+
+
+@pytest.fixture
+def neighbour() -> Iterator[Callable]:
+    """neighbour(event, function): another add-on's handler, behind Sinew's; returns what takes it off."""
+    added = []
+
+    def add(event: str, function: Callable[[], None]) -> Callable[[], None]:
+        def call(*_args: object) -> None:
+            function()
+
+        functions = getattr(bpy.app.handlers, event)
+        functions.append(call)
+        added.append(lambda: functions.remove(call) if call in functions else None)
+        return added[-1]
+
+    yield add
+    for take_off in added:
+        take_off()
+
+
+def assert_equals_modifier(obj: bpy.types.Object, preserve_volume: bool = True) -> None:
+    got = scenes.shapes(obj, FRAMES)
+    assert not properties.of(obj).error
+    properties.of(obj).enabled = False
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume)
+    properties.of(obj).enabled = True
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def edit_weights(obj: bpy.types.Object) -> None:
+    obj.vertex_groups["bone.0"].add(range(100, 200), 0.5, "REPLACE")
+
+
+def edit_vertices(obj: bpy.types.Object) -> None:
+    for vertex in obj.data.vertices:
+        vertex.co.z += 0.3
+    obj.data.update()
+
+
+@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
+@pytest.mark.parametrize("setting", ["method", "enabled", "heat", "scale_rule"])
+def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
+    settings = properties.of(arm)
+    if setting == "method":
+        settings.method = "lbs"
+    elif setting == "enabled":
+        settings.enabled = False
+        settings.enabled = True
+    elif setting == "heat":
+        settings.heat = True
+    else:
+        settings.scale_rule = BLENDER_3.name
+    edit(arm)
+    bpy.context.scene.frame_set(10)
+    got = scenes.final_points(arm)
+    settings.enabled = False
+    expected = scenes.modifier_shapes(arm, [10], setting != "method")[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
+@pytest.mark.parametrize("keyed", [False, True])
+def test_an_edit_of_a_mesh_with_shape_keys_before_a_frame_is_seen(route, keyed):
+    obj, _armature = scenes.make_arm()
+    if keyed:
+        scenes.key_shape(obj)
+    else:
+        obj.shape_key_add(name="Basis")
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(4)
+    edit_weights(obj)
+    bpy.context.scene.frame_set(5)
+    assert_equals_modifier(obj)
+
+
+def test_an_edit_behind_something_in_front_before_a_frame_is_seen():
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Front", "MIRROR")
+    obj.modifiers.move(1, 0)
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(4)
+    edit_weights(obj)
+    bpy.context.scene.frame_set(5)
+    assert_equals_modifier(obj)
+
+
+@pytest.mark.parametrize("frame", [1, 6])
+def test_applied(arm, frame):
+    """At rest, too, where a deleted one would look the same."""
+    shown = scenes.shapes(arm, [frame])[0]
+    bpy.ops.object.modifier_apply(modifier=stack.sinew_modifier(arm).name)
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        assert np.array_equal(scenes.final_points(arm), shown)
+    assert len(arm.modifiers) == 0
+    assert not properties.is_driven(arm)
+    assert arm.animation_data is None
+    assert not [each.name for each in arm.data.attributes if "sinew" in each.name]
+    assert not [other.name for other in bpy.data.objects if properties.is_helper(other)]
+
+
+def test_converted_to_a_mesh(arm):
+    shown = scenes.shapes(arm, [6])[0]
+    bpy.ops.object.convert(target="MESH")
+    converted = bpy.context.object
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        assert np.array_equal(scenes.final_points(converted), shown)
+    assert not properties.is_driven(converted)
+
+
+@pytest.mark.parametrize("frame", [1, 6])
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame):
+    """At rest, too, where an applied one would look the same."""
+    expected = scenes.shapes(arm, FRAMES)
+    bpy.context.scene.frame_set(frame)
+    properties.of(arm).enabled = enabled
+    arm.modifiers.remove(stack.sinew_modifier(arm))
+    bpy.context.view_layer.update()
+    assert [modifier.type for modifier in arm.modifiers] == ["ARMATURE"]
+    assert not properties.is_driven(arm)
+    arm.modifiers["Armature"].use_deform_preserve_volume = True
+    got = scenes.shapes(arm, FRAMES)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
+def test_copied_modifiers_work(arm):
+    other, _rig = scenes.make_arm(name="Other")
+    other.modifiers.clear()
+    # Its modifier has the same name.
+    another, _rig = scenes.make_arm(name="A First")
+    scenes.add_sinew(another, "lbs")
+    another.select_set(False)
+    for each in (arm, other):
+        each.select_set(True)
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    bpy.context.view_layer.update()
+    assert properties.is_driven(other)
+    assert properties.of(other).method == "dq"
+    assert properties.of(other).armature == properties.of(arm).armature
+    assert_equals_modifier(other)
+    assert_equals_modifier(arm)
+
+
+def test_a_node_group_removed_behind_sinews_handler(arm, neighbour):
+    removed = []
+
+    def remove() -> None:
+        if not removed:
+            removed.append(bpy.data.node_groups.remove(stack.sinew_modifier(arm).node_group))
+
+    neighbour("frame_change_post", remove)
+    bpy.context.scene.frame_set(7)
+    assert removed
+    bpy.context.scene.frame_set(8)
+    bpy.context.scene.frame_set(9)
+    assert_equals_modifier(arm)
+
+
+def test_a_node_group_removed_at_every_frame_is_said(arm, neighbour):
+    def remove() -> None:
+        group = stack.sinew_modifier(arm).node_group
+        if group is not None:
+            bpy.data.node_groups.remove(group)
+
+    neighbour("frame_change_post", remove)
+    for frame in range(2, 8):
+        bpy.context.scene.frame_set(frame)
+    assert "again and again" in properties.of(arm).error
+    assert arm.modifiers["Armature"].show_viewport
+    assert scenes.worst(scenes.shapes(arm, [11])[0], scenes.rest_points(arm)) > 0.1
+
+
+@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
+def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
+    removed = []
+
+    def remove() -> None:
+        if not removed:
+            removed.append(arm.modifiers.remove(stack.sinew_modifier(arm)))
+
+    neighbour(event, remove)
+    arm.update_tag()
+    bpy.context.view_layer.update()
+    for frame in (7, 8, 9):
+        bpy.context.scene.frame_set(frame)
+    assert removed
+    assert not properties.is_driven(arm)
+    own = arm.modifiers["Armature"]
+    assert own.show_viewport
+    assert own.object is not None
+
+
+@pytest.mark.parametrize("what", ["rename", "delete", "add", "delete object", "throw"])
+def test_suspended_modifiers_come_back_whatever_a_neighbour_does(neighbour, what):
+    obj, armature = scenes.make_arm()
+    for name in ("Behind", "Further"):
+        obj.modifiers.new(name, "CAST").factor = 0.1
+    obj.parent = armature
+    armature.keyframe_insert("location", frame=1)
+    armature.location.x = 3.0
+    armature.keyframe_insert("location", frame=11)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Twin", obj.data))
+    other, _rig = scenes.make_arm(name="Other")
+    scenes.add_sinew(obj, "dq")
+    scenes.shapes(obj, [2, 3, 4])
+    assert handlers.state_of(obj).dirtied_by_frames
+    suspended = []
+
+    def interfere() -> None:
+        suspended.append(not obj.modifiers[-1].show_viewport)
+        if what == "rename":
+            obj.modifiers["Behind"].name = "Renamed"
+        elif what == "delete":
+            obj.modifiers.remove(obj.modifiers["Behind"])
+        elif what == "add":
+            obj.modifiers.new("Added", "CAST").factor = 0.0
+        elif what == "delete object":
+            bpy.data.objects.remove(other)
+        else:
+            raise RuntimeError("a neighbour's own fault")
+
+    take_off = neighbour("frame_change_pre", interfere)
+    bpy.context.scene.frame_set(5)
+    assert suspended == [True]
+    take_off()
+    assert all(m.show_viewport and m.show_render for m in obj.modifiers if m.type == "CAST")
+    assert_equals_modifier(obj)
+
+
+def test_an_artists_driver_stays(arm):
+    driver = arm.driver_add("location", 0).driver
+    variable = driver.variables.new()
+    variable.name = "sinew_0"
+    variable.targets[0].id, variable.targets[0].data_path = arm, "location[1]"
+    scenes.shapes(arm, FRAMES)
+    properties.of(arm).heat = True
+    scenes.shapes(arm, FRAMES)
+    drive.remove(arm)
+    assert [curve.data_path for curve in arm.animation_data.drivers] == ["location"]
+
+
+def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(6)
+
+    def fail(*_args: object) -> None:
+        raise RuntimeError("disk on fire")
+
+    monkeypatch.setattr(driven, "_deform_into", fail)
+    got = scenes.shapes(obj, [2, 3, 4, 5])
+    state = handlers.state_of(obj)
+    assert state.failures > 0
+    assert "disk on fire" in state.failure
+    assert state.plan.state is State.AFTER_UPDATE
+    assert "disk on fire" in state.plan.reason
+    expected = scenes.modifier_shapes(obj, [2, 3, 4, 5], preserve_volume=True)
+    monkeypatch.undo()
+    drive.remove(obj)
+    expected = scenes.modifier_shapes(obj, [4, 5], preserve_volume=True)
+    assert scenes.worst(got[2:], expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("how", ["forced", "environment"])
+def test_in_safe_mode_nothing_runs_within_the_evaluation(monkeypatch, how):
+    if how == "forced":
+        monkeypatch.setattr(safe_mode, "_forced", True)
+    else:
+        monkeypatch.setenv(safe_mode.VARIABLE, "1")
+    obj, _armature = scenes.make_arm()
+    asked = []
+    monkeypatch.setattr(driven, "deform_evaluated", lambda *arguments: asked.append(arguments))
+    scenes.add_sinew(obj, "dq")
+    assert_equals_modifier(obj)
+    assert asked == []
+    assert handlers.state_of(obj).plan.reason == "Safe mode"
+
+
+def test_suspended_by_two_threads_at_once():
+    """As by a window and by its render's thread: the second waits, and at the end nothing is suspended."""
+    order, entered = [], threading.Event()
+
+    def other() -> None:
+        entered.set()
+        with updates_suspended():
+            order.append("other")
+
+    thread = threading.Thread(target=other)
+    with updates_suspended():
+        thread.start()
+        entered.wait(10)
+        thread.join(0.2)
+        with turn() as is_ours:
+            assert not is_ours
+        order.append("this")
+    thread.join(10)
+    assert order == ["this", "other"]
+    with turn() as is_ours:
+        assert is_ours
+
+
+def test_an_object_renamed_in_a_handler(arm, neighbour):
+    neighbour("frame_change_pre", lambda: setattr(arm, "name", f"At {bpy.context.scene.frame_current}"))
+    for frame in (7, 8, 9):
+        bpy.context.scene.frame_set(frame)
+        assert scenes.worst(scenes.final_points(arm), scenes.rest_points(arm)) > 0.1
+    assert_equals_modifier(arm)
+
+
+def test_tools_for_weights_see_the_bones_that_deform(arm):
+    """Normalize All leaves groups without such a bone alone, but only where an Armature modifier is on."""
+    mask = arm.vertex_groups.new(name="mask")
+    mask.add(range(252), 0.3, "REPLACE")
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    bpy.context.view_layer.update()
+    shown = scenes.final_points(arm)
+    arm.vertex_groups.active_index = 0
+    bpy.ops.object.vertex_group_normalize_all(group_select_mode="BONE_DEFORM", lock_active=False)
+    assert {round(mask.weight(vertex), 6) for vertex in range(252)} == {0.3}
+    bpy.context.view_layer.update()
+    # The weights of the tube are normalized as they are.
+    assert scenes.worst(scenes.final_points(arm), shown) <= 1e-5
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    assert [m.name for m in arm.modifiers] == ["Sinew", "Armature"]
+    assert not arm.modifiers["Armature"].show_viewport
+    assert_equals_modifier(arm)
+    drive.remove(arm)
+    assert arm.modifiers["Armature"].show_viewport
+    assert arm.modifiers["Armature"].show_render
+
+
+@pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
+def test_modifiers_renamed_at_every_frame(arm, neighbour, event):
+    def rename() -> None:
+        for modifier in arm.modifiers:
+            modifier.name = f"{modifier.type} {bpy.context.scene.frame_current}"
+
+    neighbour(event, rename)
+    for frame in range(2, 9):
+        bpy.context.scene.frame_set(frame)
+        assert scenes.worst(scenes.final_points(arm), scenes.rest_points(arm)) > 0.01
+    assert_equals_modifier(arm)
+
+
+def test_a_parent_that_deforms_becomes_another(route):
+    obj, armature = scenes.make_arm()
+    obj.modifiers.clear()
+    _other, rig = scenes.make_arm(name="Other")
+    scenes.forget_keys(rig)
+    scenes.bend(rig, 70.0)
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(6)
+    obj.parent = rig
+    bpy.context.view_layer.update()
+    assert_equals_modifier(obj, preserve_volume=False)

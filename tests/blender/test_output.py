@@ -1,0 +1,423 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a command can not write: one sentence, exit status 1, nothing half-written, no traceback.
+
+Tests may run as root, who may write to every folder: so files and links stand where a folder is wanted,
+disks are read-only or full, and /proc takes no files.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import subprocess
+import zipfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from program import run_sinew, start_sinew
+from sinew_addon import cli
+from sinew_addon.core import output
+from sinew_addon.core.errors import SinewError, WrongUse
+from sinew_addon.core.names import as_file_name
+
+oldest_and_newest = pytest.mark.skipif(
+    bpy.app.version[:2] not in ((4, 2), (5, 2)), reason="long: runs with the oldest and the newest Blender"
+)
+OUT = "OUT"
+# Of each command that writes: how, and the name of what it is given to write.
+WRITERS = {
+    "points": (("points", "FILE", "--method", "dq", "--frames", "1,6", "--out", OUT), "points.npz"),
+    "reskin": (("reskin", "FILE", "--method", "dq", "--frames", "none", "--out", OUT), "out"),
+    "restore": (("restore", "RESKINNED", "--out", OUT), "out"),
+    "inbetween": (("inbetween", "FILE", "--method", "sclerp", "--out", OUT), "out"),
+    **{
+        f"bake {kind}": (
+            ("bake", "FILE", "--method", "dq", "--to", kind, "--frames", "1-3", "--out", OUT),
+            "out",
+        )
+        for kind in ("shape-keys", "mdd", "alembic", "usd", "gltf")
+    },
+    "compare": (
+        ("compare", "FILE", "--frames", "1,6", "--pictures", "1", "--size", "64", "--out", OUT),
+        "out",
+    ),
+    "compare sheet": (("compare", "FILE", "--frame", "6", "--size", "64", "--out", OUT), "sheet.png"),
+    "render": (
+        ("render", "FILE", "--method", "dq", "--frames", "1,6", "--size", "64", "--out", OUT),
+        "out",
+    ),
+    "report": (("report", "--quick", "--out", OUT), "out"),
+}
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    """An arm with an action of bones, and the same re-skinned."""
+    folder = tmp_path_factory.mktemp("inputs")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes.make_arm()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "arm.blend"))
+    run_sinew(
+        "reskin", folder / "arm.blend", "--method", "dq", "--frames", "none", "--out", folder / "skinned"
+    )
+    return {"FILE": folder / "arm.blend", "RESKINNED": folder / "skinned" / "arm.blend"}
+
+
+def arguments_of(writer: str, inputs: dict, out: Path) -> list[str]:
+    arguments, _name = WRITERS[writer]
+    places = {**inputs, OUT: out}
+    return [str(places.get(argument, argument)) for argument in arguments]
+
+
+@contextmanager
+def disk(folder: Path, options: str):
+    """A disk in memory, mounted at a new folder."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("may not mount a disk here")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def complaint(errors: str) -> str:
+    """The one line that says what is wrong."""
+    (line,) = [line for line in errors.splitlines() if line.startswith("sinew: ")]
+    return line
+
+
+def complaint_here(arguments: list[str], capsys) -> str:
+    """The same of a command that ends before it has anything to do with Blender, without a process for it."""
+    assert cli.main(arguments) == 1
+    return complaint(capsys.readouterr().err)
+
+
+def all_in(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+def test_every_command_that_writes_is_tested_here():
+    commands = re.findall(r"^    ([a-z]+)\b", run_sinew("--help").stdout, re.MULTILINE)
+    assert len(commands) > 8
+    assert {name for name in commands if "--out" in run_sinew(name, "--help").stdout} == {
+        name.split()[0] for name in WRITERS
+    }
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_no_folder_to_write_to(writer, inputs, tmp_path, capsys):
+    name = WRITERS[writer][1]
+    file = tmp_path / "taken.blend"
+    file.write_bytes(b"precious")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone" / "too")
+    failed = run_sinew(*arguments_of(writer, inputs, file / "x" / name), status=1)
+    assert "can not be written" in complaint(failed.stderr)
+    assert f"{file} is a file" in failed.stderr
+    assert failed.stdout == ""
+    for place, wanted in (
+        (tmp_path / "nowhere" / "x" / name, "is a link to nothing"),
+        (Path("/proc/sinew") / name, "nothing can be made in /proc"),
+    ):
+        assert wanted in complaint_here(arguments_of(writer, inputs, place), capsys)
+    assert file.read_bytes() == b"precious"
+    assert all_in(tmp_path) == ["nowhere", "taken.blend"]
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_the_wrong_thing_has_the_name(writer, inputs, tmp_path, capsys):
+    """A file where a folder is to be, and a folder where a file is."""
+    place = tmp_path / WRITERS[writer][1]
+    if place.suffix:
+        place.mkdir()
+        wanted = "is a folder, expected a file"
+    else:
+        place.write_bytes(b"precious")
+        wanted = "is a file"
+    assert wanted in complaint_here(arguments_of(writer, inputs, place), capsys)
+    assert all_in(tmp_path) == [place.name]
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_a_read_only_disk(writer, inputs, tmp_path, capsys):
+    with disk(tmp_path / "locked", "ro") as folder:
+        place = folder / "deep" / WRITERS[writer][1]
+        assert "Read-only file system" in complaint_here(arguments_of(writer, inputs, place), capsys)
+
+
+@oldest_and_newest
+@pytest.mark.parametrize("writer", WRITERS)
+def test_a_full_disk(writer, inputs, tmp_path):
+    """Room for a folder or two, and for no file."""
+    with disk(tmp_path / "full", "size=16k") as folder:
+        (folder / "ballast").write_bytes(bytes(16 * 1024 - 4096))
+        with pytest.raises(OSError, match="No space"):
+            (folder / "ballast 2").write_bytes(bytes(8192))
+        (folder / "ballast 2").unlink()
+        failed = run_sinew(*arguments_of(writer, inputs, folder / "deep" / WRITERS[writer][1]), status=1)
+        assert re.search(r"can not be written|can not be drawn|are free", failed.stderr), failed.stderr
+        left = [path for path in folder.rglob("*") if path.is_file() and path.name != "ballast"]
+        assert [path.name for path in left if "unfinished" in path.name or not path.stat().st_size] == []
+
+
+@oldest_and_newest
+@pytest.mark.parametrize("writer", WRITERS)
+def test_a_write_that_stops_half_way(writer, inputs, tmp_path):
+    """A limit on the size of files stands in for a disk that fills up meanwhile."""
+    place = tmp_path / "deep" / WRITERS[writer][1]
+    process = start_sinew(
+        *arguments_of(writer, inputs, place),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (600, 600)),
+    )
+    _output, errors = process.communicate(timeout=120)
+    assert process.returncode == 1, errors
+    assert "Traceback" not in errors, errors
+    assert re.search(r"can not be (written|drawn)", errors), errors
+    left = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert [path.name for path in left if "unfinished" in path.name] == []
+    # A journal keeps whole lines, however few; a report of that can be small enough.
+    assert {path.name for path in left} <= {"sinew-journal.jsonl", "report.json"}
+    assert all(json.loads(path.read_text()) for path in left if path.name == "report.json")
+
+
+def test_a_device_is_not_replaced(tmp_path):
+    """To rename a file to /dev/null would take that away from the whole machine."""
+    pipe = tmp_path / "pipe.npz"
+    os.mkfifo(pipe)
+    with pytest.raises(SinewError, match="is a device or a pipe"):
+        output.file_to_write(pipe, (".npz",))
+
+
+def test_points_replace_no_other_kind_of_file(inputs):
+    before = inputs["FILE"].read_bytes()
+    refused = run_sinew(*arguments_of("points", inputs, inputs["FILE"]), status=2)
+    assert "expected a name ending in .npz" in complaint(refused.stderr)
+    assert inputs["FILE"].read_bytes() == before
+
+
+def test_what_is_raised_meanwhile_leaves_nothing(tmp_path):
+    def write(unfinished: Path) -> None:
+        unfinished.write_text("half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        output.write_whole(tmp_path / "a" / "b" / "c.txt", write)
+    assert all_in(tmp_path) == []
+
+
+@pytest.mark.parametrize("arguments", [("methods",), ("methods", "--json"), ("info", "FILE")])
+def test_standard_output_on_a_full_disk(arguments, inputs):
+    with open("/dev/full", "w") as full:
+        process = start_sinew(
+            *(inputs.get(argument, argument) for argument in arguments),
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        _output, errors = process.communicate(timeout=60)
+    assert complaint(errors) == "sinew: standard output: can not be written: No space left on device"
+    assert process.returncode == 1
+    assert "Traceback" not in errors
+    assert "Exception ignored" not in errors
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("info", "FOLDER"),
+        ("info", "FILE/x.blend"),
+        ("points", "FILE/x.blend", "--method", "dq", "--frames", "1", "--out", "OUT.npz"),
+        ("compare", "FOLDER", "--out", "OUT"),
+        ("render", "FILE", "--against", "FILE", "--out", "OUT"),
+        ("render", "FILE", "--against", "FILE/x", "--out", "OUT"),
+        ("reskin", "FILE/x.blend", "--method", "dq", "--out", "OUT"),
+        ("report", "--programs", "FILE", "--out", "OUT"),
+        ("report", "--blend-files", "FILE/x", "--out", "OUT"),
+        ("bake", "FILE/x.blend", "--method", "dq", "--to", "mdd", "--out", "OUT"),
+        ("inbetween", "FILE/x", "--method", "dlb", "--out", "OUT"),
+        ("info", "LONG"),
+        ("reskin", "LONG", "--method", "dq", "--out", "OUT"),
+        ("points", "FILE", "--method", "dq", "--frames", "1", "--out", "LONG.npz"),
+        ("reskin", "FILE", "--method", "dq", "--out", "LONG"),
+    ],
+)
+def test_what_can_not_be_read(arguments, inputs, tmp_path):
+    places = {
+        "FILE": str(inputs["FILE"]),
+        "FOLDER": str(tmp_path),
+        "OUT": str(tmp_path / "out"),
+        "LONG": str(tmp_path / ("a" * 300)),
+    }
+    words = [re.sub(r"\b(FILE|FOLDER|OUT|LONG)\b", lambda found: places[found[0]], a) for a in arguments]
+    failed = run_sinew(*words, status=1)
+    assert complaint(failed.stderr)
+    assert not [path for path in tmp_path.rglob("*") if "unfinished" in path.name]
+
+
+@pytest.mark.parametrize("option", ["--job"])
+def test_a_job_file_that_is_a_folder(option, tmp_path):
+    refused = run_sinew("reskin", option, tmp_path, "--out", tmp_path / "out", status=2)
+    assert "can not be read" in complaint(refused.stderr)
+
+
+NAMES = [
+    "../../x",
+    "/etc/x",
+    "a/b",
+    "..",
+    "C:\\x",
+    "C:x",
+    "mixamorig:Body",
+    "100%2F",
+    "Häschen 50%",
+    "\x1b[2J",
+]
+
+
+def test_names_of_objects_stay_in_the_archive(tmp_path):
+    """They are keys of numpy's, and names of files for whoever unpacks the archive."""
+    for name in NAMES:
+        obj, _armature = scenes.make_arm(sides=6, rings=5, name="Arm")
+        obj.name = name
+        assert obj.name == name
+    file, out = tmp_path / "names.blend", tmp_path / "deep" / "below" / "points.npz"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    done = run_sinew("points", file, "--method", "dq", "--frames", "1", "--out", out)
+    assert "\x1b" not in done.stderr
+    with np.load(out) as arrays:
+        assert set(arrays.files) == {as_file_name(name) for name in NAMES} | {"frames"}
+        assert "mixamorig:Body" in arrays.files
+        assert "..%2F..%2Fx" in arrays.files
+    with zipfile.ZipFile(out) as archive:
+        for member in archive.namelist():
+            assert not re.search(r"[/\\]|^\.+$|^[A-Za-z]:", member.removesuffix(".npy")), member
+
+
+def test_names_can_be_had_back():
+    from urllib.parse import unquote
+
+    for name in NAMES:
+        assert unquote(as_file_name(name)) == name
+
+
+def test_two_objects_of_one_name(tmp_path):
+    """A linked one beside one of the file's own: each has its array."""
+    scenes.make_arm(sides=6, rings=5, name="Arm")
+    library = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes.make_arm(sides=8, rings=5, name="Arm")
+    with bpy.data.libraries.load(str(library), link=True) as (_there, here):
+        here.objects = ["Arm", "Arm Rig"]
+    for obj in here.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    shot = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    out = tmp_path / "points.npz"
+    run_sinew("points", shot, "--method", "blender", "--frames", "1,6", "--out", out)
+    with np.load(out) as arrays:
+        assert sorted(arrays.files) == ["Arm", "Arm [library.blend]", "frames"]
+        assert arrays["Arm"].shape == (2, 40, 3)
+        assert arrays["Arm [library.blend]"].shape == (2, 30, 3)
+
+
+@pytest.mark.parametrize("name", ["a{b}#1.blend", "{blend_name}.blend", "##.blend"])
+def test_names_that_blender_would_fill_in(name, inputs, tmp_path):
+    """Blender replaces # by the frame, and from 5.0 on {…}, in the paths of what it renders."""
+    file = tmp_path / name
+    file.write_bytes(inputs["FILE"].read_bytes())
+    out = tmp_path / "o{scene_name}ut ##"
+    run_sinew("render", file, "--method", "dq", "--frames", "6", "--size", "64", "--out", out)
+    assert all_in(out) == ["0006.png", "render.json"]
+    run_sinew("compare", file, "--frames", "1,6", "--size", "64", "--pictures", "1", "--video", "--out", out)
+    assert (out / f"{file.stem}.html").exists()
+    assert (out / file.stem / "video.mp4").stat().st_size > 1000
+    assert [path for path in (out / file.stem / "pictures").iterdir() if path.suffix == ".png"]
+    assert all_in(tmp_path) == sorted([name, out.name, *(f"{out.name}/{path}" for path in all_in(out))])
+
+
+def test_no_two_frames_have_one_picture(inputs, tmp_path):
+    out = tmp_path / "out"
+    run_sinew(
+        *("render", inputs["FILE"], "--method", "dq", "--size", "64", "--out", out),
+        *("--frames", "6,6.5,6.501,6.999,-2.25"),
+    )
+    assert len(list(out.glob("*.png"))) == 5
+
+
+def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
+    picture = tmp_path / "0006.png"
+    picture.write_bytes(b"rendered for days")
+    command = ("render", inputs["FILE"], "--method", "dq", "--frames", "6", "--size", "64", "--out", tmp_path)
+    assert "0006.png" in complaint(run_sinew(*command, status=1).stderr)
+    assert picture.read_bytes() == b"rendered for days"
+    picture.unlink()
+    run_sinew(*command)
+    run_sinew(*command)
+
+
+def test_the_wrong_ending():
+    with pytest.raises(WrongUse, match=r"expected a name ending in \.png"):
+        output.file_to_write("sheet.jpg", (".png",))
+
+
+def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
+    """Of dead runs alone: those of a live one, of another program and of nobody knows whom stay."""
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    (temporary / "sinew-of-an-older-version").mkdir()
+    (temporary / "other").mkdir()
+    program = (
+        "from sinew_addon.core.scratch import ScratchFolder\n"
+        "folder = ScratchFolder(); (folder.path / 'deep').mkdir(); print(folder.path, flush=True); input()"
+    )
+
+    def start() -> tuple[subprocess.Popen, Path]:
+        process = subprocess.Popen(
+            [os.sys.executable, "-c", program],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "TMPDIR": str(temporary)},
+        )
+        return process, Path(process.stdout.readline().strip())
+
+    (killed, left), (alive, kept) = start(), start()
+    killed.kill()
+    killed.wait()
+    assert left.exists()
+    third, own = start()
+    try:
+        assert not left.exists()
+        assert (kept / "deep").exists()
+        assert own.exists()
+        assert (temporary / "sinew-of-an-older-version").exists()
+        assert (temporary / "other").exists()
+    finally:
+        for process in (alive, third):
+            process.kill()
+            process.communicate()
+
+
+def test_a_batch_clears_away_after_one_that_was_killed(tmp_path, inputs):
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    command = ("reskin", inputs["FILE"], "--method", "dq", "--frames", "none", "--out", tmp_path / "out")
+    process = start_sinew(*command, env_more={"TMPDIR": str(temporary)})
+    while not list(temporary.glob("sinew-*/doing")):
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+    assert list(temporary.glob("sinew-*"))
+    run_sinew(*command, "--overwrite", env_more={"TMPDIR": str(temporary)})
+    assert list(temporary.glob("sinew-*")) == []

@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that are saved while Sinew is at work: Blender's own, for those who have no Sinew, and Sinew's again
+when they are opened with it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.blender import (
+    drive,
+    exporters,
+    handlers,
+    node_group,
+    note,
+    properties,
+    safe_mode,
+    small_meshes,
+    stack,
+)
+
+FRAMES = [1, 6, 11]
+
+READ = """
+import json, sys, bpy, numpy as np
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+assert not hasattr(bpy.types.Object, "sinew")
+scene, obj = bpy.context.scene, bpy.data.objects["Arm"]
+if obj.mode != "OBJECT":
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="OBJECT")
+shapes = []
+for frame in json.loads(sys.argv[3]):
+    scene.frame_set(frame)
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    shapes.append(points)
+np.save(sys.argv[2], np.stack(shapes))
+sinews = obj.modifiers["Sinew"]
+sinews.show_viewport = True
+bpy.context.view_layer.update()
+warnings = [w.message for w in getattr(sinews, "node_warnings", ())]
+print("FACTS " + json.dumps({
+    "texts": [text.as_string() for text in bpy.data.texts],
+    "labels": [node.label for node in sinews.node_group.nodes if node.type == "FRAME"],
+    "warnings": warnings,
+    "drivers": [d.data_path for d in obj.animation_data.drivers] if obj.animation_data else [],
+}))
+"""
+
+
+def without_sinew(path: Path) -> tuple[np.ndarray, dict]:
+    """The shapes at FRAMES in a Blender that has never heard of Sinew, and what the file tells there."""
+    result = path.with_suffix(".npy")
+    run = subprocess.run(
+        [sys.executable, "-c", READ, str(path), str(result), json.dumps(FRAMES)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    facts = json.loads(next(line for line in run.stdout.splitlines() if line.startswith("FACTS "))[6:])
+    return np.load(result), facts
+
+
+def save(path: Path, **options: object) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
+
+
+@pytest.mark.parametrize("safe", [False, True])
+@pytest.mark.parametrize(
+    ("method", "preserve_volume"), [("lbs", False), ("dq", True), ("qv", False)], ids=["lbs", "dq", "qv"]
+)
+def test_a_blender_without_sinew_plays_the_nearest_shape(
+    tmp_path, monkeypatch, method, preserve_volume, safe
+):
+    monkeypatch.setattr(safe_mode, "_forced", safe)
+    obj, _armature = scenes.make_arm()
+    obj.modifiers[0].use_deform_preserve_volume = not preserve_volume
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume)
+    scenes.add_sinew(obj, method)
+    ours = scenes.shapes(obj, FRAMES)
+    path = tmp_path / "saved.blend"
+    save(path)
+    # Sinew goes on, and the artist's own choice stays.
+    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
+    assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
+    assert not [text for text in bpy.data.texts if text.get(note.MARK)]
+    shapes, facts = without_sinew(path)
+    assert np.array_equal(shapes, expected)
+    assert any("Arm" in text and "Sinew" in text for text in facts["texts"])
+    assert any("Sinew" in label for label in facts["labels"])
+    assert facts["drivers"] == []
+    if hasattr(bpy.types, "GeometryNodeWarning"):
+        assert node_group.MISSING in facts["warnings"]
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Arm"]
+    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
+    assert not [text for text in bpy.data.texts if text.get(note.MARK)]
+    drive.remove(obj)
+    assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
+
+
+def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
+    """A thumbnail has the scene evaluated there: so does this neighbour, in background as in a window."""
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    seen = []
+
+    def state() -> tuple:
+        own, sinews = obj.modifiers["Armature"], stack.sinew_modifier(obj)
+        return own.object, own.show_viewport, own.show_render, sinews.show_viewport, sinews.show_render
+
+    def neighbour(*_args: object) -> None:
+        before = state()
+        obj.update_tag()
+        bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(5)
+        handlers.refresh(bpy.context)
+        bpy.context.scene.frame_set(11)
+        seen.append((before, state()))
+
+    bpy.app.handlers.save_pre.append(neighbour)
+    try:
+        save(tmp_path / "saved.blend")
+    finally:
+        bpy.app.handlers.save_pre.remove(neighbour)
+    blenders_own = (armature, True, True, False, False)
+    assert seen == [(blenders_own, blenders_own)]
+    assert not state()[1]
+    expected = scenes.final_points(obj)
+    scenes.shapes(obj, FRAMES)
+    assert np.array_equal(scenes.shapes(obj, [11])[0], expected)
+
+
+def test_what_a_neighbour_changes_while_the_file_is_saved_is_seen(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(11)
+
+    def neighbour(*_args: object) -> None:
+        obj.vertex_groups["bone.1"].add(range(100), 0.7, "REPLACE")
+
+    bpy.app.handlers.save_pre.append(neighbour)
+    try:
+        save(tmp_path / "saved.blend")
+    finally:
+        bpy.app.handlers.save_pre.remove(neighbour)
+    got = scenes.shapes(obj, FRAMES)
+    properties.of(obj).enabled = False
+    assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_a_save_that_fails_ends_as_one_that_does_not(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    expected = scenes.shapes(obj, FRAMES)
+    with pytest.raises(RuntimeError):
+        save(tmp_path / "no such folder" / "saved.blend")
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+    assert not handlers.session.is_saving
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_saved_in_a_mode_of_the_modifier(tmp_path, mode):
+    obj, _armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    scenes.add_sinew(obj, "dq")
+    ours = scenes.shapes(obj, FRAMES)
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.view_layer.update()
+    save(tmp_path / "saved.blend")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
+    assert not obj.modifiers["Armature"].use_deform_preserve_volume
+    shapes, _facts = without_sinew(tmp_path / "saved.blend")
+    assert scenes.worst(shapes, expected) <= 1e-6
+
+
+@pytest.mark.parametrize("what", ["small", "throws", "off"])
+def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
+    small, armature = scenes.make_arm(name="A First")
+    obj, _armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    monkeypatch.setattr(small_meshes, "is_used", what == "small")
+    scenes.add_sinew(small, "lbs")
+    monkeypatch.setattr(small_meshes, "is_used", False)
+    properties.of(small).enabled = what != "off"
+    scenes.add_sinew(obj, "dq")
+    prepare = drive.prepare_for_save
+
+    def throw(each: bpy.types.Object) -> bool:
+        if each == small and what == "throws":
+            raise RuntimeError("disk on fire")
+        return prepare(each)
+
+    monkeypatch.setattr(drive, "prepare_for_save", throw)
+    save(tmp_path / "saved.blend")
+    shapes, _facts = without_sinew(tmp_path / "saved.blend")
+    assert np.array_equal(shapes, expected)
+    if what != "throws":
+        assert small.modifiers["Armature"].object == armature
+
+
+def test_in_memory_the_modifiers_keep_their_armatures():
+    """Of what Blender writes without a word: autosaves, quit.blend, undo steps."""
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        assert obj.modifiers["Armature"].object == armature
+
+
+def test_a_keyed_pose_that_differs_is_not_lost_by_opening(tmp_path):
+    """Blender's first evaluation of an opened file takes poses from their keys."""
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    armature.pose.bones[1].rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
+    save(tmp_path / "saved.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.context.view_layer.update()
+    obj = bpy.data.objects["Arm"]
+    shown = scenes.final_points(obj)
+    bpy.context.scene.frame_set(10)
+    bpy.context.scene.frame_set(11)
+    assert np.array_equal(scenes.final_points(obj), shown)
+
+
+def test_the_menu_of_modifiers_offers_nothing_of_sinews():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).heat = True
+    bpy.ops.sinew.compare(methods={"lbs", "dq"})
+    groups = [group for group in bpy.data.node_groups if group.get(node_group.MARK)]
+    assert groups
+    assert not any(group.is_modifier for group in groups)
+
+
+def test_an_export_has_blenders_own_modifiers_and_frames(tmp_path):
+    """As exporters find them, frame by frame; afterwards Sinew goes on."""
+    obj, armature = scenes.make_arm()
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    scenes.add_sinew(obj, "dq")
+    ours = scenes.shapes(obj, FRAMES)
+    exporters.before_export()
+    assert obj.find_armature() == armature
+    assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
+    exporters.after_export()
+    assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
+
+
+def test_fbx_has_the_skin(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    ours = scenes.shapes(obj, FRAMES)
+    path = tmp_path / "arm.fbx"
+    bpy.ops.export_scene.fbx(filepath=str(path))
+    # The exporter writes poses and gives them back by their matrices.
+    assert scenes.worst(scenes.shapes(obj, FRAMES), ours) <= 1e-6
+    assert stack.sinew_modifier(obj).show_viewport
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.import_scene.fbx(filepath=str(path))
+    imported = next(o for o in bpy.data.objects if o.type == "MESH")
+    assert imported.find_armature() is not None
+    assert len(imported.vertex_groups) == 2
+
+
+def test_an_fbx_export_that_fails_ends_as_one_that_does_not(tmp_path):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    ours = scenes.shapes(obj, FRAMES)
+    with pytest.raises(RuntimeError):
+        bpy.ops.export_scene.fbx(filepath=str(tmp_path / "no such folder" / "arm.fbx"))
+    assert scenes.worst(scenes.shapes(obj, FRAMES), ours) <= 1e-6
+    assert stack.sinew_modifier(obj).show_viewport

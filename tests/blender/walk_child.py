@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One side of a walk in a process of its own, started by walk.py, as its Blender may crash.
+
+    python walk_child.py sinew|blender fast|safe FOLDER
+
+Reads pickled requests from its input and answers each on its output; Blender's own output goes nowhere, and
+what it writes to its error output is looked through for exceptions.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import random
+import re
+import sys
+import zlib
+from pathlib import Path
+
+
+class Render:
+    """What a render was given of each mesh, by Blender's evaluation for it."""
+
+    def __init__(self) -> None:
+        self.shapes: dict[str, object] = {}
+
+
+def make_engine(walker, points_of) -> type:
+    import bpy
+
+    class WalkRender(bpy.types.RenderEngine):
+        """Draws nothing, and keeps the shapes: a render of any other engine takes a second."""
+
+        bl_idname = "WALK_RENDER"
+        bl_label = "Walk"
+
+        def render(self, depsgraph) -> None:
+            scene = depsgraph.scene
+            for obj in depsgraph.objects:
+                if obj.type == "MESH" and not walker.side.is_ours(obj.original):
+                    name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
+                    walker.rendered[name] = points_of(obj)
+            result = self.begin_result(0, 0, 4, 4)
+            self.end_result(result)
+
+    return WalkRender
+
+
+class Child:
+    def __init__(self, role: str, route: str, folder: Path, errors: Path) -> None:
+        import bpy
+        import numpy as np
+        import walk_operations
+        import walk_sides
+
+        self.bpy, self.np, self.operations, self.sides = bpy, np, walk_operations, walk_sides
+        self.errors = errors
+        self.read_to = 0
+        self.side = walk_sides.SinewSide() if role == "sinew" else walk_sides.BlenderSide()
+        self.side.prepare(safe=route == "safe")
+        self.walker = walk_operations.Walker(self.side, folder)
+        self.walker.before_evaluation = self.before_evaluation
+        bpy.utils.register_class(make_engine(self.walker, self.points_of))
+        self.claims: dict = {}
+        self.wrong: list[str] = []
+        walk_operations.make_library(self.walker)
+
+    # --- Requests
+
+    def start(self, _request: dict) -> dict:
+        self.claims, self.wrong = {}, []
+        self.operations.start(self.walker)
+        self.bpy.ops.ed.undo_push(message="start")
+        # Those of a file that a walk before has left broken.
+        self.problems()
+        return {"said": "start", "problems": self.problems(), **self.look(check=True)}
+
+    def step(self, request: dict) -> dict:
+        name, seed = request["operation"], request["seed"]
+        # Sinew's side says how it is set before this operation and after it.
+        self.claims = request.get("claims_before") or {}
+        self.wrong = []
+        numbers = random.Random(seed)
+        operation = self.operations.OPERATIONS[name]
+        self.walker.rendered = {}
+        outcome, said = "done", None
+        try:
+            said = operation.act(self.walker, numbers)
+            if said is None:
+                outcome = "nothing"
+        except Exception as error:
+            outcome, said = "refused", f"{type(error).__name__}: {error}"
+            if not isinstance(error, RuntimeError) and type(error).__name__ != "SinewError":
+                outcome = "failed"
+        if outcome == "done" and name not in ("undo", "redo"):
+            self.walker.unpushed = True
+            if request["push"]:
+                self.walker.push_undo()
+        self.claims = request.get("claims_after") or {}
+        if not self.side.is_sinew:
+            self.wrong = []
+        result = {"outcome": outcome, "said": said, **self.look(request["check"])}
+        result["rendered"] = self.walker.rendered
+        if self.side.is_sinew and name == "remove_all" and not result["claims"]:
+            result["left over"] = self.side.left_over()
+        result["problems"] = self.problems()
+        return result
+
+    def open(self, request: dict) -> dict:
+        """The shapes of a file that the other side saved: what somebody without Sinew sees."""
+        self.bpy.ops.wm.open_mainfile(filepath=request["path"])
+        self.bpy.context.view_layer.update()
+        shapes, _skipped = self.shapes(self.bpy.context.evaluated_depsgraph_get())
+        return {"shapes": shapes, "problems": self.problems()}
+
+    def before_evaluation(self) -> None:
+        if not self.side.is_sinew:
+            self.wrong += self.side.bring_in_line(self.claims)
+
+    def problems(self) -> list[str]:
+        """Exceptions that were printed or logged since the last time."""
+        sys.stderr.flush()
+        with self.errors.open("rb") as file:
+            file.seek(self.read_to)
+            text = file.read()
+            self.read_to = file.tell()
+        found = []
+        printed = text.decode(errors="replace")
+        if "Traceback" in printed:
+            found.append(printed[printed.index("Traceback") :].strip())
+        if self.side.is_sinew:
+            found += self.side.records.errors
+            self.side.records.errors = []
+        return found
+
+    # --- What is there
+
+    def look(self, check: bool) -> dict:
+        """What can be said of the file: how Sinew is set, and after an evaluation the shapes."""
+        if not check:
+            return {"claims": self.side.claims()} if self.side.is_sinew else {}
+        found: dict = {}
+        if not self.side.is_sinew:
+            self.wrong += self.side.bring_in_line(self.claims)
+        self.bpy.context.view_layer.update()
+        depsgraph = self.bpy.context.evaluated_depsgraph_get()
+        found["shapes"], found["skipped"] = self.shapes(depsgraph)
+        found["state"] = self.state()
+        if self.side.is_sinew:
+            found["claims"] = self.side.claims()
+            found["copies"] = self.copies(depsgraph)
+            found["unanswered"] = self.side.records.unanswered
+            self.side.records.unanswered = 0
+        else:
+            found["wrong"] = self.wrong
+        return found
+
+    def points_of(self, evaluated):
+        mesh = evaluated.data
+        points = self.np.empty((len(mesh.vertices), 3), dtype=self.np.float32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        return points
+
+    def shapes(self, depsgraph) -> tuple[dict, list[str]]:
+        """Points and matrix of each mesh of the view layer that is shown; the names of those whose shape
+        another side can not know."""
+        found, skipped = {}, []
+        for obj in self.bpy.context.view_layer.objects:
+            if obj.type != "MESH" or self.side.is_ours(obj) or not obj.visible_get():
+                continue
+            evaluated = obj.evaluated_get(depsgraph)
+            found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
+        # Renders show what is hidden here, and other view layers.
+        for obj in self.walker.objects("MESH"):
+            in_its_mode = obj.data.is_editmode or obj.mode == "SCULPT"
+            if in_its_mode or (not self.side.is_sinew and self.is_unknown(obj)):
+                skipped.append(obj.name_full)
+        return found, skipped
+
+    def is_unknown(self, obj) -> bool:
+        """Whether Blender's side can not say what Sinew's shape is."""
+        side = self.side
+        if obj.library is not None:
+            # Saved as Sinew had it.
+            return True
+        if not side.is_driven(obj):
+            return False
+        if side.is_method_keyed(obj):
+            paths = {c.data_path for c in self.sides.curves_of(obj)}
+            run = (self.claims.get(obj.name_full) or {"run": []})["run"]
+            keyed = [f'modifiers["{name}"].use_deform_preserve_volume' in paths for name in run]
+            if not all(keyed) or not side.is_on(obj):
+                return True
+        if not side.is_on(obj):
+            return False
+        if side.method(obj) == "qv":
+            return True
+        rule = (self.claims.get(obj.name_full) or {"rule": ""})["rule"]
+        scaled = any(
+            tuple(round(s, 5) for s in bone.scale) != (1, 1, 1)
+            for modifier in self.sides.armature_modifiers(obj)
+            if modifier.object is not None and modifier.object.pose is not None
+            for bone in modifier.object.pose.bones
+        )
+        return scaled and rule != "4.0"
+
+    def copies(self, depsgraph) -> dict:
+        return {
+            (original, method): self.points_of(obj.evaluated_get(depsgraph))
+            for obj, original, method in self.side.copies()
+            if obj.visible_get()
+        }
+
+    def shapes_by(self, request: dict) -> dict:
+        """What the originals of a comparison are by each method: those with one Armature modifier."""
+        found = {}
+        for name, method in request["copies"]:
+            obj = self.bpy.context.view_layer.objects.get(name)
+            modifiers = self.sides.armature_modifiers(obj) if obj is not None else []
+            animated = {curve.data_path for curve in self.sides.curves_of(obj)} if obj is not None else set()
+            if (
+                any(".show_" in path for path in animated)
+                or len(modifiers) != 1
+                or method == "qv"
+                or obj.data.is_editmode
+                or not obj.visible_get()
+            ):
+                continue
+            modifier = modifiers[0]
+            before = modifier.use_deform_preserve_volume
+            if method != "blender":
+                modifier.use_deform_preserve_volume = method == "dq"
+            else:
+                modifier.use_deform_preserve_volume = modifier.show_expanded
+            depsgraph = self.bpy.context.evaluated_depsgraph_get()
+            found[name, method] = self.points_of(obj.evaluated_get(depsgraph))
+            modifier.use_deform_preserve_volume = before
+        self.bpy.context.view_layer.update()
+        return found
+
+    def state(self) -> dict[str, object]:
+        """What the file holds beside shapes, without what is Sinew's own."""
+        bpy = self.bpy
+        found: dict[str, object] = {
+            "scene": bpy.context.scene.name,
+            "frame": bpy.context.scene.frame_current,
+            # Linked ones that nobody uses any more go or stay by counts that Blender keeps of settings, too.
+            # Of those in no scene, too.
+            "objects": [
+                o.name_full for o in self.walker.objects() if o.library is None and o.users_collection
+            ],
+        }
+        there = [o for o in self.walker.objects("MESH") if o.library is None and o.users_collection]
+        found["meshes"] = sorted({obj.data.name_full for obj in there})
+        found["armatures"] = sorted(a.name_full for a in bpy.data.armatures if not a.library)
+        found["collections"] = [c.name for c in self.walker.collections()]
+        for obj in self.walker.objects("MESH"):
+            if obj.library is None and obj.users_collection:
+                found[f"object {obj.name_full}"] = self.object_state(obj)
+        for obj in self.walker.objects("ARMATURE"):
+            if obj.library is None and obj.users_collection:
+                found[f"armature {obj.name_full}"] = [bone.name for bone in obj.data.bones]
+        return found
+
+    def object_state(self, obj) -> dict[str, object]:
+        side = self.side
+        keys = obj.data.shape_keys
+        found: dict[str, object] = {
+            "mesh": obj.data.name_full,
+            "mode": obj.mode,
+            "vertices": len(obj.data.vertices) if not obj.data.is_editmode else "edited",
+            "groups": [g.name for g in obj.vertex_groups],
+            "keys": [b.name for b in keys.key_blocks] if keys is not None else [],
+            "parent": obj.parent.name_full if obj.parent is not None else "",
+            "hidden": (obj.hide_viewport, obj.hide_render),
+            "driven": side.is_driven(obj),
+        }
+        found["modifiers"] = [(m.name, m.type) for m in self.walker.modifiers(obj)]
+        if obj.mode == "OBJECT" and obj.override_library is None and not obj.data.is_editmode:
+            found["weights"] = zlib.crc32(
+                repr([(g.group, round(g.weight, 6)) for v in obj.data.vertices for g in v.groups]).encode()
+            )
+        if not side.is_on(obj) and obj.mode == "OBJECT":
+            found["armature modifiers"] = [
+                {
+                    "name": m.name,
+                    "on": (m.show_viewport, m.show_render),
+                    "object": m.object.name_full if m.object is not None else "",
+                    "volume": side.preserve_volume(m),
+                    "options": (m.use_multi_modifier, m.vertex_group, m.invert_vertex_group),
+                    "by": (m.use_bone_envelopes, m.use_vertex_groups),
+                }
+                for m in self.sides.armature_modifiers(obj)
+            ]
+        if not side.is_driven(obj):
+            found["parent type"] = obj.parent_type
+        return found
+
+
+def main() -> int:
+    role, route, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
+    answers = os.fdopen(os.dup(1), "wb")
+    requests = os.fdopen(os.dup(0), "rb")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 0)
+    os.dup2(nowhere, 1)
+    errors = folder / "errors.txt"
+    # Appended to, so that where others write does not depend on where this file is read.
+    file = os.open(errors, os.O_CREAT | os.O_RDWR | os.O_APPEND | os.O_TRUNC)
+    os.dup2(file, 2)
+    sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+    child = Child(role, route, folder, errors)
+    ways = {"start": child.start, "step": child.step, "shapes by": child.shapes_by, "open": child.open}
+
+    def answer(what: object) -> None:
+        pickle.dump(what, answers, protocol=pickle.HIGHEST_PROTOCOL)
+        answers.flush()
+
+    answer({"blender": child.bpy.app.version_string})
+    while True:
+        try:
+            request = pickle.load(requests)
+        except EOFError:
+            break
+        answer(ways[request["what"]](request))
+    # Without the ending of Blender as a module, which can crash or hang by itself.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    if not re.fullmatch("sinew|blender", sys.argv[1] if len(sys.argv) > 1 else ""):
+        sys.exit(__doc__)
+    main()

@@ -1,0 +1,1602 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operations of a walk: each does the same to the file on both sides (walk_sides), decided by the random
+numbers that it is given and by what the file holds.
+
+An operation returns in words what it did, or None where the file has nothing for it.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Euler, Vector
+from walk_sides import METHODS, BlenderSide, SinewSide, armature_modifiers, key, remove_curves
+
+FRAMES = (1, 11)
+# No turn of a bone against another by as much as half a turn, where dual quaternions meet a discontinuity.
+TURN = 0.8
+
+
+@dataclass
+class Operation:
+    name: str
+    weight: float
+    act: Callable[[Walker, random.Random], str | None]
+
+
+OPERATIONS: dict[str, Operation] = {}
+
+
+def operation(weight: float):
+    """weight  how often it is chosen, beside the others"""
+
+    def register(act: Callable) -> Callable:
+        name = act.__name__
+        OPERATIONS[name] = Operation(name, weight, act)
+        return act
+
+    return register
+
+
+class Walker:
+    """What operations choose from: the open file without what Sinew has added to it."""
+
+    def __init__(self, side: BlenderSide | SinewSide, folder: Path) -> None:
+        self.side = side
+        self.folder = folder
+        self.number = 0
+        self.rendered: dict[str, np.ndarray] = {}
+        self.chosen = ""
+        self.compared = False
+        # Changed since the last step of undo: Blender's own operations always push one.
+        self.unpushed = False
+        # What an operation that evaluates by itself needs to have set before.
+        self.before_evaluation: Callable[[], None] = lambda: None
+
+    # --- What there is
+
+    def objects(self, kind: str | None = None) -> list[bpy.types.Object]:
+        found = [
+            o
+            for o in bpy.data.objects
+            if (kind is None or o.type == kind) and not self.side.is_ours(o) and o.name != "Camera"
+        ]
+        return sorted(found, key=lambda o: o.name_full)
+
+    def meshes(self) -> list[bpy.types.Object]:
+        """Of the current view layer, without those of other files."""
+        there = self.in_layer()
+        return [o for o in self.objects("MESH") if o.library is None and o in there]
+
+    def armatures(self) -> list[bpy.types.Object]:
+        there = self.in_layer()
+        return [o for o in self.objects("ARMATURE") if o.library is None and o in there]
+
+    def in_layer(self) -> set[bpy.types.Object]:
+        """What the current view layer has; asked so, Blender counts what was linked just now, too."""
+        bpy.context.scene.camera.visible_get()
+        return set(bpy.context.view_layer.objects)
+
+    def modifiers(self, obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+        own = self.side.own_modifier(obj)
+        return [m for m in obj.modifiers if m != own and not m.name.startswith("Sinew")]
+
+    def collections(self) -> list[bpy.types.Collection]:
+        return sorted(
+            (c for c in bpy.data.collections if c.library is None and not c.name.startswith("Sinew")),
+            key=lambda c: c.name,
+        )
+
+    def users(self, mesh: bpy.types.Mesh) -> int:
+        """Objects that have it, without Sinew's own."""
+        return sum(obj.data == mesh for obj in self.objects("MESH"))
+
+    def shares_action(self, obj: bpy.types.Object) -> bool:
+        def action(each: bpy.types.Object) -> bpy.types.Action | None:
+            return each.animation_data.action if each.animation_data is not None else None
+
+        own = action(obj)
+        return own is not None and any(o != obj and action(o) == own for o in self.objects())
+
+    def new_name(self, kind: str) -> str:
+        self.number += 1
+        return f"{kind} {self.number}"
+
+    # --- Choosing
+
+    @staticmethod
+    def one(r: random.Random, choices: Sequence):
+        choices = list(choices)
+        return r.choice(choices) if choices else None
+
+    def mesh(self, r: random.Random, wanted: Callable | None = None) -> bpy.types.Object | None:
+        """Often the one that was chosen last: faults come of what is done to one object in a row."""
+        choices = [o for o in self.meshes() if wanted is None or wanted(o)]
+        again = next((o for o in choices if o.name == self.chosen), None)
+        chosen = self.one(r, choices)
+        if again is not None and r.random() < 0.5:
+            chosen = again
+        if chosen is not None:
+            self.chosen = chosen.name
+        return chosen
+
+    def skinned(self, r: random.Random) -> bpy.types.Object | None:
+        return self.mesh(r, lambda o: bool(armature_modifiers(o)))
+
+    def driven(self, r: random.Random) -> bpy.types.Object | None:
+        return self.mesh(r, self.side.is_driven)
+
+    def editable(self, r: random.Random) -> bpy.types.Object | None:
+        """With a mesh that can be edited."""
+        return self.mesh(r, lambda o: o.data.library is None and o.override_library is None)
+
+    def armature(self, r: random.Random) -> bpy.types.Object | None:
+        return self.one(r, self.armatures())
+
+    # --- Doing
+
+    def object_mode(self) -> None:
+        active = bpy.context.view_layer.objects.active
+        if active is not None and active.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    def push_undo(self) -> None:
+        if self.unpushed:
+            bpy.ops.ed.undo_push(message="step")
+        self.unpushed = False
+
+    def this_frame(self) -> None:
+        """Takes back what was changed without a key where there are keys: nobody counts on that to last."""
+        self.before_evaluation()
+        bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+
+    def edit_mode(self) -> None:
+        """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2)."""
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.ed.undo_push(message="edit mode")
+
+    def select(self, *objects: bpy.types.Object) -> bool:
+        """The last one active; whether all can be."""
+        self.object_mode()
+        for obj in bpy.context.view_layer.objects:
+            if obj.select_get():
+                obj.select_set(False)
+        for obj in objects:
+            if not obj.visible_get():
+                return False
+            obj.select_set(True)
+        bpy.context.view_layer.objects.active = objects[-1]
+        return True
+
+
+# --- Start
+
+
+def make_tube(name: str, sides: int, rings: int, bones: Sequence[str]) -> bpy.types.Object:
+    points, faces = [], []
+    length = float(len(bones))
+    for ring in range(rings):
+        for side in range(sides):
+            angle = 2 * np.pi * side / sides
+            points.append((length * ring / (rings - 1), 0.25 * np.cos(angle), 0.25 * np.sin(angle)))
+    for ring in range(rings - 1):
+        for side in range(sides):
+            here, beside = ring * sides + side, ring * sides + (side + 1) % sides
+            faces.append((here, beside, beside + sides, here + sides))
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points, [], faces)
+    obj = bpy.data.objects.new(name, mesh)
+    for index, bone in enumerate(bones):
+        group = obj.vertex_groups.new(name=bone)
+        for vertex, point in enumerate(points):
+            weight = max(0.0, 1.0 - abs(point[0] - (index + 0.5)))
+            if weight > 0.0:
+                group.add([vertex], weight, "REPLACE")
+    return obj
+
+
+def make_rig(name: str, bones: Sequence[str], collection: bpy.types.Collection) -> bpy.types.Object:
+    rig = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for index, bone_name in enumerate(bones):
+        bone = rig.data.edit_bones.new(bone_name)
+        bone.head, bone.tail = (index, 0.0, 0.0), (index + 1.0, 0.0, 0.0)
+        bone.parent, bone.use_connect = parent, parent is not None
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for index, bone in enumerate(rig.pose.bones):
+        bone.rotation_mode = "XYZ"
+        bone.keyframe_insert("rotation_euler", frame=FRAMES[0])
+        bone.rotation_euler = (0.7, 0.5, -0.3 - 0.2 * index)
+        bone.keyframe_insert("rotation_euler", frame=FRAMES[1])
+    return rig
+
+
+def start(walker: Walker) -> None:
+    """An empty file with two armatures, three meshes of theirs and one without."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    walker.number, walker.unpushed, walker.chosen = 0, False, ""
+    walker.compared = False
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = FRAMES
+    scene.render.engine = "WALK_RENDER"
+    scene.render.resolution_x = scene.render.resolution_y = 4
+    scene.render.filepath = str(walker.folder / "render")
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    props = bpy.data.collections.new("Props")
+    scene.collection.children.link(props)
+    names = ("upper", "lower", "hand")
+    rig = make_rig("Rig", names, scene.collection)
+    other = make_rig("Other Rig", ("thigh", "shin"), scene.collection)
+    arm = make_tube("Arm", 6, 9, names)
+    sleeve = make_tube("Sleeve", 5, 7, names[:2])
+    leg = make_tube("Leg", 6, 7, ("thigh", "shin"))
+    box = make_tube("Box", 4, 3, ("nothing",))
+    for obj, armature, collection in (
+        (arm, rig, scene.collection),
+        (sleeve, rig, props),
+        (leg, other, scene.collection),
+        (box, None, props),
+    ):
+        collection.objects.link(obj)
+        if armature is not None:
+            obj.modifiers.new("Armature", "ARMATURE").object = armature
+        walker.side.note_flags(obj)
+    bpy.context.view_layer.objects.active = arm
+    scene.frame_set(1)
+
+
+def make_library(walker: Walker) -> None:
+    """A file with a character that Sinew deforms, to link and append from."""
+    start(walker)
+    for name in ("Sleeve", "Leg", "Box", "Other Rig"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    for kind, old, new in (
+        ("objects", "Arm", "Guest"),
+        ("meshes", "Arm", "Guest"),
+        ("objects", "Rig", "Guest Rig"),
+        ("armatures", "Rig", "Guest Rig"),
+    ):
+        getattr(bpy.data, kind)[old].name = new
+    bpy.ops.outliner.orphans_purge(do_recursive=True)
+    walker.side.add(bpy.data.objects["Guest"], "dq", False)
+    bpy.ops.wm.save_as_mainfile(filepath=str(walker.folder / "library.blend"))
+
+
+# --- Sinew
+
+
+@operation(6)
+def add(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(
+        r,
+        lambda o: (
+            o.parent_type != "ARMATURE"
+            and not w.side.is_driven(o)
+            and any(m.object for m in armature_modifiers(o))
+        ),
+    )
+    if obj is None:
+        return None
+    method, leave = r.choice((None, *METHODS[:2])), r.random() < 0.15
+    w.object_mode()
+    flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
+    if len(flags) > 1 and method is None:
+        method = "lbs"
+    w.side.add(obj, method, leave)
+    return f"Sinew on {obj.name}, {method or 'as the modifier'}{', leaving it where small' if leave else ''}"
+
+
+@operation(2)
+def remove(w: Walker, r: random.Random) -> str | None:
+    obj = w.driven(r)
+    if obj is None:
+        return None
+    w.object_mode()
+    w.side.remove(obj)
+    return f"Sinew off {obj.name}"
+
+
+@operation(0.4)
+def remove_all(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    w.side.end_comparison()
+    # What the current view layer does not have, too.
+    for obj in [o for o in w.objects("MESH") if w.side.is_driven(o) and o.library is None]:
+        w.side.remove(obj)
+    return "Sinew off all"
+
+
+@operation(6)
+def method(w: Walker, r: random.Random) -> str | None:
+    obj, name = w.mesh(r, lambda o: w.side.is_driven(o) and not w.side.is_method_keyed(o)), r.choice(METHODS)
+    if obj is None:
+        return None
+    w.side.set_method(obj, name)
+    return f"{obj.name} by {name}"
+
+
+@operation(4)
+def enabled(w: Walker, r: random.Random) -> str | None:
+    obj = w.driven(r)
+    if obj is None:
+        return None
+    on = not w.side.is_on(obj) or r.random() < 0.1
+    w.side.set_enabled(obj, on)
+    return f"{obj.name} {'on' if on else 'off'}"
+
+
+@operation(1)
+def rebind(w: Walker, r: random.Random) -> str | None:
+    obj = w.driven(r)
+    if obj is None:
+        return None
+    w.side.rebind(obj)
+    return f"rebind {obj.name}"
+
+
+@operation(1)
+def scale_rule(w: Walker, r: random.Random) -> str | None:
+    obj, number = w.driven(r), r.randrange(3)
+    if obj is None:
+        return None
+    if w.side.is_sinew:
+        rules = [item.identifier for item in obj.sinew.bl_rna.properties["scale_rule"].enum_items]
+        obj.sinew.scale_rule = rules[number]
+    return f"{obj.name}: scale rule {number}"
+
+
+@operation(1.5)
+def leave_small(w: Walker, r: random.Random) -> str | None:
+    obj, on = w.driven(r), r.random() < 0.4
+    if obj is None:
+        return None
+    w.side.set_option(obj, "leave_small", on)
+    return f"{obj.name}: {'left to Blender where faster' if on else 'never left to Blender'}"
+
+
+@operation(2)
+def heat(w: Walker, r: random.Random) -> str | None:
+    obj, on, quantity = w.driven(r), r.random() < 0.5, r.choice(("stretch", "distance", "bulge"))
+    if obj is None:
+        return None
+    w.side.set_heat(obj, on, quantity)
+    return f"{obj.name}: heat map {quantity if on else 'off'}"
+
+
+@operation(1)
+def compare(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(armature_modifiers(o)) and o.override_library is None)
+    methods = r.sample((*METHODS, "blender"), r.randint(1, 2))
+    if obj is None or not obj.visible_get():
+        return None
+    w.object_mode()
+    w.side.start_comparison([obj], methods)
+    # Its copies share the mesh, which not all operations take.
+    w.compared = True
+    return f"compare {obj.name} by {', '.join(methods)}"
+
+
+@operation(1)
+def end_comparison(w: Walker, r: random.Random) -> str | None:
+    w.side.end_comparison()
+    return "end of the comparison"
+
+
+@operation(0.4)
+def arrange_comparison(w: Walker, r: random.Random) -> str | None:
+    how = r.choice(("SIDE", "OVERLAY"))
+    w.side.arrange_comparison(how)
+    return f"comparison {how}"
+
+
+@operation(0.5)
+def restart(w: Walker, r: random.Random) -> str | None:
+    frame = r.choice((None, r.randint(*FRAMES)))
+    w.object_mode()
+
+    def between() -> None:
+        if frame is not None:
+            bpy.context.scene.frame_set(frame)
+
+    w.side.restart(between)
+    return f"the add-on off and on again, {'no frame' if frame is None else f'frame {frame}'} between"
+
+
+@operation(0.3)
+def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
+    obj = w.driven(r)
+    if obj is None or not w.side.is_on(obj):
+        return None
+    w.side.delete_part(obj, "modifier")
+    return f"delete Sinew's modifier of {obj.name}"
+
+
+@operation(0.5)
+def delete_points(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.mode == "OBJECT" and o.data.library is None)
+    if obj is None:
+        return None
+    if w.side.is_sinew:
+        w.side.delete_part(obj, "attribute")
+    return f"delete Sinew's attributes of {obj.data.name}"
+
+
+@operation(1)
+def key_method(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(
+        r,
+        lambda o: (
+            w.side.is_driven(o)
+            and w.side.is_on(o)
+            and o.override_library is None
+            # Keys of the method are keys of something else on the other side.
+            and not w.shares_action(o)
+        ),
+    )
+    frames = sorted(r.sample(range(1, 12), 2))
+    if obj is None:
+        return None
+    w.side.key_method(obj, [(frames[0], r.choice(METHODS[:2])), (frames[1], r.choice(METHODS[:2]))])
+    w.this_frame()
+    return f"key the method of {obj.name} at {frames}"
+
+
+@operation(1)
+def unkey_method(w: Walker, r: random.Random) -> str | None:
+    obj, name = w.mesh(r, w.side.is_method_keyed), r.choice(METHODS[:2])
+    if obj is None or not w.side.is_driven(obj):
+        return None
+    w.side.unkey_method(obj, name)
+    return f"no keys on the method of {obj.name}, {name}"
+
+
+# --- Time and poses
+
+
+@operation(10)
+def frame(w: Walker, r: random.Random) -> str | None:
+    number = r.randint(*FRAMES)
+    bpy.context.scene.frame_set(number)
+    return f"frame {number}"
+
+
+@operation(2)
+def subframe(w: Walker, r: random.Random) -> str | None:
+    number, part = r.randint(*FRAMES), r.random()
+    bpy.context.scene.frame_set(number, subframe=part)
+    return f"frame {number + part:.2f}"
+
+
+@operation(2)
+def play(w: Walker, r: random.Random) -> str | None:
+    first = bpy.context.scene.frame_current
+    for number in range(first, first + 3):
+        bpy.context.scene.frame_set(number)
+    return f"frames {first} to {first + 2}"
+
+
+@operation(0.7)
+def current_frame(w: Walker, r: random.Random) -> str | None:
+    number = r.randint(*FRAMES)
+    bpy.context.scene.frame_current = number
+    return f"scene.frame_current = {number}"
+
+
+def _turn(r: random.Random) -> Euler:
+    return Euler([r.uniform(-TURN, TURN) for _axis in range(3)])
+
+
+@operation(6)
+def pose(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    if bone is None:
+        return None
+    bone.rotation_mode = "XYZ"
+    bone.rotation_euler = _turn(r)
+    if r.random() < 0.3:
+        bone.location = [r.uniform(-0.2, 0.2) for _axis in range(3)]
+    return f"pose {bone.name} of {rig.name}"
+
+
+@operation(0.5)
+def pose_scale(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    if bone is None:
+        return None
+    bone.scale = r.choice(((1, 1, 1), (1.3, 0.8, 1.1)))
+    return f"scale {bone.name} of {rig.name}: {tuple(bone.scale)}"
+
+
+@operation(2)
+def key_pose(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    if bone is None:
+        return None
+    number = r.randint(*FRAMES)
+    bone.rotation_mode = "XYZ"
+    bone.rotation_euler = _turn(r)
+    bone.keyframe_insert("rotation_euler", frame=number)
+    return f"key {bone.name} of {rig.name} at {number}"
+
+
+@operation(0.6)
+def rest_position(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    if rig is None:
+        return None
+    rig.data.pose_position = "REST" if rig.data.pose_position == "POSE" else "POSE"
+    return f"{rig.name} in {rig.data.pose_position} position"
+
+
+@operation(0.7)
+def clear_animation(w: Walker, r: random.Random) -> str | None:
+    obj = w.one(r, [*w.armatures(), *(o for o in w.meshes() if not w.side.is_method_keyed(o))])
+    if obj is None:
+        return None
+    if obj.type == "ARMATURE":
+        obj.animation_data_clear()
+    else:
+        remove_curves(obj, "")
+    return f"clear the keys of {obj.name}"
+
+
+@operation(0.7)
+def constrain_bone(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    target = w.one(r, [a for a in w.armatures() if a != rig])
+    if (
+        bone is None
+        or target is None
+        or any(c.type == "COPY_ROTATION" for b in target.pose.bones for c in b.constraints)
+    ):
+        return None
+    if bone.constraints:
+        bone.constraints.remove(bone.constraints[0])
+        return f"take the constraint off {bone.name} of {rig.name}"
+    other = w.one(r, target.pose.bones)
+    if other is None:
+        return None
+    constraint = bone.constraints.new("COPY_ROTATION")
+    constraint.target, constraint.subtarget, constraint.influence = target, other.name, 0.5
+    return f"{bone.name} of {rig.name} copies half the rotation of {other.name} of {target.name}"
+
+
+# --- Places
+
+
+@operation(3)
+def move_object(w: Walker, r: random.Random) -> str | None:
+    obj = w.one(r, [*w.meshes(), *w.armatures()])
+    if obj is None:
+        return None
+    obj.location = [r.uniform(-1, 1) for _axis in range(3)]
+    if r.random() < 0.3:
+        obj.rotation_euler = _turn(r)
+    if r.random() < 0.2:
+        obj.scale = [r.uniform(0.7, 1.4) for _axis in range(3)]
+    return f"move {obj.name}"
+
+
+@operation(1)
+def key_object(w: Walker, r: random.Random) -> str | None:
+    obj = w.one(r, [*w.meshes(), *w.armatures()])
+    if obj is None or obj.override_library is not None:
+        return None
+    for number in r.sample(range(1, 12), 2):
+        obj.location = [r.uniform(-1, 1) for _axis in range(3)]
+        obj.keyframe_insert("location", frame=number)
+    return f"key the location of {obj.name}"
+
+
+@operation(2)
+def parent(w: Walker, r: random.Random) -> str | None:
+    obj, rig = w.mesh(r), w.armature(r)
+    kind = r.choice(("none", "OBJECT", "OBJECT", "BONE", "ARMATURE"))
+    if obj is None or rig is None or obj.override_library is not None:
+        return None
+    if kind == "ARMATURE" and w.side.is_driven(obj) is False and w.side.is_sinew is None:
+        return None
+    obj.parent = None if kind == "none" else rig
+    if kind == "none":
+        obj.parent_type = "OBJECT"
+        return f"{obj.name} without a parent"
+    obj.parent_type = kind
+    if kind == "BONE":
+        bone = w.one(r, rig.data.bones)
+        obj.parent_bone = bone.name if bone is not None else ""
+    return f"parent {obj.name} to {rig.name}, {kind}"
+
+
+# --- Weights
+
+
+def _vertices(w: Walker, r: random.Random, obj: bpy.types.Object) -> list[int]:
+    count = len(obj.data.vertices)
+    return sorted(r.sample(range(count), r.randint(1, max(1, count // 2)))) if count else []
+
+
+@operation(8)
+def weights(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.data.override_library is None)
+    group = w.one(r, obj.vertex_groups) if obj is not None else None
+    if group is None:
+        return None
+    vertices = _vertices(w, r, obj)
+    if r.random() < 0.3:
+        group.remove(vertices)
+        return f"take {len(vertices)} vertices of {obj.name} out of {group.name}"
+    group.add(vertices, r.uniform(0.0, 1.0), r.choice(("REPLACE", "ADD", "SUBTRACT")))
+    if r.random() < 0.2:
+        obj.data.update()
+    return f"weigh {len(vertices)} vertices of {obj.name} in {group.name}"
+
+
+@operation(3)
+def paint_weights(w: Walker, r: random.Random) -> str | None:
+    obj = w.editable(r)
+    if obj is None or not obj.vertex_groups or not w.select(obj):
+        return None
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    # As a window does: tools ask for the armature behind the modifiers, which Sinew gives back meanwhile.
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    obj.vertex_groups.active_index = r.randrange(len(obj.vertex_groups))
+    what = r.choice(("smooth", "normalize_all", "invert", "levels"))
+    if what == "smooth":
+        bpy.ops.object.vertex_group_smooth(group_select_mode="ACTIVE", factor=0.5, repeat=2)
+    elif what == "normalize_all":
+        bpy.ops.object.vertex_group_normalize_all(lock_active=False)
+    elif what == "invert":
+        bpy.ops.object.vertex_group_invert(group_select_mode="ACTIVE")
+    else:
+        bpy.ops.object.vertex_group_levels(group_select_mode="ACTIVE", offset=0.1)
+    if r.random() < 0.7:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    return f"paint weights of {obj.name}: {what}, then {obj.mode}"
+
+
+@operation(2)
+def groups(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.override_library is None)
+    if obj is None:
+        return None
+    group, what = w.one(r, obj.vertex_groups), r.choice(("new", "rename", "delete", "move", "bone"))
+    if what == "new" or group is None:
+        made = obj.vertex_groups.new(name=w.new_name("group"))
+        made.add(_vertices(w, r, obj), r.random(), "REPLACE")
+        return f"group {made.name} of {obj.name}"
+    if what == "rename":
+        group.name = w.new_name("group")
+        return f"rename a group of {obj.name} to {group.name}"
+    if what == "bone":
+        bones = [b.name for a in w.armatures() for b in a.data.bones]
+        taken = {g.name for g in obj.vertex_groups}
+        name = w.one(r, [b for b in dict.fromkeys(bones) if b not in taken])
+        if name is None:
+            return None
+        group.name = name
+        return f"rename a group of {obj.name} to {name}"
+    if what == "delete":
+        name = group.name
+        obj.vertex_groups.remove(group)
+        # Blender 4.2 by itself goes on with the groups of before.
+        obj.data.update()
+        return f"delete group {name} of {obj.name}"
+    if not w.select(obj):
+        return None
+    obj.vertex_groups.active_index = group.index
+    bpy.ops.object.vertex_group_sort(sort_type="NAME")
+    return f"sort the groups of {obj.name}"
+
+
+# --- Meshes
+
+
+@operation(4)
+def edit_mesh(w: Walker, r: random.Random) -> str | None:
+    obj = w.editable(r)
+    if obj is None or not w.select(obj):
+        return None
+    what = r.choice(("move", "move", "delete", "extrude", "subdivide", "nothing"))
+    w.edit_mode()
+    mesh = bmesh.from_edit_mesh(obj.data)
+    mesh.verts.ensure_lookup_table()
+    count = len(mesh.verts)
+    if what == "move" and count:
+        for index in r.sample(range(count), max(1, count // 5)):
+            mesh.verts[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
+    elif what == "delete" and count > 12:
+        gone = [mesh.verts[index] for index in r.sample(range(count), 2)]
+        bmesh.ops.delete(mesh, geom=gone, context="VERTS")
+    elif what == "extrude" and len(mesh.faces) and count < 150:
+        mesh.faces.ensure_lookup_table()
+        face = mesh.faces[r.randrange(len(mesh.faces))]
+        made = bmesh.ops.extrude_discrete_faces(mesh, faces=[face])
+        for new in made["faces"]:
+            bmesh.ops.translate(mesh, verts=new.verts, vec=(0.0, 0.1, 0.1))
+    elif what == "subdivide" and len(mesh.edges) and count < 150:
+        mesh.edges.ensure_lookup_table()
+        edges = [mesh.edges[i] for i in r.sample(range(len(mesh.edges)), min(4, len(mesh.edges)))]
+        bmesh.ops.subdivide_edges(mesh, edges=edges, cuts=1)
+    bmesh.update_edit_mesh(obj.data)
+    if r.random() < 0.75:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    return f"edit {obj.name}: {what}, then {obj.mode}"
+
+
+@operation(2)
+def leave_mode(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    return "object mode"
+
+
+@operation(0.5)
+def sculpt_mode(w: Walker, r: random.Random) -> str | None:
+    obj = w.editable(r)
+    if obj is None or not w.select(obj):
+        return None
+    bpy.ops.object.mode_set(mode="SCULPT")
+    if r.random() < 0.5:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    return f"{obj.name} in {obj.mode}"
+
+
+@operation(4)
+def move_vertices(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.data.library is None and not o.data.is_editmode)
+    if obj is None:
+        return None
+    for index in _vertices(w, r, obj):
+        obj.data.vertices[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
+    obj.data.update()
+    return f"move vertices of {obj.data.name} by a script"
+
+
+@operation(0.7)
+def rename_mesh(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.data.library is None)
+    if obj is None:
+        return None
+    obj.data.name = w.new_name("mesh")
+    return f"rename the mesh of {obj.name} to {obj.data.name}"
+
+
+@operation(0.8)
+def swap_mesh(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.mode == "OBJECT" and o.override_library is None and not o.data.is_editmode)
+    if obj is None or obj.data.library is not None:
+        return None
+    mesh = obj.data.copy()
+    mesh.name = w.new_name("mesh")
+    obj.data = mesh
+    return f"{obj.name} has a mesh of its own, {mesh.name}"
+
+
+@operation(0.5)
+def share_mesh(w: Walker, r: random.Random) -> str | None:
+    meshes = [
+        o for o in w.meshes() if o.mode == "OBJECT" and o.override_library is None and not o.data.is_editmode
+    ]
+    if len(meshes) < 2 or not w.select(*r.sample(meshes, 2)):
+        return None
+    bpy.ops.object.make_links_data(type="OBDATA")
+    return "link the mesh to another object"
+
+
+@operation(0.4)
+def join(w: Walker, r: random.Random) -> str | None:
+    """An object that Sinew does not deform into any other."""
+    others = [o for o in w.meshes() if not w.side.is_driven(o) and o.override_library is None]
+    obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
+    other = w.one(r, [o for o in others if o != obj and w.users(o.data) == 1])
+    if obj is None or other is None or len(obj.data.vertices) > 200 or not w.select(other, obj):
+        return None
+    name = other.name
+    bpy.ops.object.join()
+    return f"join {name} into {obj.name}"
+
+
+@operation(0.5)
+def apply_transform(w: Walker, r: random.Random) -> str | None:
+    obj = w.editable(r)
+    if obj is None or w.users(obj.data) > 1 or w.compared or not w.select(obj):
+        return None
+    bpy.ops.object.transform_apply()
+    return f"apply the transform of {obj.name}"
+
+
+@operation(0.4)
+def apply_pose(w: Walker, r: random.Random) -> str | None:
+    """As the rest pose."""
+    rig = w.armature(r)
+    if rig is None or rig.override_library is not None or rig.data.users > 1 or not w.select(rig):
+        return None
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.armature_apply(selected=False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return f"apply the pose of {rig.name} as its rest pose"
+
+
+# --- Bones
+
+
+@operation(1.5)
+def rename_bone(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    bone = w.one(r, rig.data.bones) if rig is not None and rig.override_library is None else None
+    # The groups that Blender renames along are the mesh's, which a comparison's copies share.
+    if bone is None or w.compared:
+        return None
+    old, bone.name = bone.name, w.new_name("bone")
+    return f"rename bone {old} to {bone.name}"
+
+
+@operation(1)
+def edit_bones(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    if rig is None or rig.override_library is not None or not w.select(rig):
+        return None
+    what = r.choice(("delete", "new", "move", "rename", "roll"))
+    if what == "rename" and w.compared:
+        what = "roll"
+    w.edit_mode()
+    bones = rig.data.edit_bones
+    bone = w.one(r, bones)
+    if what == "new" or bone is None:
+        made = bones.new(w.new_name("bone"))
+        made.head, made.tail = (0.5, 0.0, 0.3), (0.5, 0.0, 1.0)
+        made.parent = bone
+    elif what == "delete" and len(bones) > 1:
+        bones.remove(bone)
+    elif what == "move":
+        bone.tail += Vector((0.0, r.uniform(-0.2, 0.2), r.uniform(-0.2, 0.2)))
+    elif what == "rename":
+        bone.name = w.new_name("bone")
+    else:
+        bone.roll += 0.3
+    if r.random() < 0.5:
+        bpy.context.view_layer.update()
+    if r.random() < 0.8:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    return f"edit the bones of {rig.name}: {what}, then {rig.mode}"
+
+
+@operation(1.5)
+def bone_options(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    bone = w.one(r, rig.data.bones) if rig is not None and rig.override_library is None else None
+    if bone is None:
+        return None
+    what = r.choice(("deform", "segments", "envelope", "inherit"))
+    if what == "deform":
+        bone.use_deform = not bone.use_deform
+    elif what == "segments":
+        bone.bbone_segments = r.choice((1, 1, 3))
+    elif what == "envelope":
+        bone.envelope_distance = r.uniform(0.05, 0.5)
+    else:
+        bone.use_inherit_rotation = not bone.use_inherit_rotation
+    return f"{what} of bone {bone.name}"
+
+
+# --- Modifiers
+
+KINDS = ("SUBSURF", "CAST", "MIRROR", "SMOOTH", "ARMATURE", "WAVE", "SOLIDIFY", "MASK")
+
+
+@operation(3)
+def add_modifier(w: Walker, r: random.Random) -> str | None:
+    obj, rig = w.mesh(r), w.armature(r)
+    kind, front = r.choice(KINDS), r.random() < 0.4
+    if obj is None or len(w.modifiers(obj)) > 5:
+        return None
+    if kind in ("SUBSURF", "MIRROR", "SOLIDIFY") and any(m.type == kind for m in obj.modifiers):
+        return None
+    modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
+    if modifier is None:
+        return None
+    if kind == "SUBSURF":
+        modifier.levels = modifier.render_levels = 1
+    elif kind == "ARMATURE":
+        modifier.object = rig
+        w.side.set_preserve_volume(modifier, r.random() < 0.3)
+    elif kind == "WAVE":
+        modifier.time_offset = -10.0
+    elif kind == "MASK" and obj.vertex_groups:
+        modifier.vertex_group = w.one(r, obj.vertex_groups).name
+        modifier.invert_vertex_group = True
+    name = modifier.name
+    if front and obj.override_library is None:
+        obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
+    return f"{name} {'in front' if front else 'behind'} on {obj.name}"
+
+
+@operation(2)
+def move_modifier(w: Walker, r: random.Random) -> str | None:
+    """To just before or behind another of the artist's: Sinew's own is not counted."""
+    obj = w.mesh(r, lambda o: len(w.modifiers(o)) > 1 and o.override_library is None)
+    if obj is None:
+        return None
+    here, there = r.sample(w.modifiers(obj), 2)
+    names = [m.name for m in obj.modifiers]
+    obj.modifiers.move(names.index(here.name), names.index(there.name))
+    order = [m.name for m in w.modifiers(obj)]
+    return f"modifiers of {obj.name}: {', '.join(order)}"
+
+
+@operation(1)
+def delete_modifier(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None)
+    if obj is None:
+        return None
+    # Seldom the last Armature modifier, as few operations are left for what has none.
+    candidates = [m for m in w.modifiers(obj) if m.type != "ARMATURE" or r.random() < 0.3]
+    modifier = w.one(r, candidates)
+    if modifier is None:
+        return None
+    name = modifier.name
+    if modifier.type == "ARMATURE":
+        w.side.delete_part(obj, "armature modifier")
+    obj.modifiers.remove(modifier)
+    return f"delete modifier {name} of {obj.name}"
+
+
+@operation(1)
+def rename_modifier(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None)
+    if obj is None:
+        return None
+    modifier = w.one(r, w.modifiers(obj))
+    old, modifier.name = modifier.name, w.new_name("modifier")
+    return f"rename modifier {old} of {obj.name} to {modifier.name}"
+
+
+@operation(2)
+def toggle_modifier(w: Walker, r: random.Random) -> str | None:
+    """Not those that Sinew has replaced: it keeps their flags."""
+    obj = w.mesh(r)
+    if obj is None:
+        return None
+    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE" or not w.side.is_driven(obj)])
+    if modifier is None:
+        return None
+    on = not modifier.show_viewport
+    modifier.show_viewport = on
+    if r.random() < 0.6:
+        modifier.show_render = on
+    return f"{modifier.name} of {obj.name} {'on' if on else 'off'}"
+
+
+@operation(2)
+def armature_options(w: Walker, r: random.Random) -> str | None:
+    obj = w.skinned(r)
+    if obj is None:
+        return None
+    modifier = w.one(r, armature_modifiers(obj))
+    what = r.choice(("multi", "mask", "mask", "invert", "envelopes", "groups", "volume"))
+    if what == "multi":
+        modifier.use_multi_modifier = not modifier.use_multi_modifier
+    elif what == "mask":
+        group = w.one(r, obj.vertex_groups) if r.random() < 0.6 else None
+        modifier.vertex_group = group.name if group is not None else ""
+    elif what == "invert":
+        modifier.invert_vertex_group = not modifier.invert_vertex_group
+    elif what == "envelopes":
+        modifier.use_bone_envelopes = not modifier.use_bone_envelopes
+    elif what == "groups":
+        modifier.use_vertex_groups = not modifier.use_vertex_groups
+    else:
+        w.side.set_preserve_volume(modifier, not w.side.preserve_volume(modifier))
+    return f"{what} of {modifier.name} of {obj.name}"
+
+
+@operation(1)
+def another_armature(w: Walker, r: random.Random) -> str | None:
+    obj, rig = w.skinned(r), w.armature(r)
+    if obj is None or rig is None or obj.override_library is not None:
+        return None
+    modifier = w.one(r, armature_modifiers(obj))
+    modifier.object = rig
+    return f"{modifier.name} of {obj.name} has {rig.name}"
+
+
+@operation(0.7)
+def key_visibility(w: Walker, r: random.Random) -> str | None:
+    obj = w.skinned(r)
+    if obj is None or obj.override_library is not None:
+        return None
+    modifier = w.one(r, armature_modifiers(obj))
+    path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
+    frames = sorted(r.sample(range(1, 12), 2))
+    values = [(frames[0], r.choice((0.0, 1.0))), (frames[1], 1.0)]
+    for where in ("viewport", "render"):
+        key(obj, path + where, values)
+    w.this_frame()
+    return f"key the visibility of {modifier.name} of {obj.name}: {values}"
+
+
+@operation(0.5)
+def copy_modifiers(w: Walker, r: random.Random) -> str | None:
+    meshes = [o for o in w.meshes() if o.override_library is None and not w.side.is_driven(o)]
+    source = w.mesh(r, lambda o: o.override_library is None and not w.side.is_method_keyed(o))
+    target = w.one(r, [o for o in meshes if o != source])
+    if source is None or target is None or not w.select(target, source):
+        return None
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    w.side.copied_modifiers(source, target)
+    return f"copy the modifiers of {source.name} to {target.name}"
+
+
+@operation(0.4)
+def apply_modifier(w: Walker, r: random.Random) -> str | None:
+    """What deforms: Sinew's modifier, or the Armature modifier."""
+    obj = w.mesh(
+        r,
+        lambda o: (
+            not w.compared
+            and len(armature_modifiers(o)) == 1
+            and len(w.modifiers(o)) == 1
+            and w.users(o.data) == 1
+            and o.data.shape_keys is None
+            and o.override_library is None
+            and w.side.is_on(o)
+        ),
+    )
+    if obj is None or not w.select(obj):
+        return None
+    w.before_evaluation()
+    w.side.apply(obj)
+    return f"apply what deforms {obj.name}"
+
+
+@operation(0.4)
+def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
+    obj = w.editable(r)
+    if obj is None or obj.data.library is not None or not w.select(obj):
+        return None
+    w.before_evaluation()
+    bpy.ops.object.convert(target="MESH")
+    obj = bpy.context.view_layer.objects.active
+    obj.data.name = w.new_name("mesh")
+    w.side.applied(obj)
+    return f"convert {obj.name} to a mesh"
+
+
+# --- Shape keys
+
+
+def _keys(obj: bpy.types.Object) -> list[bpy.types.ShapeKey]:
+    keys = obj.data.shape_keys
+    return list(keys.key_blocks)[1:] if keys is not None else []
+
+
+@operation(2)
+def add_shape_key(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.mode == "OBJECT" and o.data.library is None and o.override_library is None)
+    if obj is None or len(_keys(obj)) > 3 or obj.data.is_editmode:
+        return None
+    if obj.data.shape_keys is None:
+        obj.shape_key_add(name="Basis", from_mix=False)
+    made = obj.shape_key_add(name=w.new_name("key"), from_mix=False)
+    for index in _vertices(w, r, obj):
+        made.data[index].co += Vector([r.uniform(-0.2, 0.2) for _axis in range(3)])
+    made.value = r.random()
+    return f"shape key {made.name} of {obj.name}"
+
+
+@operation(3)
+def shape_key_value(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(_keys(o)))
+    if obj is None:
+        return None
+    block = w.one(r, _keys(obj))
+    block.value = r.random()
+    if r.random() < 0.2:
+        block.mute = not block.mute
+    return f"{block.name} of {obj.name}: {block.value:.2f}{', muted' if block.mute else ''}"
+
+
+@operation(1)
+def shape_key_points(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
+    if obj is None or obj.data.is_editmode:
+        return None
+    block = w.one(r, _keys(obj))
+    for index in _vertices(w, r, obj):
+        block.data[index].co += Vector([r.uniform(-0.1, 0.1) for _axis in range(3)])
+    obj.data.update()
+    return f"move points of {block.name} of {obj.name}"
+
+
+@operation(1)
+def key_shape_key(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None)
+    if obj is None:
+        return None
+    block = w.one(r, _keys(obj))
+    for number in r.sample(range(1, 12), 2):
+        block.value = r.random()
+        block.keyframe_insert("value", frame=number)
+    return f"key {block.name} of {obj.name}"
+
+
+@operation(1)
+def delete_shape_key(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
+    if obj is None or obj.override_library is not None:
+        return None
+    if r.random() < 0.3:
+        obj.shape_key_clear()
+        return f"delete all shape keys of {obj.name}"
+    obj.shape_key_remove(w.one(r, _keys(obj)))
+    return f"delete a shape key of {obj.name}"
+
+
+@operation(1)
+def pin_shape_key(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(_keys(o)))
+    if obj is None:
+        return None
+    obj.active_shape_key_index = r.randrange(len(obj.data.shape_keys.key_blocks))
+    obj.show_only_shape_key = not obj.show_only_shape_key
+    return f"{obj.name}: {'pin' if obj.show_only_shape_key else 'no pin'}, {obj.active_shape_key.name}"
+
+
+@operation(0.4)
+def absolute_shape_keys(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None)
+    if obj is None:
+        return None
+    keys = obj.data.shape_keys
+    keys.use_relative = not keys.use_relative
+    keys.eval_time = r.uniform(0.0, 20.0)
+    return f"{'relative' if keys.use_relative else 'absolute'} shape keys of {obj.name}"
+
+
+# --- Objects
+
+
+@operation(1)
+def rename_object(w: Walker, r: random.Random) -> str | None:
+    obj = w.one(r, [*w.meshes(), *w.armatures()])
+    if obj is None or obj.override_library is not None:
+        return None
+    old, obj.name = obj.name, w.new_name("object")
+    return f"rename {old} to {obj.name}"
+
+
+def _delete(w: Walker, obj: bpy.types.Object, by_script: bool) -> str | None:
+    name = obj.name
+    w.object_mode()
+    if by_script:
+        bpy.data.objects.remove(obj)
+        return f"remove {name} by a script"
+    if not w.select(obj):
+        return None
+    bpy.ops.object.delete()
+    return f"delete {name}"
+
+
+@operation(0.6)
+def delete_object(w: Walker, r: random.Random) -> str | None:
+    obj, by_script = w.mesh(r), r.random() < 0.5
+    return _delete(w, obj, by_script) if len(w.meshes()) > 2 else None
+
+
+@operation(0.2)
+def delete_armature(w: Walker, r: random.Random) -> str | None:
+    rig, by_script = w.armature(r), r.random() < 0.4
+    return _delete(w, rig, by_script) if len(w.armatures()) > 1 else None
+
+
+@operation(1.5)
+def duplicate(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
+    linked, by_script = r.random() < 0.4, r.random() < 0.4
+    if obj is None or len(w.meshes()) > 6:
+        return None
+    name = obj.name
+    if by_script:
+        w.object_mode()
+        made = obj.copy()
+        if not linked:
+            made.data = obj.data.copy()
+        if made.animation_data is not None and made.animation_data.action is not None:
+            # As Blender's own operator does: keys of a method are keys of other things on the other side.
+            slot = getattr(made.animation_data, "action_slot", None)
+            made.animation_data.action = made.animation_data.action.copy()
+            if slot is not None:
+                made.animation_data.action_slot = made.animation_data.action.slots[slot.identifier]
+        bpy.context.scene.collection.objects.link(made)
+    else:
+        if not w.select(obj):
+            return None
+        bpy.ops.object.duplicate(linked=linked)
+        made = bpy.context.view_layer.objects.active
+    made.name = w.new_name("object")
+    if not linked:
+        made.data.name = w.new_name("mesh")
+    return (
+        f"duplicate {name} as {made.name}{', linked' if linked else ''}{', by a script' if by_script else ''}"
+    )
+
+
+@operation(0.5)
+def duplicate_armature(w: Walker, r: random.Random) -> str | None:
+    rig, linked = w.armature(r), r.random() < 0.5
+    if rig is None or len(w.armatures()) > 4 or rig.override_library is not None:
+        return None
+    w.object_mode()
+    made = rig.copy()
+    if not linked:
+        made.data = rig.data.copy()
+        made.data.name = w.new_name("armature")
+    bpy.context.scene.collection.objects.link(made)
+    made.name = w.new_name("object")
+    made.location.y += 0.5
+    return f"duplicate {rig.name} as {made.name}"
+
+
+@operation(0.5)
+def single_user(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: w.users(o.data) > 1 and o.override_library is None)
+    if obj is None or not w.select(obj):
+        return None
+    bpy.ops.object.make_single_user(type="SELECTED_OBJECTS", object=True, obdata=True)
+    obj = bpy.context.view_layer.objects.active
+    obj.data.name = w.new_name("mesh")
+    return f"make {obj.name} single user"
+
+
+@operation(1.5)
+def hide(w: Walker, r: random.Random) -> str | None:
+    obj, how = w.one(r, [*w.meshes(), *w.armatures()]), r.choice(("viewport", "render", "eye", "eye"))
+    if obj is None:
+        return None
+    if how == "eye":
+        hidden = not obj.hide_get()
+        if obj.mode != "OBJECT":
+            w.object_mode()
+        obj.hide_set(hidden)
+    else:
+        name = f"hide_{how}"
+        hidden = not getattr(obj, name)
+        w.object_mode()
+        setattr(obj, name, hidden)
+    return f"{'hide' if hidden else 'show'} {obj.name} ({how})"
+
+
+@operation(1)
+def hide_collection(w: Walker, r: random.Random) -> str | None:
+    layers = [c for c in bpy.context.view_layer.layer_collection.children if not c.name.startswith("Sinew")]
+    layer, how = w.one(r, sorted(layers, key=lambda c: c.name)), r.choice(("exclude", "eye", "viewport"))
+    if layer is None:
+        return None
+    w.object_mode()
+    if how == "exclude":
+        layer.exclude = not layer.exclude
+    elif how == "eye":
+        layer.hide_viewport = not layer.hide_viewport
+    else:
+        layer.collection.hide_viewport = not layer.collection.hide_viewport
+    return f"{how} of collection {layer.name}"
+
+
+@operation(0.7)
+def move_to_collection(w: Walker, r: random.Random) -> str | None:
+    obj, collection = w.mesh(r), w.one(r, w.collections())
+    if obj is None or collection is None or obj.mode != "OBJECT":
+        return None
+    if collection in list(obj.users_collection):
+        if len([c for c in obj.users_collection if not c.name.startswith("Sinew")]) > 1:
+            collection.objects.unlink(obj)
+            return f"{obj.name} out of {collection.name}"
+        return None
+    collection.objects.link(obj)
+    return f"{obj.name} into {collection.name}"
+
+
+@operation(0.5)
+def show_all(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    for layer in bpy.context.view_layer.layer_collection.children:
+        if not layer.name.startswith("Sinew"):
+            layer.exclude = layer.hide_viewport = layer.collection.hide_viewport = False
+    for obj in [*w.meshes(), *w.armatures()]:
+        obj.hide_set(False)
+        obj.hide_viewport = False
+    return "show all"
+
+
+# --- Scenes
+
+
+@operation(0.5)
+def scene(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    if len(bpy.data.scenes) == 1:
+        made = bpy.data.scenes.new("Second")
+        made.render.engine = "WALK_RENDER"
+        made.render.resolution_x = made.render.resolution_y = 4
+        made.render.filepath = bpy.context.scene.render.filepath
+        made.camera = bpy.context.scene.camera
+        made.frame_start, made.frame_end = FRAMES
+        for obj in [*w.meshes(), *w.armatures()]:
+            if r.random() < 0.7:
+                made.collection.objects.link(obj)
+        return "a second scene"
+    other = next(s for s in bpy.data.scenes if s != bpy.context.scene)
+    if r.random() < 0.3:
+        other.frame_set(r.randint(*FRAMES))
+        return f"frame {other.frame_current} in scene {other.name}"
+    bpy.context.window.scene = other
+    return f"scene {other.name}"
+
+
+@operation(0.4)
+def view_layer(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    layers = bpy.context.scene.view_layers
+    if len(layers) == 1:
+        layers.new("Second")
+    other = next(layer for layer in layers if layer != bpy.context.view_layer)
+    bpy.context.window.view_layer = other
+    return f"view layer {other.name}"
+
+
+# --- Files
+
+
+@operation(5)
+def undo(w: Walker, r: random.Random) -> str | None:
+    steps = r.choice((1, 1, 2))
+    w.push_undo()
+    for _step in range(steps):
+        bpy.ops.ed.undo()
+    if r.random() < 0.3:
+        if r.random() < 0.5:
+            bpy.context.view_layer.update()
+        bpy.ops.ed.redo()
+        return f"undo {steps}, redo"
+    return f"undo {steps}"
+
+
+@operation(2.5)
+def redo(w: Walker, r: random.Random) -> str | None:
+    w.push_undo()
+    bpy.ops.ed.redo()
+    return "redo"
+
+
+@operation(1)
+def save(w: Walker, r: random.Random) -> str | None:
+    w.this_frame()
+    bpy.ops.wm.save_as_mainfile(filepath=str(w.folder / "walk.blend"))
+    return "save"
+
+
+@operation(0.5)
+def save_copy(w: Walker, r: random.Random) -> str | None:
+    w.this_frame()
+    bpy.ops.wm.save_as_mainfile(filepath=str(w.folder / "copy.blend"), copy=True)
+    return "save a copy"
+
+
+@operation(1)
+def save_and_load(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    w.this_frame()
+    path = str(w.folder / "walk.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    return "save and open"
+
+
+@operation(0.5)
+def revert(w: Walker, r: random.Random) -> str | None:
+    if Path(bpy.data.filepath).name != "walk.blend":
+        return None
+    bpy.ops.wm.revert_mainfile()
+    return "revert"
+
+
+def _from_library(w: Walker, link: bool) -> list[bpy.types.Object]:
+    path = str(w.folder / "library.blend")
+    w.object_mode()
+    with bpy.data.libraries.load(path, link=link) as (_source, target):
+        target.objects = ["Guest", "Guest Rig"]
+    for obj in target.objects:
+        # Linked once more, it is the same one.
+        if obj not in list(bpy.context.scene.collection.objects):
+            bpy.context.scene.collection.objects.link(obj)
+    return list(target.objects)
+
+
+def _has_guest() -> bool:
+    return any(o.library is not None or o.override_library is not None for o in bpy.data.objects)
+
+
+@operation(0.5)
+def append(w: Walker, r: random.Random) -> str | None:
+    if len(w.meshes()) > 6:
+        return None
+    guest, rig = _from_library(w, link=False)
+    guest.name, guest.data.name = w.new_name("object"), w.new_name("mesh")
+    rig.name, rig.data.name = w.new_name("object"), w.new_name("armature")
+    return f"append {guest.name} and {rig.name}"
+
+
+@operation(0.4)
+def link(w: Walker, r: random.Random) -> str | None:
+    if _has_guest():
+        return None
+    _from_library(w, link=True)
+    return "link Guest and Guest Rig"
+
+
+@operation(0.6)
+def override(w: Walker, r: random.Random) -> str | None:
+    if not _has_guest():
+        _from_library(w, link=True)
+    guest = next((o for o in w.objects("MESH") if o.library is not None), None)
+    if guest is None or guest not in w.in_layer():
+        return None
+    w.object_mode()
+    guest.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
+    return f"override {guest.name}"
+
+
+@operation(0.5)
+def reload_library(w: Walker, r: random.Random) -> str | None:
+    if not bpy.data.libraries:
+        return None
+    w.object_mode()
+    bpy.data.libraries[0].reload()
+    return "reload the library"
+
+
+@operation(0.7)
+def purge(w: Walker, r: random.Random) -> str | None:
+    bpy.data.orphans_purge(do_recursive=r.random() < 0.7)
+    return "purge orphans"
+
+
+@operation(1.5)
+def render(w: Walker, r: random.Random) -> str | None:
+    w.object_mode()
+    w.before_evaluation()
+    w.rendered = {}
+    if r.random() < 0.3:
+        scene = bpy.context.scene
+        first = r.randint(1, 10)
+        scene.frame_start, scene.frame_end = first, first + 1
+        bpy.ops.render.render(animation=True)
+        scene.frame_start, scene.frame_end = FRAMES
+        return f"render frames {first} and {first + 1}"
+    bpy.ops.render.render()
+    return "render"
+
+
+@operation(1)
+def neighbour(w: Walker, r: random.Random) -> str | None:
+    """Another add-on's handler, once, at a change of frame."""
+    obj, when = w.mesh(r), r.choice(("frame_change_pre", "frame_change_post", "depsgraph_update_post"))
+    what, number = (
+        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name")),
+        r.randint(*FRAMES),
+    )
+    if (
+        obj is None
+        or obj.override_library is not None
+        or obj.mode != "OBJECT"
+        or obj.data.library is not None
+    ):
+        return None
+    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE"])
+    if what in ("rename", "toggle", "delete") and modifier is None:
+        return None
+    name, vertices, new = obj.name, _vertices(w, r, obj), w.new_name("neighbour")
+    modifier_name = modifier.name if modifier is not None else ""
+    handlers = getattr(bpy.app.handlers, when)
+
+    def act(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+        handlers.remove(act)
+        obj = bpy.data.objects[name]
+        if what == "add":
+            obj.modifiers.new(new, "CAST")
+        elif what == "weights" and obj.vertex_groups:
+            obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
+        elif what == "move":
+            obj.location.z += 0.1
+        elif what == "name":
+            obj.name = new
+        elif what == "rename":
+            obj.modifiers[modifier_name].name = new
+        elif what == "toggle":
+            obj.modifiers[modifier_name].show_viewport = not obj.modifiers[modifier_name].show_viewport
+        elif what == "delete":
+            obj.modifiers.remove(obj.modifiers[modifier_name])
+
+    handlers.append(act)
+    if when == "depsgraph_update_post":
+        obj.update_tag()
+        bpy.context.view_layer.update()
+    else:
+        bpy.context.scene.frame_set(number)
+    if act in handlers:
+        handlers.remove(act)
+    return f"another add-on in {when}: {what}, {name} {modifier_name}, frame {number}"
+
+
+@operation(0.5)
+def touch(w: Walker, r: random.Random) -> str | None:
+    obj, what = w.one(r, [*w.meshes(), *w.armatures()]), r.choice(("object", "data", "all"))
+    if obj is None:
+        return None
+    if what == "object":
+        obj.update_tag()
+    elif what == "data":
+        obj.data.update_tag()
+    else:
+        obj.update_tag(refresh={"OBJECT", "DATA", "TIME"})
+    return f"tag {obj.name}: {what}"
+
+
+@operation(2)
+def update(w: Walker, r: random.Random) -> str | None:
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    return "view_layer.update()"
+
+
+# --- What test_walk plants, to see that it is found; never chosen
+
+
+@operation(0)
+def plant_shape(w: Walker, r: random.Random) -> str | None:
+    if w.side.is_sinew:
+        bpy.data.objects["Arm"].data.vertices[0].co.z += 0.001
+    return "a vertex moved on one side"
+
+
+@operation(0)
+def plant_state(w: Walker, r: random.Random) -> str | None:
+    if w.side.is_sinew:
+        bpy.data.objects["Arm"].modifiers["Armature"].show_render = False
+    return "a modifier switched off on one side"
+
+
+@operation(0)
+def plant_exception(w: Walker, r: random.Random) -> str | None:
+    def fail(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+        bpy.app.handlers.frame_change_post.remove(fail)
+        raise ValueError("planted")
+
+    if w.side.is_sinew:
+        bpy.app.handlers.frame_change_post.append(fail)
+        bpy.context.scene.frame_set(2)
+    return "an exception in a handler"
+
+
+@operation(0)
+def plant_crash(w: Walker, r: random.Random) -> str | None:
+    if w.side.is_sinew:
+        os.abort()
+    return "a crash"

@@ -1,0 +1,441 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The two sides of a walk: what an operation of Sinew's is with Sinew, and in a Blender without it.
+
+Blender's side keeps what Sinew would be set to in properties that change no shape and that Blender itself
+copies, undoes, links and saves with what they belong to: an object's pass index, and of an Armature modifier
+whether it is expanded. Expanded is one whose own Preserve Volume is on; the flag itself is what Sinew's
+method makes of it for now.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import bpy
+
+METHODS = ("lbs", "dq", "qv")
+# Bits of the pass index. ADOPTED: what Sinew makes of it, and when, is its own choice, until it is put on.
+DRIVEN, ON, DQ, QV, KEYED, ADOPTED = 1, 2, 4, 8, 16, 32
+OBJECT_MODES_OF_THE_MODIFIER = {"EDIT", "SCULPT"}
+
+
+def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    return [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
+
+
+def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The curves of what an ID's animation plays, in 4.2 to 5.2."""
+    animation = owner.animation_data
+    action = animation.action if animation is not None else None
+    if action is None:
+        return []
+    if hasattr(action, "fcurves"):
+        return list(action.fcurves)
+    slot = animation.action_slot
+    bags = [s.channelbag(slot) for layer in action.layers for s in layer.strips] if slot is not None else []
+    return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+def remove_curves(owner: bpy.types.ID, end: str) -> None:
+    """Takes the curves off whose data path ends so."""
+    action = owner.animation_data.action if owner.animation_data is not None else None
+    for curve in [c for c in curves_of(owner) if c.data_path.endswith(end)]:
+        if hasattr(action, "fcurves"):
+            action.fcurves.remove(curve)
+            continue
+        for layer in action.layers:
+            for strip in layer.strips:
+                for bag in strip.channelbags:
+                    if curve in list(bag.fcurves):
+                        bag.fcurves.remove(curve)
+                        break
+
+
+def key(owner: bpy.types.ID, path: str, values: list[tuple[int, float]]) -> None:
+    """Keys a property whatever its value is now."""
+    for frame, _value in values:
+        owner.keyframe_insert(path, frame=frame)
+    curve = next(c for c in curves_of(owner) if c.data_path == path)
+    at = dict(values)
+    for point in curve.keyframe_points:
+        if point.co.x in at:
+            point.co.y = at[point.co.x]
+            point.interpolation = "CONSTANT"
+    curve.update()
+
+
+class BlenderSide:
+    """The Blender without Sinew."""
+
+    is_sinew = False
+
+    def __init__(self) -> None:
+        self.log: list[str] = []
+
+    def prepare(self, safe: bool) -> None:
+        pass
+
+    def is_ours(self, obj: bpy.types.Object) -> bool:
+        return False
+
+    def is_helper(self, obj: bpy.types.Object) -> bool:
+        return False
+
+    def own_modifier(self, obj: bpy.types.Object) -> bpy.types.Modifier | None:
+        return None
+
+    def is_driven(self, obj: bpy.types.Object) -> bool:
+        return bool(obj.pass_index & DRIVEN)
+
+    def is_on(self, obj: bpy.types.Object) -> bool:
+        return bool(obj.pass_index & ON)
+
+    def method(self, obj: bpy.types.Object) -> str:
+        return "qv" if obj.pass_index & QV else "dq" if obj.pass_index & DQ else "lbs"
+
+    def _set(self, obj: bpy.types.Object, bit: int, on: bool) -> None:
+        value = obj.pass_index | bit if on else obj.pass_index & ~bit
+        if obj.pass_index != value:
+            obj.pass_index = value
+
+    def note_flags(self, obj: bpy.types.Object) -> None:
+        """Called where the walk itself has set Preserve Volume."""
+        for modifier in armature_modifiers(obj):
+            modifier.show_expanded = modifier.use_deform_preserve_volume
+
+    def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
+        """The modifier's own."""
+        return modifier.show_expanded
+
+    def set_preserve_volume(self, modifier: bpy.types.Modifier, on: bool) -> None:
+        modifier.show_expanded = modifier.use_deform_preserve_volume = on
+
+    def add(self, obj: bpy.types.Object, method: str | None, leave_small: bool) -> None:
+        first = next((m for m in armature_modifiers(obj) if m.object is not None), None)
+        if self.is_driven(obj) or first is None:
+            return
+        self._set(obj, ADOPTED, False)
+        self._set(obj, DRIVEN, True)
+        self._set(obj, ON, True)
+        self.set_method(obj, method or ("dq" if first.show_expanded else "lbs"))
+
+    def remove(self, obj: bpy.types.Object) -> None:
+        if self.is_driven(obj):
+            self.unkey_method(obj, self.method(obj))
+            obj.pass_index = 0
+
+    def set_method(self, obj: bpy.types.Object, method: str) -> None:
+        self._set(obj, DQ, method == "dq")
+        self._set(obj, QV, method == "qv")
+
+    def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
+        self._set(obj, ON, on)
+
+    def rebind(self, obj: bpy.types.Object) -> None:
+        self._set(obj, ON, True)
+
+    def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
+        """One that changes no shape."""
+
+    def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
+        pass
+
+    def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
+        self._set(obj, KEYED, True)
+        self._set(obj, QV, False)
+        for modifier in armature_modifiers(obj):
+            path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].use_deform_preserve_volume'
+            key(obj, path, [(frame, float(method == "dq")) for frame, method in values])
+
+    def unkey_method(self, obj: bpy.types.Object, method: str) -> None:
+        remove_curves(obj, ".use_deform_preserve_volume")
+        self._set(obj, KEYED, False)
+        self.set_method(obj, method)
+
+    def is_method_keyed(self, obj: bpy.types.Object) -> bool:
+        return bool(obj.pass_index & KEYED)
+
+    def start_comparison(self, meshes: list[bpy.types.Object], methods: list[str]) -> None:
+        pass
+
+    def end_comparison(self) -> None:
+        pass
+
+    def arrange_comparison(self, arrangement: str) -> None:
+        pass
+
+    def restart(self, between: object) -> None:
+        between()
+
+    def delete_part(self, obj: bpy.types.Object, what: str) -> None:
+        """The artist deletes a modifier that Sinew needs: it goes, or says so and is off."""
+        if what.endswith("modifier") and self.is_driven(obj):
+            self._set(obj, ADOPTED, True)
+
+    def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
+        self._set(target, ADOPTED, True)
+
+    def applied(self, obj: bpy.types.Object) -> None:
+        obj.pass_index = 0
+
+    def apply(self, obj: bpy.types.Object) -> None:
+        for modifier in armature_modifiers(obj):
+            bpy.ops.object.modifier_apply(modifier=modifier.name)
+        obj.pass_index = 0
+
+    def bring_in_line(self, claims: dict[str, dict]) -> list[str]:
+        """Makes the modifiers blend as Sinew's side says it is set; a line for each object where what Sinew
+        says differs from what the walk has set it to.
+
+        claims  by the name of each object that Sinew drives
+        """
+        wrong = []
+        for obj in bpy.data.objects:
+            if obj.type != "MESH":
+                continue
+            claim = claims.get(obj.name_full)
+            if obj.library is None:
+                wrong += self._adopt(obj, claim)
+            run = claim["run"] if claim is not None else []
+            if self.is_on(obj) and self.is_method_keyed(obj):
+                continue
+            on = self.is_driven(obj) and self.is_on(obj) and obj.mode not in OBJECT_MODES_OF_THE_MODIFIER
+            for modifier in armature_modifiers(obj):
+                replaced = on and modifier.name in run
+                wanted = self.method(obj) == "dq" if replaced else modifier.show_expanded
+                if modifier.use_deform_preserve_volume != wanted:
+                    modifier.use_deform_preserve_volume = wanted
+        return wrong
+
+    def _adopt(self, obj: bpy.types.Object, claim: dict | None) -> list[str]:
+        if obj.pass_index & ADOPTED:
+            self._set(obj, DRIVEN, claim is not None)
+            self._set(obj, ON, claim is not None and claim["on"])
+            if claim is not None:
+                self.set_method(obj, claim["method"])
+            return []
+        if self.is_driven(obj) != (claim is not None):
+            return [f"{obj.name_full} is{'' if claim else ' not'} Sinew's, against the walk's list"]
+        if claim is None:
+            return []
+        if claim["error"] and not claim["on"]:
+            self._set(obj, ON, False)
+        if self.is_on(obj) != claim["on"]:
+            return [f"{obj.name_full}: Sinew is {'on' if claim['on'] else 'off'} against the walk's list"]
+        if not self.is_method_keyed(obj) and claim["method"] != self.method(obj):
+            return [f"{obj.name_full}: method {claim['method']}, the walk's list has {self.method(obj)}"]
+        return []
+
+
+class _Records(logging.Handler):
+    """Keeps what was logged with an exception, and how often Blender's evaluation could not be answered."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.DEBUG)
+        self.errors: list[str] = []
+        self.unanswered = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.exc_info:
+            self.errors.append(self.format(record))
+        elif record.levelno == logging.DEBUG:
+            self.unanswered += 1
+
+
+class SinewSide:
+    """The Blender with Sinew."""
+
+    is_sinew = True
+
+    def __init__(self) -> None:
+        self.records = _Records()
+
+    def prepare(self, safe: bool) -> None:
+        import routes
+        import sinew_addon
+
+        logger = logging.getLogger("sinew")
+        logger.setLevel(logging.DEBUG)
+        logger.propagate = False
+        logger.handlers[:] = [self.records]
+        sinew_addon.register()
+        routes.force(routes.UPDATE if safe else routes.EVALUATION)
+        from sinew_addon.blender import small_meshes
+
+        # The walk says itself which are left to Blender.
+        small_meshes.is_used = True
+
+    @property
+    def _properties(self):
+        from sinew_addon.blender import properties
+
+        return properties
+
+    def is_ours(self, obj: bpy.types.Object) -> bool:
+        """Made by Sinew for another."""
+        return self._properties.is_helper(obj) or self._properties.is_copy(obj)
+
+    def is_helper(self, obj: bpy.types.Object) -> bool:
+        return self._properties.is_helper(obj)
+
+    def own_modifier(self, obj: bpy.types.Object) -> bpy.types.Modifier | None:
+        from sinew_addon.blender import stack
+
+        return stack.sinew_modifier(obj)
+
+    def is_driven(self, obj: bpy.types.Object) -> bool:
+        return self._properties.is_driven(obj)
+
+    def is_on(self, obj: bpy.types.Object) -> bool:
+        return self.is_driven(obj) and obj.sinew.enabled
+
+    def note_flags(self, obj: bpy.types.Object) -> None:
+        pass
+
+    def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
+        return modifier.use_deform_preserve_volume
+
+    def set_preserve_volume(self, modifier: bpy.types.Modifier, on: bool) -> None:
+        modifier.use_deform_preserve_volume = on
+
+    def add(self, obj: bpy.types.Object, method: str | None, leave_small: bool) -> None:
+        from sinew_addon.blender import drive, handlers
+
+        if not self.is_driven(obj):
+            drive.add(obj, method)
+            obj.sinew.leave_small = leave_small
+            # As the button does.
+            handlers.session.forget()
+            handlers.refresh(bpy.context)
+
+    def remove(self, obj: bpy.types.Object) -> None:
+        from sinew_addon.blender import drive, handlers
+
+        if self.is_driven(obj):
+            drive.remove(obj)
+            handlers.session.forget()
+
+    def set_method(self, obj: bpy.types.Object, method: str) -> None:
+        from sinew_addon.blender import drive
+
+        drive.use_one_method(obj, method)
+
+    def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
+        obj.sinew.enabled = on
+
+    def rebind(self, obj: bpy.types.Object) -> None:
+        from sinew_addon.blender import handlers
+
+        handlers.rebind(obj, bpy.context)
+
+    def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
+        setattr(obj.sinew, name, value)
+
+    def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
+        if on:
+            bpy.context.scene.sinew_measures.quantity = quantity
+        obj.sinew.heat = on
+
+    def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
+        numbers = {m.name: m.number for m in self._properties.METHODS.values()}
+        key(obj, "sinew.method", [(frame, float(numbers[method])) for frame, method in values])
+
+    def unkey_method(self, obj: bpy.types.Object, method: str) -> None:
+        remove_curves(obj, "sinew.method")
+        self.set_method(obj, method)
+
+    def is_method_keyed(self, obj: bpy.types.Object) -> bool:
+        return any(curve.data_path == "sinew.method" for curve in curves_of(obj))
+
+    def start_comparison(self, meshes: list[bpy.types.Object], methods: list[str]) -> None:
+        import numpy as np
+        from sinew_addon.blender.comparison import comparison
+
+        comparison.start(bpy.context, meshes, methods, np.array((1.0, 0.0, 0.0)))
+
+    def end_comparison(self) -> None:
+        from sinew_addon.blender.comparison import comparison
+
+        comparison.end(bpy.context)
+
+    def arrange_comparison(self, arrangement: str) -> None:
+        from sinew_addon.blender.comparison import comparison_state
+
+        state = comparison_state.of_scene(bpy.context.scene)
+        if state is not None:
+            state.arrangement = arrangement
+
+    def restart(self, between: object) -> None:
+        """Off and on again in the preferences."""
+        import sinew_addon
+
+        sinew_addon.unregister()
+        between()
+        sinew_addon.register()
+
+    def delete_part(self, obj: bpy.types.Object, what: str) -> None:
+        modifier = self.own_modifier(obj)
+        if modifier is None or not self.is_on(obj):
+            return
+        if what == "modifier":
+            obj.modifiers.remove(modifier)
+        elif what == "attribute":
+            for name in [a.name for a in obj.data.attributes if a.name.startswith("sinew")]:
+                obj.data.attributes.remove(obj.data.attributes[name])
+
+    def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
+        pass
+
+    def applied(self, obj: bpy.types.Object) -> None:
+        pass
+
+    def apply(self, obj: bpy.types.Object) -> None:
+        modifier = self.own_modifier(obj)
+        if self.is_on(obj) and modifier is not None and modifier.show_viewport:
+            bpy.ops.object.modifier_apply(modifier=modifier.name)
+        else:
+            for armature in armature_modifiers(obj):
+                bpy.ops.object.modifier_apply(modifier=armature.name)
+
+    def claims(self) -> dict[str, dict]:
+        """By the name of each object that Sinew drives: how it says it does."""
+        return {
+            obj.name_full: {
+                "on": obj.sinew.enabled,
+                "method": obj.sinew.method,
+                "rule": obj.sinew.scale_rule,
+                "error": obj.sinew.error,
+                "run": [stand_in.name for stand_in in obj.sinew.stand_ins],
+            }
+            for obj in bpy.data.objects
+            if self.is_driven(obj) and not self.is_ours(obj)
+        }
+
+    def copies(self) -> list[tuple[bpy.types.Object, str, str]]:
+        """The copies of comparisons: object, original's name, method."""
+        return [
+            (obj, obj.sinew.copied.name_full, obj.sinew.copied_for)
+            for obj in bpy.data.objects
+            if self._properties.is_copy(obj) and obj.sinew.copied is not None
+        ]
+
+    def left_over(self) -> list[str]:
+        """What is left of Sinew in a file where it drives nothing."""
+        found = [f"object {o.name}" for o in bpy.data.objects if o.library is None and self.is_ours(o)]
+        found += [
+            f"settings of {o.name}" for o in bpy.data.objects if o.is_property_set("sinew") and not o.library
+        ]
+        for obj in bpy.data.objects:
+            if obj.library is not None:
+                continue
+            found += [f"modifier {m.name} of {obj.name}" for m in obj.modifiers if "Sinew" in m.name]
+            drivers = obj.animation_data.drivers if obj.animation_data is not None else ()
+            found += [f"driver {d.data_path} of {obj.name}" for d in drivers]
+        for mesh in bpy.data.meshes:
+            # Without a user it is not saved, and was that of an object that was deleted.
+            names = mesh.attributes.keys() if mesh.library is None and mesh.users else ()
+            found += [f"attribute {name} of {mesh.name}" for name in names if "sinew" in name.lower()]
+        for kind in ("meshes", "node_groups", "materials", "collections", "actions", "texts"):
+            items = (i for i in getattr(bpy.data, kind) if i.library is None)
+            found += [f"{kind}: {item.name}" for item in items if "sinew" in item.name.lower()]
+        return found

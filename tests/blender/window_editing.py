@@ -1,0 +1,403 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Steps that pose, paint and edit, and that change the stack of modifiers."""
+
+from __future__ import annotations
+
+import contextlib
+
+import bpy
+import window
+import window_scene
+from mathutils import Vector
+from window_hand import FOLDER, Run, Steps, choose, click, execute, hero, press, rig, set_frame, step, wait
+from window_scene import LARGE, shown_points, worst
+
+
+@step("modes")
+def drag_a_bone(run: Run) -> Steps:
+    """By R, X and a number, as on a keyboard, in pose mode."""
+    with window.in_view3d("WINDOW"):
+        bpy.ops.view3d.view_all()
+    execute("object.mode_set", "Hero Rig", mode="POSE")
+    bone = rig().pose.bones["bone.1"]
+    rig().data.bones.active = bone.bone
+    bone.select = True
+    before = bone.matrix.copy()
+    yield from wait()
+    for key, text in (("R", ""), ("X", ""), ("FOUR", "4"), ("FIVE", "5")):
+        press(key, text)
+        yield from wait()
+        run.check_shapes(f"while dragging, after {key}")
+    press("RET")
+    yield from wait()
+    run.check(bone.matrix != before, "the bone was not dragged")
+    run.check_shapes("dragged")
+    press("Z", ctrl=True)
+    yield from wait(4)
+    run.check_shapes("dragged and undone")
+    execute("object.mode_set", mode="OBJECT")
+    yield from run.check_frames()
+
+
+def _enter_weight_paint() -> Steps:
+    """With the armature's last bone active, and no group."""
+    execute("object.mode_set", "Hero Rig", mode="POSE")
+    rig().data.bones.active = rig().data.bones["bone.2"]
+    rig().pose.bones["bone.2"].select = True
+    execute("object.mode_set", mode="OBJECT")
+    hero().vertex_groups.active_index = -1
+    choose("Hero", "Hero Rig")
+    yield from wait()
+    execute("object.mode_set", mode="WEIGHT_PAINT")
+    yield from wait()
+
+
+@step("modes")
+def weight_paint(run: Run) -> Steps:
+    """The armature goes to pose mode and the active bone's group becomes the active one, as without Sinew;
+    paint shows, also while it plays."""
+    found = []
+    for is_on in (False, True):
+        if not is_on:
+            click("sinew.remove", "Hero")
+        yield from _enter_weight_paint()
+        _stroke()
+        yield from wait()
+        active = hero().vertex_groups.active
+        found.append((active and active.name, rig().mode))
+        if not is_on:
+            execute("object.mode_set", mode="OBJECT")
+            execute("object.mode_set", "Hero Rig", mode="OBJECT")
+            click("sinew.add", "Hero")
+            hero().sinew.method = "dq"
+    run.check(found[0] == ("bone.2", "POSE"), f"without Sinew, they are {found[0]}")
+    run.check(found[0] == found[1], f"active group and the armature's mode without Sinew and with: {found}")
+    run.check_shapes("in weight paint")
+    before = [group.weight for vertex in hero().data.vertices for group in vertex.groups]
+    with window.in_view3d():
+        bpy.ops.screen.animation_play()
+    yield from wait(5)
+    hero().vertex_groups.active_index = 1
+    _stroke()
+    yield from wait(5)
+    with window.in_view3d():
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield from wait()
+    after = [group.weight for vertex in hero().data.vertices for group in vertex.groups]
+    run.check(before != after, "nothing was painted")
+    run.check_shapes("painted while it played")
+    press("Z", ctrl=True)
+    yield from wait(4)
+    run.check_shapes("painted and undone")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "painting.blend"), copy=True)
+    run.note_saved(FOLDER / "painting.blend")
+    execute("object.mode_set", "Hero", mode="OBJECT")
+    yield from run.check_frames()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "painted.blend"), copy=True)
+    run.note_saved(FOLDER / "painted.blend")
+    click("sinew.remove", "Hero")
+    run.wanted["Hero"] = ""
+    modifier = hero().modifiers["Armature"]
+    flags = (modifier.show_viewport, modifier.show_render)
+    run.check(flags == (True, True), f"once Sinew is removed, the Armature modifier is on in {flags}")
+    yield from wait()
+    run.check_shapes("without Sinew")
+    press("Z", ctrl=True)
+    run.wanted["Hero"] = "dq"
+    yield from wait(4)
+    yield from run.check_frames()
+
+
+def _stroke() -> None:
+    """Over the middle of the view."""
+    with window.in_view3d("WINDOW"):
+        middle = bpy.context.region.width / 2, bpy.context.region.height / 2
+        given = {"name": "", "location": (0.0, 0.0, 0.0), "pressure": 1.0, "size": 200.0, "x_tilt": 0.0}
+        stroke = [
+            given
+            | {"y_tilt": 0.0, "time": n / 10, "is_start": n == 0}
+            | dict.fromkeys(("mouse", "mouse_event"), (middle[0] + 4.0 * n, middle[1]))
+            for n in range(8)
+        ]
+        bpy.ops.paint.weight_paint("EXEC_DEFAULT", True, stroke=stroke)
+
+
+@step("modes")
+def edit_the_mesh(run: Run) -> Steps:
+    execute("object.mode_set", "Hero", mode="EDIT")
+    yield from wait()
+    execute("mesh.select_all", action="SELECT")
+    execute("transform.translate", value=(0.0, 0.0, 0.2))
+    yield from wait()
+    execute("object.mode_set", mode="OBJECT")
+    yield from wait()
+    run.check_shapes("its vertices moved")
+    execute("object.mode_set", "Hero", mode="EDIT")
+    execute("mesh.subdivide")
+    execute("object.mode_set", mode="OBJECT")
+    yield from wait()
+    run.check(len(hero().data.vertices) > 2 * LARGE, "it was not subdivided")
+    run.check_shapes("subdivided")
+    # Out of edit mode, and the subdivision.
+    for _time in range(2):
+        press("Z", ctrl=True)
+        yield from wait(4)
+    # To where it was in edit mode.
+    execute("object.mode_set", "Hero", mode="OBJECT")
+    yield from wait()
+    run.check_shapes("subdivided and undone")
+    yield from run.check_frames()
+
+
+@step("modes")
+def edit_the_armature(run: Run) -> Steps:
+    execute("object.mode_set", "Hero Rig", mode="EDIT")
+    rig().data.edit_bones["bone.2"].tail.z += 0.5
+    rig().data.edit_bones["bone.1"].roll += 0.4
+    yield from wait()
+    execute("object.mode_set", mode="OBJECT")
+    yield from wait()
+    run.check_shapes("its bones edited")
+    rig().data.bones["bone.1"].name = "elbow"
+    yield from wait()
+    run.check("elbow" in hero().vertex_groups, "the group was not renamed with its bone")
+    run.check_shapes("a bone renamed")
+    execute("object.mode_set", "Hero Rig", mode="EDIT")
+    rig().data.edit_bones["bone.2"].name = "hand"
+    execute("object.mode_set", mode="OBJECT")
+    yield from wait()
+    run.check("hand" in hero().vertex_groups, "the group was not renamed with its bone in edit mode")
+    run.check_shapes("a bone renamed in edit mode")
+    press("Z", ctrl=True)
+    yield from wait(4)
+    execute("object.mode_set", "Hero Rig", mode="OBJECT")
+    yield from wait()
+    run.check_shapes("renamed and undone")
+    yield from run.check_frames()
+
+
+@step("modes")
+def methods_while_it_plays(run: Run) -> Steps:
+    with window.in_view3d():
+        bpy.ops.screen.animation_play()
+    for method in ("lbs", "dq", "qv", "dq", "lbs", "dq"):
+        hero().sinew.method = method
+        yield from wait(4)
+    hero().sinew.enabled = False
+    yield from wait(4)
+    hero().sinew.enabled = True
+    click("sinew.rebind", "Hero")
+    yield from wait(4)
+    with window.in_view3d():
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield from wait()
+    run.check_shapes("after playback")
+    yield from run.check_frames()
+
+
+@step("modes")
+def hide_and_show(run: Run) -> Steps:
+    choose("Hero Rig")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.object.hide_view_set("EXEC_DEFAULT", True)
+    yield from wait()
+    run.check_shapes("its armature hidden")
+    yield from run.check_frames()
+    rig().hide_viewport = True
+    yield from wait()
+    run.check_shapes("its armature switched off")
+    yield from run.check_frames()
+    rig().hide_viewport = False
+    with window.in_view3d("WINDOW"):
+        bpy.ops.object.hide_view_clear("EXEC_DEFAULT", True)
+    hero().hide_viewport = True
+    yield from wait()
+    set_frame(3)
+    yield from wait()
+    hero().hide_viewport = False
+    yield from wait()
+    run.check_shapes("shown again")
+    yield from run.check_frames()
+
+
+@step("modifiers")
+def remove_sinews_modifier(run: Run) -> Steps:
+    """By the cross in its header: the Armature modifier deforms again."""
+    execute("object.modifier_remove", "Hero", modifier="Sinew")
+    run.wanted["Hero"] = ""
+    yield from wait()
+    modifier = hero().modifiers["Armature"]
+    run.check(modifier.show_viewport and modifier.show_render, "its Armature modifier stays off")
+    run.check(modifier.object == rig(), "its Armature modifier has no armature")
+    run.check_shapes("without Sinew's modifier")
+    yield from run.check_frames()
+    press("Z", ctrl=True)
+    run.wanted["Hero"] = "dq"
+    yield from wait(4)
+    run.check_shapes("undone")
+    yield from run.check_frames()
+
+
+@step("modifiers")
+def copy_modifiers(run: Run) -> Steps:
+    """To another mesh of the same armature, which never had Sinew: a working one or none."""
+    twin = bpy.data.objects.new("Twin", hero().data.copy())
+    _link_beside(twin)
+    yield from wait()
+    yield from _copy_modifiers(run)
+
+
+@step("modifiers")
+def copy_modifiers_to_a_copy(run: Run) -> Steps:
+    """To one that had Sinew, and whose modifiers were deleted one by one."""
+    twin = hero().copy()
+    twin.data = hero().data.copy()
+    twin.name = "Twin"
+    _link_beside(twin)
+    yield from wait()
+    run.check_copy(twin, "copied by Python")
+    for modifier in list(twin.modifiers):
+        twin.modifiers.remove(modifier)
+        yield from wait()
+    yield from _copy_modifiers(run)
+
+
+def _link_beside(twin: bpy.types.Object) -> None:
+    twin.location = rig().location + Vector((0.0, -4.0, 0.0))
+    bpy.context.window_manager.windows[0].scene.collection.objects.link(twin)
+
+
+def _copy_modifiers(run: Run) -> Steps:
+    choose("Hero", "Twin")
+    execute("object.make_links_data", type="MODIFIERS")
+    yield from wait()
+    twin = bpy.data.objects["Twin"]
+    run.check_copy(twin, "after Copy Modifiers")
+    set_frame(5)
+    yield from wait()
+    run.check_copy(twin, "after Copy Modifiers, at frame 5")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "copied.blend"), copy=True)
+    run.note_saved(FOLDER / "copied.blend")
+    execute("object.delete", "Twin", confirm=False)
+    yield from wait()
+    yield from run.check_frames()
+
+
+@step("modifiers")
+def duplicate(run: Run) -> Steps:
+    for linked in (False, True):
+        execute("object.duplicate", "Hero", linked=linked)
+        copy = bpy.context.window_manager.windows[0].view_layer.objects.active
+        yield from wait()
+        run.check_copy(copy, f"duplicated {'linked' if linked else ''}")
+        set_frame(9)
+        yield from wait()
+        run.check_copy(copy, f"duplicated {'linked' if linked else ''} at frame 9")
+        execute("object.delete", copy.name, confirm=False)
+        yield from wait()
+        yield from run.check_frames()
+
+
+@step("modifiers")
+def apply(run: Run) -> Steps:
+    """Freezes the shape, and Sinew is forgotten."""
+    set_frame(12)
+    yield from wait()
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    before = shown_points(hero(), depsgraph)
+    execute("object.modifier_apply", "Hero", modifier="Sinew")
+    del run.wanted["Hero"]
+    yield from wait()
+    set_frame(3)
+    yield from wait()
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    off = worst(shown_points(hero(), depsgraph), before)
+    run.check(off <= window_scene.TOLERANCE, f"the shape that was applied moves by {off:.4f}")
+    _check_forgotten(run, hero(), "after Apply")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "applied.blend"), copy=True)
+    press("Z", ctrl=True)
+    run.wanted["Hero"] = "dq"
+    yield from wait(4)
+    run.check_shapes("undone")
+    yield from run.check_frames()
+
+
+def _check_forgotten(run: Run, obj: bpy.types.Object, when: str) -> None:
+    run.check(
+        not (obj.is_property_set("sinew") and len(obj.sinew.stand_ins)), f"Sinew's settings stay {when}"
+    )
+    run.check(not any(m.type == "NODES" for m in obj.modifiers), f"a modifier of Sinew's stays {when}")
+    ours = [a.name for a in obj.data.attributes if a.name.startswith("sinew")]
+    run.check(not ours, f"attributes stay {when}: {ours}")
+    drivers = obj.animation_data.drivers if obj.animation_data is not None else []
+    run.check(not len(drivers), f"drivers stay {when}")
+
+
+@step("modifiers")
+def convert_to_mesh(run: Run) -> Steps:
+    set_frame(12)
+    yield from wait()
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    before = shown_points(hero(), depsgraph)
+    execute("object.convert", "Hero", target="MESH")
+    del run.wanted["Hero"]
+    yield from wait()
+    set_frame(3)
+    yield from wait()
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    off = worst(shown_points(hero(), depsgraph), before)
+    run.check(off <= window_scene.TOLERANCE, f"the shape that was converted moves by {off:.4f}")
+    _check_forgotten(run, hero(), "after Convert")
+    press("Z", ctrl=True)
+    run.wanted["Hero"] = "dq"
+    yield from wait(4)
+    run.check_shapes("undone")
+    yield from run.check_frames()
+
+
+@step("modifiers")
+def save_as_shape_key(run: Run) -> Steps:
+    set_frame(12)
+    yield from wait()
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    before = shown_points(hero(), depsgraph)
+    # Blender itself refuses it for Geometry Nodes.
+    with contextlib.suppress(RuntimeError):
+        execute("object.modifier_apply_as_shapekey", "Hero", modifier="Sinew", keep_modifier=True)
+    yield from wait()
+    keys = hero().data.shape_keys
+    run.check_shapes("afterwards")
+    if keys is not None:
+        points = before.copy()
+        keys.key_blocks[-1].data.foreach_get("co", points.ravel())
+        off = worst(points, before)
+        run.check(off <= window_scene.TOLERANCE, f"the shape key is off by {off:.4f}")
+        press("Z", ctrl=True)
+        yield from wait(4)
+    yield from run.check_frames()
+
+
+@step("modifiers")
+def no_inert_group_in_the_menu(run: Run) -> Steps:
+    """The Add Modifier menu offers groups that are modifiers; on another mesh ours would do nothing."""
+    offered = [g.name for g in bpy.data.node_groups if g.is_modifier and not g.name.startswith((".", "_"))]
+    run.check(not offered, f"the menu offers {offered}")
+    yield
+
+
+@step("modifiers")
+def delete_the_armature(run: Run) -> Steps:
+    """It says so, and what is saved opens; undone, all is as before."""
+    execute("object.delete", "Hero Rig", confirm=False)
+    wanted = run.wanted
+    run.wanted = {name: method for name, method in wanted.items() if name != "Hero"}
+    yield from wait(4)
+    set_frame(4)
+    yield from wait()
+    run.check_shapes("without Hero's armature")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "no-armature.blend"), copy=True)
+    press("Z", ctrl=True)
+    yield from wait(4)
+    run.wanted = wanted
+    run.check_shapes("the armature undone")
+    yield from run.check_frames()

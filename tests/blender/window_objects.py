@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Steps with whole objects: copied, joined, scaled, parented, keyed, written to libraries, purged."""
+
+from __future__ import annotations
+
+import bpy
+import window
+import window_scene
+from window_hand import (
+    FOLDER,
+    Run,
+    Steps,
+    choose,
+    click,
+    execute,
+    fresh,
+    hero,
+    press,
+    push,
+    rig,
+    set_frame,
+    step,
+    wait,
+)
+from window_scene import blender_points, shown_points, worst
+
+
+@step("objects")
+def copy_and_paste(run: Run) -> Steps:
+    """Ctrl+C and Ctrl+V go by a file of Blender's own, of which it tells nobody."""
+    choose("Hero", "Hero Rig")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.view3d.copybuffer()
+        bpy.ops.view3d.pastebuffer()
+    yield from wait(4)
+    pasted = [o for o in bpy.context.window_manager.windows[0].scene.objects if o.name.startswith("Hero.")]
+    run.check(len(pasted) == 1, f"{[o.name for o in pasted]} was pasted")
+    for frame in (12, 5):
+        set_frame(frame)
+        yield from wait()
+        for obj in pasted:
+            _check_against(run, obj, bpy.data.objects["Hero Rig.001"], f"pasted, at frame {frame}")
+    for name in [o.name for o in bpy.data.objects if o.name.startswith(("Hero.", "Hero Rig."))]:
+        bpy.data.objects.remove(bpy.data.objects[name])
+    yield from run.check_frames()
+
+
+def _check_against(run: Run, obj: bpy.types.Object, armature: bpy.types.Object, when: str) -> None:
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    off = worst(shown_points(obj, depsgraph), blender_points(obj, armature, "dq", depsgraph))
+    run.check(off <= window_scene.TOLERANCE, f"{obj.name} {when} is off by {off:.4f}: {obj.sinew.error}")
+
+
+@step("objects")
+def written_as_a_library(run: Run) -> Steps:
+    """As asset browsers and other add-ons do; Blender tells nobody."""
+    path = FOLDER / "written.blend"
+    bpy.data.libraries.write(str(path), {hero(), rig()}, fake_user=True)
+    wanted, run.wanted = run.wanted, {"Hero": "dq"}
+    run.note_saved(path, in_memory=True)
+    run.wanted = wanted
+    yield from run.check_frames()
+
+
+@step("objects")
+def purge_orphans(run: Run) -> Steps:
+    for _time in range(2):
+        bpy.ops.outliner.orphans_purge(do_local_ids=True, do_linked_ids=True, do_recursive=True)
+        yield from wait()
+        run.check_shapes("purged")
+        yield from run.check_frames()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "purged.blend"), copy=True)
+    run.note_saved(FOLDER / "purged.blend")
+
+
+@step("objects")
+def scale_and_apply(run: Run) -> Steps:
+    choose("Hero", "Hero Rig")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.transform.resize("EXEC_DEFAULT", True, value=(1.5, 1.5, 1.5))
+    yield from wait()
+    run.check_shapes("scaled")
+    execute("object.transform_apply", "Hero", "Hero Rig", location=False, rotation=False, scale=True)
+    yield from wait()
+    run.check_shapes("scale applied")
+    press("Z", ctrl=True)
+    yield from wait(4)
+    run.check_shapes("scale applied and undone")
+    yield from run.check_frames()
+
+
+@step("objects")
+def shape_keys(run: Run) -> Steps:
+    """Keys and their values; with them the rest points change, and the reference knows none."""
+    for name in ("Basis", "Wide"):
+        execute("object.shape_key_add", "Hero", from_mix=False)
+        hero().data.shape_keys.key_blocks[-1].name = name
+    yield from wait()
+    run.check_shapes("with keys that move nothing")
+    yield from run.check_frames()
+    execute("object.shape_key_remove", "Hero", all=True)
+    yield from wait()
+    run.check_shapes("without keys")
+    yield from run.check_frames()
+
+
+@step("objects")
+def weights_by_operators(run: Run) -> Steps:
+    choose("Hero")
+    for name, arguments in (
+        ("object.vertex_group_normalize_all", {"lock_active": False}),
+        ("object.vertex_group_quantize", {"group_select_mode": "ALL", "steps": 3}),
+        ("object.vertex_group_limit_total", {"limit": 1}),
+    ):
+        execute(name, "Hero", **arguments)
+        yield from wait()
+        run.check_shapes(f"after {name}")
+    set_frame(15)
+    yield from wait()
+    run.check_shapes("after all, at frame 15")
+    for _time in range(3):
+        press("Z", ctrl=True)
+        yield from wait(4)
+        run.check_shapes("undone")
+    yield from run.check_frames()
+
+
+@step("objects")
+def parent_again(run: Run) -> Steps:
+    """Ctrl+P, With Empty Groups, while Sinew is on."""
+    execute("object.parent_clear", "Hero", type="CLEAR_KEEP_TRANSFORM")
+    yield from wait()
+    run.check_shapes("without its parent")
+    choose("Hero Rig", "Hero")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.object.parent_set("EXEC_DEFAULT", True, type="OBJECT", keep_transform=True)
+    yield from wait()
+    run.check_shapes("parented")
+    rig().location.y -= 0.5
+    push("Moved")
+    yield from wait()
+    run.check_shapes("its parent moved")
+    yield from run.check_frames()
+
+
+@step("objects")
+def join(run: Run) -> Steps:
+    """Another mesh becomes part of Hero's."""
+    with window.in_view3d("WINDOW"):
+        bpy.ops.mesh.primitive_cube_add("EXEC_DEFAULT", True, size=0.1, location=(0.0, 0.0, 1.0))
+    other = bpy.context.window_manager.windows[0].view_layer.objects.active.name
+    yield from wait()
+    choose("Hero", other)
+    execute("object.join")
+    yield from wait()
+    run.check_shapes("joined")
+    yield from run.check_frames()
+    press("Z", ctrl=True)
+    yield from wait(4)
+    run.check_shapes("joined and undone")
+    yield from run.check_frames()
+
+
+@step("objects")
+def another_armature(run: Run) -> Steps:
+    """Chosen in the Armature modifier, while Sinew is on."""
+    hero().modifiers["Armature"].object = bpy.data.objects["Front Rig"]
+    yield from wait()
+    set_frame(16)
+    yield from wait()
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    expected = blender_points(hero(), bpy.data.objects["Front Rig"], "dq", depsgraph)
+    off = worst(shown_points(hero(), depsgraph), expected)
+    run.check(off <= window_scene.TOLERANCE, f"Hero by another armature is off by {off:.4f}")
+    hero().modifiers["Armature"].object = rig()
+    yield from wait()
+    yield from run.check_frames()
+
+
+@step("objects")
+def switch_the_modifiers(run: Run) -> Steps:
+    """The artist switches the Armature modifier on beside Sinew's, then Sinew's off and on."""
+    nodes = next(m for m in hero().modifiers if m.type == "NODES")
+    nodes.show_viewport = False
+    yield from wait()
+    nodes.show_viewport = True
+    yield from wait()
+    run.check_shapes("Sinew's modifier off and on")
+    yield from run.check_frames()
+
+
+@step("objects")
+def keyed_method(run: Run) -> Steps:
+    settings = hero().sinew
+    settings.method = "lbs"
+    settings.keyframe_insert("method", frame=1)
+    settings.method = "dq"
+    settings.keyframe_insert("method", frame=10)
+    for frame, method in ((5, "lbs"), (12, "dq"), (9, "lbs"), (20, "dq")):
+        set_frame(frame)
+        run.wanted["Hero"] = method
+        yield from wait()
+        run.check_shapes(f"at frame {frame}")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "keyed.blend"), copy=True)
+    run.note_saved(FOLDER / "keyed.blend")
+    settings.keyframe_delete("method", frame=1)
+    settings.keyframe_delete("method", frame=10)
+    yield from run.check_frames()
+
+
+@step("objects")
+def new_file(run: Run) -> Steps:
+    """Ctrl+N with Sinew on, and a character of the new file."""
+    bpy.ops.wm.read_homefile(app_template="")
+    run.wanted = {}
+    yield from wait()
+    obj = window_scene.make_character("Newcomer", window_scene.LARGE, (0.0, 0.0, 0.0))
+    click("sinew.add", obj.name)
+    bpy.data.objects["Newcomer"].sinew.method = "dq"
+    run.wanted = {"Newcomer": "dq"}
+    yield from wait()
+    yield from run.check_frames()
+    yield from fresh(run)

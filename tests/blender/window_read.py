@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads files that were saved with Sinew, in a Blender that has never heard of it.
+
+    python window_read.py SAVED.json
+
+SAVED.json lists for each file what it should hold; prints what it does not, as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import window_scene
+
+FRAMES = (1, 12, 20)
+
+
+def faults_of(path: str, characters: dict[str, dict[str, str]], in_memory: bool) -> list[str]:
+    """A sentence for each thing that is not as Blender's own state.
+
+    characters  each mesh object's armature and method; the method is "" where Sinew was off
+    in_memory   written by Blender without telling anybody, as autosave does: the armatures have to be there
+    """
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert not hasattr(bpy.types.Object, "sinew")
+    found = []
+    for name, wanted in characters.items():
+        obj = bpy.data.objects.get(name)
+        if obj is None:
+            found.append(f"{name} is not in the file")
+            continue
+        found += [f"{name}: {fault}" for fault in _object_faults(obj, wanted, in_memory)]
+    is_on = any(wanted["method"] for wanted in characters.values())
+    if is_on and not in_memory and "Sinew" not in bpy.data.texts:
+        found.append("no text says that Sinew is missing")
+    return found
+
+
+def _object_faults(obj: bpy.types.Object, wanted: dict[str, str], in_memory: bool) -> list[str]:
+    armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
+    found = []
+    if [m.object and m.object.name for m in armatures] != [wanted["armature"]]:
+        found.append(f"its armatures are {[m.object and m.object.name for m in armatures]}")
+    if in_memory or found:
+        return found
+    modifier = armatures[0]
+    if not (modifier.show_viewport and modifier.show_render):
+        found.append("its Armature modifier is off")
+    if wanted["method"] and modifier.use_deform_preserve_volume != (wanted["method"] == "dq"):
+        found.append(f"Preserve Volume is {modifier.use_deform_preserve_volume} for {wanted['method']}")
+    for nodes in (m for m in obj.modifiers if m.type == "NODES"):
+        if nodes.show_viewport or nodes.show_render:
+            found.append(f"Sinew's modifier is on: {nodes.name}")
+    shapes, scene = [], next(s for s in bpy.data.scenes if obj.name in s.objects)
+    bpy.context.window.scene = scene
+    if obj.mode != "OBJECT":
+        # Saved in edit mode, it has no evaluated mesh without a window.
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.object.mode_set(mode="OBJECT")
+    method = "dq" if modifier.use_deform_preserve_volume else "lbs"
+    for frame in FRAMES:
+        scene.frame_set(frame)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        shown = window_scene.shown_points(obj, depsgraph)
+        expected = window_scene.blender_points(obj, modifier.object, method, depsgraph)
+        shapes.append(shown)
+        if window_scene.worst(shown, expected) > window_scene.TOLERANCE:
+            found.append(f"frame {frame} is off by {window_scene.worst(shown, expected):.4f}")
+    if window_scene.worst(shapes[0], shapes[-1]) < 0.1:
+        found.append("it is not animated")
+    return found
+
+
+def exported_faults(path: Path) -> list[str]:
+    """A skinned tube at rest is wanted: straight, six times as long as it is wide."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    if path.suffix == ".glb":
+        bpy.ops.import_scene.gltf(filepath=str(path))
+    else:
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    skinned = [
+        o for o in bpy.data.objects if o.type == "MESH" and any(m.type == "ARMATURE" for m in o.modifiers)
+    ]
+    if len(skinned) != 1:
+        return [f"{len(skinned)} meshes have an Armature modifier"]
+    points = np.empty((len(skinned[0].data.vertices), 3), dtype=np.float32)
+    skinned[0].data.vertices.foreach_get("co", points.ravel())
+    long, *wide = sorted(np.ptp(points, axis=0), reverse=True)
+    return [] if np.allclose(wide, long / 6.0, rtol=1e-3) else ["the mesh is not as it is at rest"]
+
+
+def main() -> None:
+    faults: dict[str, list[str]] = {}
+    for file in json.loads(Path(sys.argv[1]).read_text()):
+        path = Path(file["path"])
+        if path.suffix == ".blend":
+            found = faults_of(str(path), file["characters"], file["in_memory"])
+        else:
+            found = [f"{path.name}: {fault}" for fault in exported_faults(path)]
+        if found:
+            faults.setdefault(file["step"], []).extend(found)
+    print("FAULTS " + json.dumps(faults), flush=True)
+
+
+if __name__ == "__main__":
+    main()

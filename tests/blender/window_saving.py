@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Steps that save, quit and open again."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+
+import bpy
+import window
+from window_hand import FOLDER, Run, Steps, click, execute, hero, push, rig, set_frame, step, until, wait
+from window_scene import pose
+
+
+@step("files")
+def add(run: Run) -> Steps:
+    yield from run.check_frames()
+
+
+@step("files")
+def save_as_with_a_camera(run: Run) -> Steps:
+    path = FOLDER / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    run.note_saved(path)
+    run.check_shapes("right after saving")
+    yield from wait()
+
+
+@step("files")
+def save_with_a_pose_by_hand(run: Run) -> Steps:
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "posed.blend"))
+    pose(rig(), 40.0)
+    yield
+    bpy.ops.wm.save_mainfile()
+    run.note_saved(FOLDER / "posed.blend")
+    run.check_shapes("right after saving")
+    yield from wait()
+    run.check_shapes("after saving")
+    set_frame(12)
+
+
+@step("files")
+def save_incremental(run: Run) -> Steps:
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "increment.blend"))
+    hero().location.x += 0.01
+    push("Moved")
+    yield
+    bpy.ops.wm.save_mainfile(incremental=True)
+    run.note_saved(FOLDER / "increment1.blend")
+    yield from wait()
+
+
+@step("files")
+def save_a_copy(run: Run) -> Steps:
+    hero().location.x += 0.01
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "copy.blend"), copy=True)
+    run.note_saved(FOLDER / "copy.blend")
+    yield from wait()
+
+
+@step("files")
+def pack_and_save(run: Run) -> Steps:
+    bpy.ops.file.pack_all()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "packed.blend"), compress=True)
+    run.note_saved(FOLDER / "packed.blend")
+    yield from wait()
+
+
+@step("files")
+def save_where_it_can_not_be(run: Run) -> Steps:
+    """Blender fails to save; Sinew goes on."""
+    with contextlib.suppress(RuntimeError):
+        bpy.ops.wm.save_as_mainfile(filepath="/proc/no/such/folder.blend", copy=True)
+    run.check_shapes("after a failure")
+    yield from run.check_frames()
+
+
+@step("files")
+def save_while_it_plays(run: Run) -> Steps:
+    with window.in_view3d():
+        bpy.ops.screen.animation_play()
+    yield from wait(10)
+    for number in range(3):
+        path = FOLDER / f"playing{number}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+        run.note_saved(path)
+        yield from wait(3)
+    with window.in_view3d():
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield from wait()
+
+
+@step("files")
+def save_in_modes(run: Run) -> Steps:
+    for mode in ("WEIGHT_PAINT", "EDIT", "SCULPT", "OBJECT"):
+        execute("object.mode_set", "Hero", mode=mode)
+        yield from wait()
+        path = FOLDER / f"mode-{mode}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+        run.note_saved(path)
+        yield
+    yield from run.check_frames()
+
+
+@step("files")
+def save_while_off(run: Run) -> Steps:
+    hero().sinew.enabled = False
+    run.wanted["Hero"] = ""
+    yield from wait()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "off.blend"), copy=True)
+    run.note_saved(FOLDER / "off.blend")
+    run.check_shapes("while off")
+    hero().sinew.enabled = True
+    run.wanted["Hero"] = "dq"
+    yield from run.check_frames()
+
+
+@step("files")
+def save_with_qv(run: Run) -> Steps:
+    hero().sinew.method = "qv"
+    run.wanted["Hero"] = "qv"
+    yield from wait()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "qv.blend"), copy=True)
+    run.note_saved(FOLDER / "qv.blend")
+    hero().sinew.method = "dq"
+    run.wanted["Hero"] = "dq"
+    yield from wait()
+
+
+@step("files")
+def save_with_a_heat_map(run: Run) -> Steps:
+    hero().sinew.heat = True
+    yield from wait()
+    run.check_shapes("with a heat map")
+    yield from run.check_frames()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "heat.blend"), copy=True)
+    run.note_saved(FOLDER / "heat.blend")
+    hero().sinew.heat = False
+    yield from run.check_frames()
+
+
+@step("files")
+def save_over_and_over(run: Run) -> Steps:
+    """Ten saves without a frame between them."""
+    for number in range(10):
+        pose(rig(), 10.0 * number)
+        bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "saved.blend"))
+    run.note_saved(FOLDER / "saved.blend")
+    yield from wait()
+    run.check_shapes("saved ten times")
+    set_frame(12)
+    yield from run.check_frames()
+
+
+@step("files")
+def revert(run: Run) -> Steps:
+    """The file that the second Blender saw works with Sinew, too."""
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "saved.blend"))
+    yield from wait()
+    run.check_shapes("opened again")
+    run.check(hero().sinew.method == "dq", f"its method is {hero().sinew.method}")
+    modifier = hero().modifiers["Armature"]
+    run.check(not modifier.show_viewport, "both deform")
+    yield from run.check_frames()
+    click("sinew.remove", "Hero")
+    run.wanted["Hero"] = ""
+    yield from wait()
+    run.check(
+        not hero().modifiers["Armature"].use_deform_preserve_volume, "Preserve Volume stays after Remove"
+    )
+    run.check_shapes("removed")
+
+
+@step("quit")
+def save_and_leave(run: Run) -> Steps:
+    """For the second session, which opens last.blend and recovers quit.blend and what autosave wrote."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "last.blend"))
+    run.note_saved(FOLDER / "last.blend")
+    bpy.ops.wm.save_userpref()
+    yield from wait()
+    hero().location.y += 0.1
+    push("Moved after saving")
+    yield from wait()
+
+
+@step("quit")
+def autosave(run: Run) -> Steps:
+    """Blender tells nobody of it; it comes every minute."""
+    started = time.time()
+
+    def newest() -> list[Path]:
+        return [path for path in FOLDER.glob("*_autosave.blend") if path.stat().st_mtime > started]
+
+    yield from until(newest, "an autosave")
+    yield from wait()
+    run.note_saved(newest()[0], in_memory=True, names=run.wanted.keys() - {"Front"})
+
+
+@step("quit")
+def autosave_after_update(run: Run) -> Steps:
+    """The same file: Sinew deforms Front after Blender's evaluation, and takes its pointer away."""
+    newest = max(FOLDER.glob("*_autosave.blend"), key=lambda path: path.stat().st_mtime)
+    run.note_saved(newest, in_memory=True, names={"Front"})
+    yield
+
+
+@step("again")
+def opened_again(run: Run) -> Steps:
+    """Blender was started with last.blend, and Sinew is enabled in the preferences."""
+    run.wanted = {"Hero": "dq", "Small": "lbs", "Front": "dq", "Guest": ""}
+    yield from wait(4)
+    run.check(Path(bpy.data.filepath).name == "last.blend", f"{bpy.data.filepath} is open")
+    run.check_shapes("as it opened")
+    yield from run.check_frames()
+
+
+@step("again")
+def recover_last_session(run: Run) -> Steps:
+    bpy.ops.wm.recover_last_session()
+    yield from wait(4)
+    run.check_shapes("recovered")
+    yield from run.check_frames()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "recovered.blend"))
+    run.note_saved(FOLDER / "recovered.blend")
+
+
+@step("again")
+def recover_auto_save(run: Run) -> Steps:
+    found = max(FOLDER.glob("last*_autosave.blend"), key=lambda path: path.stat().st_mtime)
+    bpy.ops.wm.recover_auto_save(filepath=str(found))
+    yield from wait(4)
+    run.check_shapes("recovered")
+    yield from run.check_frames()

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every command that the documents name is there and is run by a test, most of them here, as written."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from sinew_addon import cli
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "SECURITY.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+PROGRAMS = Path(sys.executable).parent
+
+# Where a command is run that this file can not run: in another test, which names it. A command that is none
+# of a block, of these, or of what ./dev test runs, is one that no test knows.
+ELSEWHERE = {
+    "sinew reskin --scheduler": "tests/blender/test_cluster.py",
+    "sinew check --blender": "tests/blender/test_check.py",
+    "dask scheduler": "tests/blender/test_cluster.py",
+    "dask worker": "tests/blender/test_cluster.py",
+    "pytest --sinew-update": "tests/blender/test_compare.py",
+    "./dev test": ".ci/run",
+    "./dev fuzz": "tests/blender/test_fuzz.py",
+    "./dev walk": "tests/blender/test_walk.py",
+    "./dev soak": "tests/blender/test_soak.py",
+}
+
+
+class Command(NamedTuple):
+    """words: without a prompt, a pipe in front, and what is said of it behind; whole: with arguments, as it
+    can be run."""
+
+    document: str
+    line: str
+    words: tuple[str, ...]
+    whole: bool
+
+    @property
+    def name(self) -> str:
+        return " ".join(self.words[:2])
+
+
+def commands_in(path: Path) -> list[Command]:
+    found = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        block = re.match(r" {4}(?:find .*\| )?((?:sinew|\./dev|dask) .*)", line)
+        if block:
+            # What is said of it stands behind two spaces.
+            text = re.split(r"\s{2,}", block[1])[0]
+            found.append(Command(path.name, line.strip(), tuple(shlex.split(text)), whole=True))
+            continue
+        for text in re.findall(
+            r"`((?:\.venv/bin/)?(?:sinew|\./dev|dask|pytest|blender --command sinew)(?: [^`]+)?)`", line
+        ):
+            words = text.replace(".venv/bin/", "").replace("blender --command ", "").split()
+            if len(words) > 1 and words[1] != "…":
+                found.append(Command(path.name, text, tuple(words), whole=False))
+    return found
+
+
+COMMANDS = [command for path in DOCUMENTS for command in commands_in(path)]
+WHOLE = [command for command in COMMANDS if command.whole]
+
+
+def test_there_are_commands():
+    assert len(WHOLE) > 25
+    assert {command.document for command in COMMANDS} >= {
+        "README.md",
+        "CONTRIBUTING.md",
+        "batch.md",
+        "bake.md",
+    }
+
+
+def test_every_command_of_sinew_is_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parser, modules = cli.make_parser()
+    for command in COMMANDS:
+        if command.words[0] != "sinew":
+            continue
+        assert command.words[1] in modules, command
+        help_of_it = subparser(parser, command.words[1]).format_help()
+        for word in command.words[2:]:
+            if word.startswith("--"):
+                assert word.partition("=")[0] in help_of_it, command
+        if command.whole:
+            parser.parse_args(command.words[1:])
+
+
+def subparser(parser, name):
+    return next(a for a in parser._actions if a.choices and name in a.choices).choices[name]
+
+
+def test_every_subcommand_is_documented():
+    _parser, modules = cli.make_parser()
+    said = {
+        command.words[1]
+        for command in WHOLE
+        if command.words[0] == "sinew" and command.document == "README.md"
+    }
+    assert said == set(modules)
+
+
+# --- ./dev
+
+DEV = (ROOT / "dev").read_text(encoding="utf-8")
+
+
+def commands_of_dev() -> set[str]:
+    helped = subprocess.run([ROOT / "dev", "help"], capture_output=True, text=True, check=True).stdout
+    return set(re.findall(r"^\./dev (\w+)", helped, re.MULTILINE))
+
+
+def run_by_dev_test() -> set[str]:
+    body = re.search(r"^own_commands\(\) \{\n(.*?)^\}", DEV, re.MULTILINE | re.DOTALL)[1]
+    return set(re.findall(r"^    small (\w+)", body, re.MULTILINE))
+
+
+def test_every_command_of_dev_is_run():
+    in_program = set(re.search(r"^    ([a-z |]+)\) \"command_\$command\"", DEV, re.MULTILINE)[1].split(" | "))
+    named = {command.words[1] for command in COMMANDS if command.words[0] == "./dev"}
+    assert named <= commands_of_dev()
+    assert commands_of_dev() == in_program | {"help"}
+    elsewhere = {name.split()[1] for name in ELSEWHERE if name.startswith("./dev")}
+    assert commands_of_dev() == run_by_dev_test() | elsewhere
+
+
+def test_options_of_dev_are_there():
+    sources = DEV + "".join(
+        path.read_text(encoding="utf-8") for path in (ROOT / "tests/blender").glob("*.py")
+    )
+    for command in COMMANDS:
+        if command.words[0] == "./dev":
+            for word in command.words[2:]:
+                if word.startswith("--"):
+                    assert word.partition("=")[0] in sources, command
+
+
+def test_what_is_run_elsewhere_is():
+    for command, place in ELSEWHERE.items():
+        text = (ROOT / place).read_text(encoding="utf-8")
+        last = command.split()[-1]
+        assert last in text or "./dev" in command, (command, place)
+
+
+# --- Each line for real
+
+
+def key_of(command: Command) -> str | None:
+    """Where it stands in ELSEWHERE."""
+    for known in ELSEWHERE:
+        program, *rest = known.split()
+        if command.words[0] == program and all(word in command.words for word in rest):
+            return known
+    return None
+
+
+def test_every_command_is_known():
+    runs = run_by_dev_test()
+    for command in COMMANDS:
+        is_run = command in RUN_HERE or key_of(command) is not None
+        is_run = is_run or (command.words[0] == "./dev" and command.words[1] in runs)
+        # Named in a sentence: one of its subcommand that is run is enough.
+        named = not command.whole and any(command.name == other.name for other in RUN_HERE)
+        assert is_run or named, f"no test runs {' '.join(command.words)} of {command.document}"
+
+
+RUN_HERE = [command for command in WHOLE if command.words[0] == "sinew" and key_of(command) is None]
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    """A folder with the files that the documents speak of."""
+    pytest.importorskip("bpy", reason="the commands need Blender")
+    folder = tmp_path_factory.mktemp("studio")
+    rig = ROOT / "blend_files" / "wrist.blend"
+    for name in ("human.blend", "characters/hero.blend", "shots/010/shot.blend", "library/other.blend"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(rig, folder / name)
+    batch = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
+    job = re.search(r"```toml\n(.*?)```", batch, re.DOTALL)[1]
+    # The rig has one mesh, which the example's lists of names do not know.
+    (folder / "film.toml").write_text(
+        re.sub(r"^include = .*\n", "", job, flags=re.MULTILINE), encoding="utf-8"
+    )
+    return folder
+
+
+def run(line: str, folder: Path) -> str:
+    """A line as it stands, with this environment's programs."""
+    line = re.split(r"\s{2,}", line)[0].replace("/library", "library")
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {line}"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
+        env={**os.environ, "PATH": f"{PROGRAMS}{os.pathsep}{os.environ['PATH']}"},
+    )
+    assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+    assert "Traceback" not in done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    "command", RUN_HERE, ids=lambda command: f"{command.document}: {' '.join(command.words)}"
+)
+def test_it_runs_as_written(command, studio, tmp_path):
+    folder = shutil.copytree(studio, tmp_path / "studio")
+    if command.words[1] == "restore":
+        run("sinew reskin characters/ --method dq --frames none --out reskinned/", folder)
+    if "--resume" in command.words:
+        run(command.line.replace(" --resume", ""), folder)
+    if "--against" in command.words:
+        run("sinew render human.blend --method dq --frames 1,16,32 --out golden/", folder)
+    before = {path for path in folder.rglob("*") if path.is_file()}
+    assert run(command.line, folder)
+    written = {path for path in folder.rglob("*") if path.is_file()} - before
+    reads_only = command.words[1] in ("methods", "info", "check")
+    assert bool(written) != reads_only or "--resume" in command.words
+    assert not [path for path in written if "unfinished" in path.name]

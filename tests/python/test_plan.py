@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who deforms an object, as a table: without Blender."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+# The package around it imports bpy; this file does not.
+_PATH = Path(__file__).resolve().parents[2] / "addon" / "blender" / "plan.py"
+_SPEC = importlib.util.spec_from_file_location("sinew_plan", _PATH)
+plan_module = importlib.util.module_from_spec(_SPEC)
+sys.modules["sinew_plan"] = plan_module
+_SPEC.loader.exec_module(plan_module)
+ObjectFacts, State, plan = plan_module.ObjectFacts, plan_module.State, plan_module.plan
+
+TABLE = [
+    ({}, State.IN_DEPSGRAPH, ""),
+    ({"enabled": False}, State.OFF, ""),
+    ({"enabled": False, "mode": "EDIT", "safe_mode": True}, State.OFF, ""),
+    ({"is_linked": True}, State.BUILT_IN, "make a library override"),
+    ({"mode": "EDIT"}, State.BUILT_IN, "In this mode"),
+    ({"mode": "SCULPT", "has_heat_map": True}, State.BUILT_IN, "In this mode"),
+    ({"mode": "WEIGHT_PAINT"}, State.IN_DEPSGRAPH, ""),
+    ({"builtin_is_faster": True}, State.BUILT_IN, "Small"),
+    ({"builtin_is_faster": True, "safe_mode": True}, State.BUILT_IN, "Small"),
+    ({"safe_mode": True}, State.AFTER_UPDATE, "Safe mode"),
+    ({"failure": "ValueError: no"}, State.AFTER_UPDATE, "ValueError: no"),
+    ({"is_comparison_copy": True, "mesh_is_shared": True}, State.AFTER_UPDATE, "copy for comparison"),
+    ({"mesh_is_editable": False}, State.AFTER_UPDATE, "linked"),
+    ({"mesh_is_shared": True}, State.AFTER_UPDATE, "Other objects"),
+    ({"has_upstream": True}, State.AFTER_UPDATE, "in front"),
+    ({"has_heat_map": True}, State.AFTER_UPDATE, "heat map"),
+    ({"visibility_is_keyed": True}, State.AFTER_UPDATE, "animated"),
+    ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
+]
+
+
+@pytest.mark.parametrize(("facts", "state", "reason"), TABLE)
+def test_the_table(facts, state, reason):
+    found = plan(ObjectFacts(**facts))
+    assert found.state is state
+    assert reason in found.reason
+    assert bool(found.reason) == bool(reason)
+
+
+def test_every_fact_matters():
+    """One that no row changes would not have to be gathered."""
+    named = {name for facts, _state, _reason in TABLE for name in facts}
+    assert named == {field.name for field in fields(ObjectFacts)}

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The wheel of sinew-blender has every module; tests/installed runs what is in it."""
+
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+ADDON = Path(__file__).resolve().parents[2] / "addon"
+
+
+def test_the_wheel_has_every_module(tmp_path):
+    # A copy: setuptools leaves its work beside the sources, and takes what lies there into the next wheel.
+    sources = shutil.copytree(
+        ADDON, tmp_path / "addon", ignore=shutil.ignore_patterns("__pycache__", "build", "*.egg-info")
+    )
+    subprocess.run(
+        [
+            *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-index", "--no-deps"),
+            *("--no-build-isolation", "--wheel-dir", tmp_path, sources),
+        ],
+        check=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    inside = {name for name in zipfile.ZipFile(wheel).namelist() if not re.match(r"[^/]+\.dist-info/", name)}
+    modules = {path.relative_to(ADDON).as_posix() for path in ADDON.rglob("*.py")}
+    assert len(modules) > 100
+    assert inside == {f"sinew_addon/{name}" for name in modules - {"setup.py"} | {"blender_manifest.toml"}}
