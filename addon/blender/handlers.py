@@ -41,6 +41,7 @@ class Session:
     was_on: set[int] = field(default_factory=set)  # the objects that Sinew deformed before the file is saved
     is_saving: bool = False  # Blender writes the file: nothing may change
     is_late: bool = False  # something waits for the end of a render
+    is_rendering: bool = False
     all_left: bool = False  # to Blender, and nothing but what they are told of can change that
 
     @property
@@ -412,7 +413,7 @@ def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
         for obj in session.objects or () if is_ours and not session.is_saving else ():
             state = state_of(obj)
             if state is not None and state.dirtied_by_frames:
-                session.gate.suspend(obj)
+                session.gate.suspend(obj, session.is_rendering)
 
 
 @persistent
@@ -550,9 +551,15 @@ def end_export() -> None:
 
 
 @persistent
+def on_render_start(*_args: object) -> None:
+    session.is_rendering = True
+
+
+@persistent
 def on_render_end(*_args: object) -> None:
     """In the render's thread, where it has one: what waited for its end is for the main one."""
     with turn():
+        session.is_rendering = False
         session.gate.restore()
     if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
         bpy.app.timers.register(_after_render, first_interval=0.05)
@@ -581,6 +588,7 @@ _HANDLERS = {
     "save_pre": on_save,
     "save_post": on_saved,
     "save_post_fail": on_saved,
+    "render_init": on_render_start,
     "render_complete": on_render_end,
     "render_cancel": on_render_end,
 }
