@@ -158,7 +158,9 @@ class Walker:
         bpy.context.scene.frame_set(bpy.context.scene.frame_current)
 
     def edit_mode(self) -> None:
-        """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2)."""
+        """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2). What was
+        changed before has its own, as whether Blender makes one for it depends on what else is in the file."""
+        self.push_undo()
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.ed.undo_push(message="edit mode")
 
@@ -301,7 +303,7 @@ def add(w: Walker, r: random.Random) -> str | None:
 
 @operation(2)
 def remove(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
     if obj is None:
         return None
     w.object_mode()
@@ -315,7 +317,11 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
     w.side.end_comparison()
     # What the current view layer does not have, too.
     for obj in [o for o in w.objects("MESH") if w.side.is_driven(o) and o.library is None]:
-        w.side.remove(obj)
+        # What comes from a library with Sinew has it again when the file is loaded.
+        if obj.override_library is None:
+            w.side.remove(obj)
+        else:
+            w.side.set_enabled(obj, False)
     return "Sinew off all"
 
 
@@ -653,6 +659,7 @@ def paint_weights(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
     if obj is None or not obj.vertex_groups or not w.select(obj):
         return None
+    w.push_undo()
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     # As a window does: tools ask for the armature behind the modifiers, which Sinew gives back meanwhile.
     w.before_evaluation()
@@ -752,6 +759,7 @@ def sculpt_mode(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
     if obj is None or not w.select(obj):
         return None
+    w.push_undo()
     bpy.ops.object.mode_set(mode="SCULPT")
     if r.random() < 0.5:
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -129,10 +129,21 @@ class BlenderSide:
         self._set(obj, QV, method == "qv")
 
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
+        if on and not self.is_on(obj):
+            self._use_keyed_flags(obj)
         self._set(obj, ON, on)
 
     def rebind(self, obj: bpy.types.Object) -> None:
-        self._set(obj, ON, True)
+        self.set_enabled(obj, True)
+
+    def _use_keyed_flags(self, obj: bpy.types.Object) -> None:
+        """While it was off, the modifiers had the artist's own: Blender sets keyed ones with the next frame."""
+        scene = bpy.context.scene
+        values = {c.data_path: c.evaluate(scene.frame_current_final) for c in curves_of(obj)}
+        for modifier in armature_modifiers(obj):
+            value = values.get(modifier.path_from_id("use_deform_preserve_volume"))
+            if value is not None:
+                modifier.use_deform_preserve_volume = value >= 0.5
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         """One that changes no shape."""
