@@ -93,6 +93,35 @@ def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
+@pytest.mark.parametrize("once", [False, True], ids=["always", "once"])
+@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
+def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit, once):
+    """Blender evaluates it without telling anybody, and leaves out who comes behind one that goes away."""
+
+    def act() -> None:
+        if once:
+            take_off()
+        edit(arm)
+
+    take_off = neighbour("frame_change_post", act)
+    bpy.context.scene.frame_set(9)
+    take_off()
+    got = scenes.final_points(arm)
+    properties.of(arm).enabled = False
+    expected = scenes.modifier_shapes(arm, [9], True)[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
+@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
+def test_an_edit_in_a_handler_of_what_was_edited_is_seen_with_the_next_event(arm, neighbour, edit):
+    take_off = neighbour("depsgraph_update_post", lambda: edit(arm) if arm.pass_index else None)
+    arm.pass_index = 1
+    arm.data.update()
+    bpy.context.view_layer.update()
+    take_off()
+    assert_equals_modifier(arm)
+
+
 @pytest.mark.parametrize("keyed", [False, True])
 def test_an_edit_of_a_mesh_with_shape_keys_before_a_frame_is_seen(route, keyed):
     obj, _armature = scenes.make_arm()

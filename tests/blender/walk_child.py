@@ -259,7 +259,9 @@ class Child:
                 found[f"object {obj.name_full}"] = self.object_state(obj)
         for obj in self.walker.objects("ARMATURE"):
             if obj.library is None and obj.users_collection:
-                found[f"armature {obj.name_full}"] = [bone.name for bone in obj.data.bones]
+                # Those of edit mode are known to others when Blender next needs them.
+                bones = [] if obj.data.is_editmode else [bone.name for bone in obj.data.bones]
+                found[f"armature {obj.name_full}"] = bones
         return found
 
     def object_state(self, obj) -> dict[str, object]:

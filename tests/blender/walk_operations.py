@@ -1545,7 +1545,10 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
     handlers.append(act)
     if when == "depsgraph_update_post":
         obj.update_tag()
+        w.before_evaluation()
         bpy.context.view_layer.update()
+        # What was touched before and again in a handler is looked at with the next event.
+        w.this_frame()
     else:
         bpy.context.scene.frame_set(number)
     if act in handlers:

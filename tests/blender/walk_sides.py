@@ -214,6 +214,9 @@ class BlenderSide:
             for modifier in armature_modifiers(obj):
                 replaced = on and modifier.name in run
                 wanted = self.method(obj) == "dq" if replaced else modifier.show_expanded
+                if obj.override_library is not None:
+                    # Blender's undo gives an override its flag back, and evaluates it as before.
+                    obj.update_tag()
                 if modifier.use_deform_preserve_volume != wanted:
                     modifier.use_deform_preserve_volume = wanted
         return wrong
