@@ -134,7 +134,7 @@ def remove(obj: bpy.types.Object) -> None:
     """
     nodes = sinew_modifier(obj)
     if obj.override_library is not None and nodes is not None and nodes.is_override_data:
-        # Blender lets a script remove it from the override, and loads it again, with the Armature modifier twice.
+        # A script can remove it from the override; Blender loads it again, and the Armature modifier twice.
         raise SinewError(
             f"{obj.name}: Sinew comes with it from its library; switch it off here, or remove it there"
         )

@@ -26,9 +26,7 @@ _TELLING = (
 
 def others_listen() -> bool:
     """Whether Blender calls others than Sinew while Sinew changes settings or the file is saved."""
-    return any(
-        not _is_ours(function) for event in _TELLING for function in getattr(bpy.app.handlers, event)
-    )
+    return any(not _is_ours(function) for event in _TELLING for function in getattr(bpy.app.handlers, event))
 
 
 def others_follow(event: str, function: Callable) -> bool:

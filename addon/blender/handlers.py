@@ -414,8 +414,8 @@ def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """What handlers behind Sinew's change, Blender evaluates without telling anybody; in its list of updates it
-    is already. A mesh that was there before they were called may have changed once more."""
+    """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
+    of updates at once. A mesh that was there before they were called may have changed once more."""
     seen, session.seen = session.seen, None
     meshes = Changes.meshes_in(depsgraph) if seen is not None else None
     if not meshes:

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import drive, driven, handlers, properties, safe_mode, stack
+from sinew_addon.blender import animation, drive, driven, handlers, properties, safe_mode, stack
 from sinew_addon.blender.plan import State
 from sinew_addon.blender.updates import turn, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
@@ -424,3 +424,20 @@ def test_a_parent_that_deforms_becomes_another(route):
     obj.parent = rig
     bpy.context.view_layer.update()
     assert_equals_modifier(obj, preserve_volume=False)
+
+
+def test_keys_that_two_objects_share_go_with_the_last(route):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    obj.keyframe_insert("sinew.method", frame=4)
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    handlers.refresh(bpy.context)
+    assert other.animation_data.action == obj.animation_data.action
+    drive.remove(obj)
+    assert "sinew.method" in animation.animated_paths(other)
+    drive.remove(other)
+    bpy.context.scene.frame_set(5)
+    for each in (obj, other):
+        assert not animation.animated_paths(each)
+        assert not each.is_property_set("sinew")

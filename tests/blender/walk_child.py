@@ -69,6 +69,7 @@ class Child:
 
     def start(self, _request: dict) -> dict:
         self.claims, self.wrong = {}, []
+        self.side.set_safe(False)
         self.operations.start(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
         # Those of a file that a walk before has left broken.
