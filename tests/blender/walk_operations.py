@@ -423,7 +423,8 @@ def restart(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.3)
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    # Blender's own button does not take what comes from a library off an override.
+    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
     if obj is None or not w.side.is_on(obj):
         return None
     w.side.delete_part(obj, "modifier")
