@@ -18,6 +18,7 @@ from . import (
     armature_io,
     attach,
     drive,
+    front,
     mesh_io,
     points,
     pose_driver,
@@ -264,6 +265,8 @@ def update(
         driven.frames = None
     elif driven.plan.state is State.IN_DEPSGRAPH:
         driven.dirtied_by_frames = False
+        if driven.plan.in_buffer:
+            points.make_room(obj, driven.source.points)
         if driven.declined or not is_same or wanted != before:
             driven.declined, driven.is_touched = "", True
             # Blender evaluates the object once more, and so asks for its points.
@@ -295,6 +298,8 @@ def _looks(obj: bpy.types.Object) -> list:
         obj.show_only_shape_key,
     ]
     looks.append(keys is None or keys.use_relative)
+    if settings.front is not None:
+        looks.append(front.signature(obj))
     looks += [armature.mode for armature in settings.armatures]
     # What an animation sets has no other event.
     looks += sorted(
@@ -317,13 +322,12 @@ def _deform(
 ) -> None:
     """Writes the points of this evaluation for the next one, where they differ from what is there."""
     # Binding is not part of a frame's time: it happens once.
-    started, before = time.perf_counter(), driven.rest_points
+    started = time.perf_counter()
     differs = _shape(obj, driven, depsgraph)
     if differs is None:
         return
     if changes.frame:
-        reshaped = before is not None and driven.rest_points is not before
-        driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
+        driven.dirtied_by_frames = bool(differs) or obj.session_uid in changes.moved
     if differs:
         points.write(obj, driven.chain.points, driven.source.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
@@ -382,21 +386,35 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     settings = evaluated.sinew
     # Evaluated ones, as the driver reads them.
     armatures = [stand_in.armature for stand_in in settings.stand_ins]
-    shown = mesh_io.points_in(mesh, driven.attribute)
-    if driven.mode != evaluated.mode or not driven.is_alone:
+    if driven.mode != evaluated.mode or not (driven.is_alone or driven.plan.in_buffer):
         driven.declined = "its mode, or the users of its mesh, changed"
-    elif len(armatures) != len(driven.chain.links) or None in armatures:
+        return
+    if len(armatures) != len(driven.chain.links) or None in armatures:
         driven.declined = "its Armature modifiers changed"
-    elif shown is None or len(shown) != len(driven.source.points):
+        return
+    shown = _points_to_write(settings, mesh, driven)
+    if shown is None or len(shown) != len(driven.source.points):
         driven.declined = "its mesh changed"
-    else:
-        if not driven.is_announced and driven.first is not None:
-            # Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy,
-            # without the points that were written last.
-            driven.is_suspect |= shown[0].tobytes() != driven.first
-        with driven.lock:
-            _deform_into(shown, evaluated, mesh, driven, armatures)
-            driven.first = shown[0].tobytes()
+        return
+    if not (driven.is_announced or driven.plan.in_buffer) and driven.first is not None:
+        # Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy,
+        # without the points that were written last.
+        driven.is_suspect |= shown[0].tobytes() != driven.first
+    with driven.lock:
+        _deform_into(shown, evaluated, mesh, driven, armatures)
+
+
+def _points_to_write(
+    settings: properties.SinewSettings, mesh: bpy.types.Mesh, driven: Driven
+) -> np.ndarray | None:
+    """The memory of the evaluated mesh, or of the evaluated carrier; None where it is not there."""
+    if not driven.plan.in_buffer:
+        return mesh_io.points_in(mesh, driven.attribute)
+    carrier = settings.carrier
+    # What an evaluated object has as its data, Blender does not always mark as evaluated.
+    if carrier is None or not carrier.is_evaluated:
+        return None
+    return mesh_io.points_in(carrier.data, mesh_io.POSITION)
 
 
 def _deform_into(
@@ -408,7 +426,10 @@ def _deform_into(
 ) -> None:
     started = time.perf_counter()
     frames = _frames(evaluated, evaluated.sinew, armatures, driven, "VIEWPORT")
-    rest_points = source.keyed_points(evaluated, mesh, driven.source)
+    rest_points = source.evaluated_points(evaluated, mesh, driven.source)
+    if rest_points is None:
+        driven.declined = "what modifiers in front make of its mesh changed"
+        return
     if frames is None:
         # The last shape stays.
         last = driven.chain.points
@@ -417,6 +438,9 @@ def _deform_into(
         driven.chain.deform(rest_points, frames, shown)
         driven.frames, driven.rest_points = frames, rest_points
         driven.shapes += 1
+    if driven.plan.in_buffer:
+        points.tell_from(shown, driven.source.points)
+    driven.first = shown[0].tobytes()
     driven.answered, driven.declined, driven.attempts = mesh.as_pointer(), "", 0
     driven.milliseconds = 1000.0 * (time.perf_counter() - started)
 
@@ -554,8 +578,6 @@ def _bones_changed(
             continue
         if armature.data.session_uid in changes.armatures or not known.complete:
             bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-            if driven.plan.state is State.AFTER_UPDATE:
-                _follow_renamed_bones(obj, known, bones)
             changed |= not bones.equals(known)
     return changed
 
@@ -594,18 +616,3 @@ def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgrap
     if armature is None or armature.mode == "EDIT":
         return Bones.none()
     return armature_io.read_bones(armature.evaluated_get(depsgraph))
-
-
-def _follow_renamed_bones(obj: bpy.types.Object, old: Bones, new: Bones) -> None:
-    """Blender renames the vertex groups of a renamed bone only where a modifier points to the armature;
-    where Sinew has cleared the pointer it is ours to do."""
-    if not np.array_equal(old.rest, new.rest):
-        return
-    renamed = {b: a for b, a in zip(old.names, new.names, strict=True) if b != a}
-    moving = [(group, renamed[group.name]) for group in obj.vertex_groups if group.name in renamed]
-    staying = {group.name for group in obj.vertex_groups} - set(renamed)
-    # Two bones can have swapped names: no group may stand in the way of another.
-    for number, (group, _name) in enumerate(moving):
-        group.name = f"\x01{number}"
-    for group, name in moving:
-        group.name = name if name not in staying else next(b for b, a in renamed.items() if a == name)

@@ -24,8 +24,12 @@ SIMULATIONS = {
     "EXPLODE",
 }
 
-# These can change weights from one frame to the next.
+# These can change weights from one frame to the next, or which vertices there are without changing how many.
 WEIGHT_CHANGERS = {
+    "BOOLEAN",
+    "DECIMATE",
+    "REMESH",
+    "WELD",
     "VERTEX_WEIGHT_EDIT",
     "VERTEX_WEIGHT_MIX",
     "VERTEX_WEIGHT_PROXIMITY",
@@ -57,13 +61,13 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     if not is_needed(obj):
         remove(obj)
         return None
-    signature = _signature(obj)
-    if settings.front is None or settings.front.data != obj.data or settings.front_signature != signature:
+    wanted = signature(obj)
+    if settings.front is None or settings.front.data != obj.data or settings.front_signature != wanted:
         check(obj)
         # Before the old one goes: at its address, Blender would take the new one for evaluated already.
         made = _make(obj)
         remove(obj)
-        settings.front, settings.front_signature = made, signature
+        settings.front, settings.front_signature = made, wanted
         made.name = f"{obj.name} Sinew front"
     return settings.front
 
@@ -113,7 +117,7 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
         copy.animation_data_clear()
 
 
-def _signature(obj: bpy.types.Object) -> str:
+def signature(obj: bpy.types.Object) -> str:
     """Differs where the copy would: by the settings of what stands in front, and the pinned shape key."""
     pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
     animation = obj.animation_data

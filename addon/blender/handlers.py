@@ -19,7 +19,7 @@ from .gate import Gate
 from .heat import heat_map, heat_view, measures
 from .in_evaluation import Answers
 from .plan import Plan, State
-from .updates import is_rendering_in_window, turn, updates_suspended
+from .updates import is_main_thread, is_rendering_in_window, turn, updates_suspended
 
 log = logging.getLogger("sinew")
 
@@ -449,8 +449,11 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, is_ours: bool) -> None:
     """To an evaluation. What Sinew itself causes, and what Blender evaluates while it saves, is only noted:
-    it may have listed what others changed, too."""
-    if not is_ours or session.is_saving:
+    it may have listed what others changed, too. So is what the window shows while it renders: points that are
+    written after the update are those of the render's frame then."""
+    waits_for_render = is_rendering_in_window() and is_main_thread()
+    session.is_late |= waits_for_render
+    if not is_ours or session.is_saving or waits_for_render:
         if session.missed is None:
             session.missed = changes
         else:
