@@ -266,7 +266,7 @@ def update(
     elif driven.plan.state is State.IN_DEPSGRAPH:
         driven.dirtied_by_frames = False
         if driven.plan.in_buffer:
-            points.make_room(obj, driven.source.points)
+            points.make_room(obj, driven.source.points, anew=wanted != before)
         if driven.declined or not is_same or wanted != before:
             driven.declined, driven.is_touched = "", True
             # Blender evaluates the object once more, and so asks for its points.

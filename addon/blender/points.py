@@ -60,9 +60,9 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
     carrier.write(properties.of(obj).carrier, _told_from(points, rest))
 
 
-def make_room(obj: bpy.types.Object, rest: np.ndarray) -> None:
-    """Gives the carrier as many vertices as there are points, for an evaluation to move."""
-    if not are_written(obj, len(rest)):
+def make_room(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
+    """Gives the carrier the rest points, for an evaluation to move: where their number differs, or anew."""
+    if anew or not are_written(obj, len(rest)):
         write(obj, rest, rest)
 
 

@@ -9,7 +9,7 @@ modifier (seen on 4.2 to 5.2, viewport and render). A variable that reads a prop
 read where files may not run any.
 
 On a property of the object, which makes nothing dirty, it only keeps the poses evaluated: for points that are
-written after the update. Its value means nothing.
+written after the update. Its value is always 0.
 """
 
 from __future__ import annotations
@@ -76,7 +76,10 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         if curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)
-    driver = obj.driver_add(path).driver
+    curve = obj.driver_add(path)
+    # Whatever the variables are, the value is 0: so no frame changes the input.
+    curve.modifiers.new("GENERATOR").coefficients = (0.0, 0.0)
+    driver = curve.driver
     driver.type = "SUM"
     # Else it is what the property was just now, and differs from one time to the next.
     driver.expression = ""
