@@ -70,6 +70,7 @@ class Driven:
     failures, failure  how often it failed there, and what failed last
     is_suspect         the mesh may have changed since it was read: it is looked at with the next event, or
                        when somebody asks
+    is_surprised       so an evaluation found that nobody had been told of
     lock               held while the chain works: a render may ask from a thread of its own
     shapes             how many have been written
     """
@@ -105,6 +106,7 @@ class Driven:
     failures: int = 0
     failure: str = ""
     is_suspect: bool = False
+    is_surprised: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
     milliseconds: float = 0.0
     shapes: int = 0
@@ -249,7 +251,7 @@ def update(
     if driven is not known and known is not None:
         driven.failures, driven.failure, driven.attempts = known.failures, known.failure, known.attempts
         driven.losses = known.losses
-    driven.is_suspect = is_read_later
+    driven.is_suspect, driven.is_surprised = is_read_later, False
     if inspect or not driven.watched:
         driven.plan, driven.needs_apply, driven.name, driven.is_touched = wanted, False, obj.name, True
         driven.left_by = small_meshes.choices(obj) if wanted.state is State.BUILT_IN else []
@@ -399,7 +401,8 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     if not (driven.is_announced or driven.plan.in_buffer) and driven.first is not None:
         # Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy,
         # without the points that were written last.
-        driven.is_suspect |= shown[0].tobytes() != driven.first
+        driven.is_surprised |= shown[0].tobytes() != driven.first
+        driven.is_suspect |= driven.is_surprised
     with driven.lock:
         _deform_into(shown, evaluated, mesh, driven, armatures)
 

@@ -47,6 +47,12 @@ def is_needed(obj: bpy.types.Object) -> bool:
 
 def check(obj: bpy.types.Object) -> None:
     """Raises SinewError where what stands in front can not be evaluated apart."""
+    first = stack.armature_modifier(obj)
+    if first is not None and first.use_multi_modifier and stack.parent_deforms(obj):
+        raise SinewError(
+            f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
+            "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
+        )
     for modifier in stack.changes_in_front(obj):
         if modifier.type in SIMULATIONS:
             raise SinewError(
@@ -61,9 +67,9 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     if not is_needed(obj):
         remove(obj)
         return None
+    check(obj)
     wanted = signature(obj)
     if settings.front is None or settings.front.data != obj.data or settings.front_signature != wanted:
-        check(obj)
         # Before the old one goes: at its address, Blender would take the new one for evaluated already.
         made = _make(obj)
         remove(obj)

@@ -428,6 +428,14 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     _end_of_announced()
 
 
+def _look_at_surprises() -> float:
+    """What another add-on's handler changed behind Sinew's, Blender evaluates without telling anybody: in a
+    window it is seen to a moment later."""
+    if any(state.is_surprised for _obj, state in session.known):
+        refresh(bpy.context)
+    return 0.25
+
+
 def _end_of_announced() -> None:
     """What Blender evaluates from here to the next event is for a handler that changed something."""
     for _obj, state in session.known:
@@ -599,6 +607,8 @@ def register() -> None:
     properties.listeners.heat_changed = _heat_changed
     measures.Listener.changed = refresh
     events.hear_all(_HANDLERS)
+    if not bpy.app.background:
+        bpy.app.timers.register(_look_at_surprises, first_interval=1.0, persistent=True)
 
 
 def adopt_open_file() -> None:
@@ -611,4 +621,6 @@ def adopt_open_file() -> None:
 
 def unregister() -> None:
     session.forget()
+    if bpy.app.timers.is_registered(_look_at_surprises):
+        bpy.app.timers.unregister(_look_at_surprises)
     events.ignore_all({**_HANDLERS, **_FRAME_HANDLERS})

@@ -127,9 +127,11 @@ def test_posing_evaluates_the_mesh_once(set_up: Setup):
     assert [evaluations_in(pose, obj.name) for _ in range(3)] == [1, 1, 1]
 
 
-def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame():
+@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
+def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame(set_up: Setup):
     """Of the first evaluation: anything that asks later would have Blender evaluate the rest."""
     followed, armature = scenes.make_arm()
+    set_up(followed, armature)
     obj, follower = scenes.make_arm()
     constraint = follower.pose.bones[1].constraints.new("COPY_LOCATION")
     constraint.target, constraint.subtarget = followed, followed.vertex_groups[-1].name

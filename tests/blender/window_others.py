@@ -366,6 +366,25 @@ def suspended_modifiers_renamed_and_deleted(run: Run) -> Steps:
 
 
 @step("hostile")
+def weights_changed_behind_sinew(run: Run) -> Steps:
+    """Of what a handler changes Blender tells nobody."""
+    changed = []
+
+    def change() -> None:
+        if not changed:
+            changed.append(True)
+            hero().vertex_groups[0].add(range(3000), 1.0, "REPLACE")
+
+    with Hostile(change, "depsgraph_update_post", ahead=False):
+        window_scene.pose(rig(), 40.0)
+        yield from until(lambda: changed, "a change of weights")
+        yield from wait(20)
+    run.check_shapes("after the change")
+    yield from run.check_frames()
+    yield from fresh(run)
+
+
+@step("hostile")
 def others_throw(run: Run) -> Steps:
     def throw() -> None:
         raise ValueError("another add-on's fault")
