@@ -86,7 +86,7 @@ def _run(program: str, folder: Path, groups: tuple[str, ...], found: Results) ->
             cwd=folder,
             stdout=log,
             stderr=subprocess.STDOUT,
-            timeout=600,
+            timeout=1200,
             check=False,
             env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"},
         ).returncode
