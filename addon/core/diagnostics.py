@@ -10,8 +10,8 @@ from itertools import permutations
 import numpy as np
 
 from .influences import SMALLEST_WEIGHT_SUM, GroupWeights, Influences
-from .quaternions import dots
 from .rig import Weighting
+from .vectors import dots
 
 # Below this sum of weights what was painted by accident decides where a vertex goes.
 SMALL_WEIGHT_SUM = 0.01

@@ -19,9 +19,10 @@ from typing import ClassVar
 import numpy as np
 
 from .influences import Influences
-from .quaternions import cross, dots, rotated, rotations_of
 from .rig import Bones
+from .rotations import rotated, rotations_of
 from .surface import Surface
+from .vectors import cross, dots
 
 
 @dataclass(frozen=True)
@@ -233,7 +234,11 @@ class Hold:
         one = np.float32(1.0)
         total = first + np.where(dots(first, second) < 0.0, -one, one) * second
         total += np.where(dots(first, third) < 0.0, -one, one) * third
-        return rotated(total, normals.astype(np.float32))
+        with np.errstate(over="ignore"):
+            normals = normals.astype(np.float32)
+        # A face with a point that is no number has no normal.
+        normals[~np.isfinite(normals)] = 0.0
+        return rotated(total, normals)
 
 
 class Pose:
