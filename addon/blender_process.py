@@ -101,6 +101,7 @@ class BlenderProcess:
         if not self._is_there:
             self._greet()
         self._begin(limits)
+        assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
@@ -143,6 +144,7 @@ class BlenderProcess:
             raise SinewError(answer["refused"])
 
     def _answer(self) -> dict:
+        assert self._process.stdout is not None
         line = self._process.stdout.readline()
         # Before the worker is there, Blender and what it runs at its start print what they like.
         while line and not self._is_there and not line.startswith(GREETINGS):

@@ -179,7 +179,7 @@ def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
 
 
 def _holds(table: dict, position: Position) -> bool:
-    value: object = table
+    value: Any = table
     for step in position:
         try:
             value = value[step]

@@ -163,7 +163,9 @@ class PoseCheck:
         self._vertices = np.repeat(np.arange(len(influences.counts)), influences.counts)
         self._shows = self._weighs_enough()
         self._last: tuple[np.ndarray, np.ndarray] | None = None
-        self._seen = {name: (np.zeros(len(influences.counts), dtype=bool), []) for name in _OF_POSES}
+        self._seen: dict[str, tuple[np.ndarray, list[float]]] = {
+            name: (np.zeros(len(influences.counts), dtype=bool), []) for name in _OF_POSES
+        }
 
     def look(self, rotations: np.ndarray, frame: float) -> None:
         """One pose of an action, in the order of time.

@@ -7,10 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from .comparison import Comparison
 from .diagnostics import Finding
 from .heat import HeatScale, viridis
 from .html_templates import render
+from .metrics import Summary
 from .plots import colour_of, line_plot
 
 # Title, unit and entries of the summaries: a line for each method and entry.
@@ -174,7 +177,7 @@ def _legend(scale: HeatScale, unit: str) -> dict[str, object]:
     return {
         "stops": [
             f"rgb({round(255 * r)},{round(255 * g)},{round(255 * b)})"
-            for r, g, b in viridis([number / 16 for number in range(17)])
+            for r, g, b in viridis(np.linspace(0.0, 1.0, 17))
         ],
         # Each is centred below its colour, except those at the ends.
         "ticks": [
@@ -201,7 +204,7 @@ def legend_texts(scale: HeatScale, unit: str) -> list[str]:
 
 def _numbers(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     """Heads and rows of the table of all frames."""
-    entries = [
+    entries: list[tuple[str, Callable[[Summary], str]]] = [
         ("Distance, largest", lambda s: comparison.length(s.distance_max)),
         ("RMS", lambda s: comparison.length(s.distance_rms)),
         ("Volume", lambda s: _percent(s.volume_change)),

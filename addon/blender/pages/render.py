@@ -157,7 +157,7 @@ class OwnLook:
         self._scene = scene
         _prepare_png(scene)
 
-    def picture(self, _view: None, path: Path) -> None:
+    def picture(self, path: Path) -> None:
         """Renders to the PNG `path`."""
         _render(self._scene, path)
 
