@@ -194,7 +194,7 @@ class BlenderProcess:
         return self._said().get("doing", "starting")
 
     def _said(self) -> dict:
-        """ "doing", and what else there is to know of it; nothing before its first word."""
+        """Its task as "doing", and how far it is; nothing before its first word."""
         with contextlib.suppress(OSError, ValueError):
             return json.loads((self._folder.path / DOING).read_bytes())
         return {}
@@ -222,7 +222,7 @@ def _command() -> list[str]:
 
 
 def _environment(limits: Limits) -> dict[str, str]:
-    """This one's, with what `limits` says of threads."""
+    """As of this process, with what `limits` says of threads."""
     if not limits.threads:
         return dict(os.environ)
     # Mesa's OpenGL without graphics hardware has threads, too: 0 are faster than 1.

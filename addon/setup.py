@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""This folder is the package sinew_addon, and each folder in it with an __init__.py is a package below."""
+"""Builds sinew-blender: this folder is the package sinew_addon, each folder with __init__.py one below."""
 
 from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py

@@ -242,7 +242,7 @@ def _percent_range(values: Sequence[float]) -> str:
 
 
 def _frame_list(frames: Sequence[float]) -> str:
-    """ "3, 7 to 12, 20"."""
+    """Frames as "3, 7 to 12, 20"."""
     runs: list[list[float]] = []
     for frame in frames:
         if runs and frame == runs[-1][-1] + 1:

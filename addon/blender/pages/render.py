@@ -35,7 +35,10 @@ def check_size(size: int) -> None:
 
 
 def chosen_engine(wanted: str) -> str:
-    """ "workbench" or "cycles", wanted by name or "auto". Raises SinewError where it can not render here."""
+    """The engine, "workbench" or "cycles", wanted by name or "auto".
+
+    Raises SinewError where it can not render here.
+    """
     if wanted == "cycles":
         return wanted
     engine = usual_engine(bpy.app.binary_path)
