@@ -91,7 +91,7 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     Scene scene = random_scene(1, 20000, 1.0);
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
     std::vector<Deformer> deformers;
-    for (const Method& method : kMethods) deformers.emplace_back(method.id, scene.data());
+    for (const MethodInfo& method : kMethods) deformers.emplace_back(scene.data(), method);
     std::vector<Vec3<float>> other_rest_points = scene.rest_points;
     const auto frames = [&](std::vector<Vec3<float>>& points) {
         for (Deformer& deformer : deformers) {
@@ -136,7 +136,7 @@ TEST(Bones, of_high_numbers_take_no_memory) {
         Scene scene;
         scene.add_vertex({1, 2, 3}, {{bone, 1.0f}});
         const std::size_t before = bytes;
-        const Deformer deformer(MethodId::dq, scene.data());
+        const Deformer deformer(scene.data(), Dq::info);
         sizes.push_back(bytes - before);
     }
     // What the numbers are sorted by is 4 bytes each, and gone afterwards.

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <string>
 
-#include "sinew/skinning/dq.h"
-#include "sinew/skinning/lbs.h"
-#include "sinew/skinning/qv.h"
+#include "sinew/skinning/methods.h"
 #include "support.h"
 
 namespace sinew {
@@ -66,12 +64,18 @@ class Skinning : public testing::Test {};
 struct MethodNames {
     template <class Method>
     static std::string GetName(int) {
-        if (std::is_same_v<Method, Lbs>) return "lbs";
-        return std::is_same_v<Method, Qv> ? "qv" : "dq";
+        return std::string(Method::info.name);
     }
 };
 
-using AllMethods = testing::Types<Lbs, Qv, Dq>;
+template <class List>
+struct TypesOf;
+template <class... Method>
+struct TypesOf<std::tuple<Method...>> {
+    using All = testing::Types<Method...>;
+};
+
+using AllMethods = TypesOf<Methods>::All;
 TYPED_TEST_SUITE(Skinning, AllMethods, MethodNames);
 
 TYPED_TEST(Skinning, one_influence_moves_with_its_bone) {
