@@ -40,7 +40,8 @@ def test_methods_say_what_they_are():
     for row in rows:
         assert row.label
         assert row.description
-        assert row.needs
+        assert row.source
+        assert set(row.needs) <= {"rest_bones"}
         assert row.name in repr(row)
 
 
