@@ -92,6 +92,9 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
     std::vector<Deformer> deformers;
     for (const MethodInfo& method : kMethods) deformers.emplace_back(scene.data(), method);
+    std::vector<float> shares(scene.rest_points.size());
+    for (std::size_t i = 0; i < shares.size(); ++i) shares[i] = static_cast<float>(i % 100) / 50.0f - 0.5f;
+    deformers.emplace_back(scene.data(), Lbs::info, MixData{Dq::info, shares});
     std::vector<Vec3<float>> other_rest_points = scene.rest_points;
     const auto frames = [&](std::vector<Vec3<float>>& points) {
         for (Deformer& deformer : deformers) {
@@ -127,6 +130,19 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     }
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(in_frames, 0);
+}
+
+TEST(Bindings, are_packed_once) {
+    const Scene scene = random_scene(2, 20000, 1.0);
+    const std::size_t before = bytes;
+    const Binding binding(scene.data());
+    const std::size_t of_binding = bytes - before;
+    std::vector<Deformer> deformers;
+    deformers.reserve(kMethodCount);
+    const std::size_t alone = bytes;
+    for (const MethodInfo& method : kMethods) deformers.emplace_back(binding, method);
+    // Of bones alone.
+    EXPECT_LT(bytes - alone, of_binding / 20);
 }
 
 // As a number of a bone is no size: what is made for it does not grow with it.

@@ -82,7 +82,7 @@ HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones,
         const Vec<Four> cosine = dot(quad, first);
         const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
         least = hn::Min(least, hn::Abs(cosine));
-        quad = hn::Xor(quad, sign);
+        if (Rigid::kSignedFloat4s >= 1) quad = hn::Xor(quad, sign);
         if (Rigid::kSignedFloat4s == 2) second = hn::Xor(second, sign);
         hn::Store(kDifferences ? hn::Sub(quad, first) : quad, d, rows + kRow * k);
         hn::Store(kDifferences ? hn::Sub(second, first_second) : second, d, rows + kRow * k + 4);
@@ -123,7 +123,8 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
         }
     }
     // Within 45 degrees of the first, all lie within 90 of each other.
-    if (copy_aligned<Rigid, !kPlain>(palette, bones, count, rows) > 0.7072f) return true;
+    const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
+    if (Rigid::kSignedFloat4s == 0 || least > 0.7072f) return true;
     if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
     if (!signs_agree(rows, kRow, count)) return false;
     if (!kPlain) subtract_first(rows, count);

@@ -9,13 +9,14 @@
 
 #include "sinew/skinning/dq.h"
 #include "sinew/skinning/lbs.h"
+#include "sinew/skinning/log.h"
 #include "sinew/skinning/qv.h"
 
 namespace sinew {
 
 /// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
 /// line and panel are made from it.
-using Methods = std::tuple<Lbs, Qv, Dq>;
+using Methods = std::tuple<Lbs, Qv, Dq, Log>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
