@@ -90,7 +90,7 @@ def blend_files_below(folder: Path) -> Iterator[Path]:
 def _files_below(folder: Path) -> Iterator[Path]:
     """Also in linked folders, but in none that the way there has been through."""
     for path, folders, names in os.walk(folder, followlinks=True):
-        above = {os.path.realpath(part) for part in (path, *Path(path).parents)}
+        above = {os.path.realpath(part) for part in (Path(path), *Path(path).parents)}
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
         yield from (Path(path, name) for name in names)
 

@@ -14,11 +14,12 @@ import logging
 import threading
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from queue import SimpleQueue
+from typing import TYPE_CHECKING
 
 import sinew
 
@@ -26,6 +27,9 @@ from ..blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from ..core.errors import SinewError
 from ..core.opengl import usual_engine
 from .journal import UNFINISHED, content_hash, stamp
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 ATTEMPTS = 2
 CONNECT_LIMIT = 30.0
@@ -130,7 +134,7 @@ def do_task(
     journal.
     """
     source, target = Path(task["source"]), Path(task["target"])
-    facts = {"versions": versions()}
+    facts: dict[str, object] = {"versions": versions()}
     if task["known"] is not None and task["known"] == {**facts, "hash": content_hash(source)}:
         return {"unchanged": True}
     for attempt in range(1, ATTEMPTS + 1):
@@ -164,20 +168,23 @@ def run_here(
     tasks: Sequence[dict],
     run: Callable[[dict, Limits], dict],
     versions: Callable[[], dict[str, str]],
-) -> Iterator[tuple[dict, dict]]:
+) -> Generator[tuple[dict, dict], None, None]:
     """Each task and what became of it, done one after the other in this process."""
     for task in tasks:
         yield task, do_task(task, Limits(), run, versions)
 
 
-def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Iterator[tuple[dict, dict]]:
+def run_on_this_machine(
+    tasks: Sequence[dict], limits: Limits, jobs: int
+) -> Generator[tuple[dict, dict], None, None]:
     """Each task and what became of it, as they are done, by `jobs` Blenders.
 
     Raises SinewError where no Blender can be had. What is not done when the generator is closed, or
     interrupted, is given up.
     """
     versions()
-    waiting, done = deque(tasks), SimpleQueue()
+    waiting = deque(tasks)
+    done: SimpleQueue[tuple[dict, dict]] = SimpleQueue()
 
     def work() -> None:
         # Nothing else is done here, for as long as it takes a Blender waits.
@@ -203,7 +210,7 @@ def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Ite
 
 def run_in_dask(
     tasks: Sequence[dict], limits: Limits, scheduler: str, warn: Callable[[str], None]
-) -> Iterator[tuple[dict, dict]]:
+) -> Generator[tuple[dict, dict], None, None]:
     """The same by the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
 
     warn  told in one sentence where the cluster is open to others
@@ -262,7 +269,7 @@ def _is_this_machine(host: str) -> bool:
         return host == "localhost"
 
 
-def _check_workers(client, scheduler: str) -> None:
+def _check_workers(client: Client, scheduler: str) -> None:
     """Raises SinewError where a worker can not do what this process would."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_LIMIT)

@@ -9,7 +9,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,9 +22,10 @@ from ..batch.workers import run_here, run_in_dask, run_on_this_machine
 from ..blender_process import Limits
 from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
+from ..core.html_templates import NO_PAGES, can_render
 from ..core.output import folder_to_write, writing
 from .arguments import count, seconds
-from .console import Console
+from .console import BatchProgress, Console
 
 
 @dataclass(frozen=True)
@@ -182,7 +183,7 @@ class _Workers:
             verbose=console.verbose,
         )
 
-    def run(self, tasks: list[dict]) -> Iterator[tuple[dict, dict]]:
+    def run(self, tasks: list[dict]) -> Generator[tuple[dict, dict], None, None]:
         if not tasks or self._inside_blender:
             from .. import worker
             from ..prepare import prepare_blender
@@ -262,8 +263,10 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
             f"{job.target}: is there already; use --overwrite to replace it, or --resume to go on"
         )
     same = ("command", "source", "settings")
-    stands = args.resume and is_ours and "error" not in record and journal.holds_all(job.target, record)
-    if stands and tells_all(record) and all(record.get(k) == task[k] for k in same):
+    if record is None or not args.resume or not is_ours or "error" in record:
+        return None
+    stands = journal.holds_all(job.target, record) and tells_all(record)
+    if stands and all(record.get(k) == task[k] for k in same):
         return {"hash": record["hash"], "versions": record["versions"]}
     return None
 
@@ -302,7 +305,7 @@ def _record_failure(journal: Journal, target: Path, record: dict, before: dict) 
     journal.record(target, record)
 
 
-def _tell(console: Console, progress, task: dict, result: dict) -> None:
+def _tell(console: Console, progress: BatchProgress, task: dict, result: dict) -> None:
     failed = "error" in result or bool(result["left_out"])
     meshes = 0 if "error" in result else len(result["meshes"])
     if "error" in result:
@@ -353,6 +356,8 @@ def _conclude(console: Console, action: Action, rows: list[dict], summary: dict,
     unchanged = f", {summary['unchanged']} of them before" if summary["unchanged"] else ""
     console.say(f"{len(complete)} of {len(rows)} files {action.done}{unchanged}")
     console.say(str(report))
+    if not can_render():
+        console.note(f"report.html is left out: {NO_PAGES}")
     return 1 if bad else 0
 
 

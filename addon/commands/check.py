@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -78,7 +78,7 @@ def _files_of(given: Path) -> list[Path]:
     return found
 
 
-def _checked(paths: list[Path], limits: Limits) -> Iterator[tuple[Path, dict]]:
+def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], None, None]:
     """Each file and what was found, by a Blender of its own that is started anew where it is lost. Raises
     SinewError where none can be had."""
     blender = None

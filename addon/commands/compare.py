@@ -11,6 +11,7 @@ from ..core.comparison import Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
+from ..core.metrics import Summary
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page
@@ -190,8 +191,10 @@ def _measure(
     from ..blender.pages import measure
 
     batches = measure.batches(subject, frames, len(methods) + 1)
-    summaries, times, own = ({method: [] for method in methods} for _ in range(3))
-    rest = None
+    summaries: dict[str, list[Summary]] = {method: [] for method in methods}
+    times: dict[str, list[float]] = {method: [] for method in methods}
+    own: dict[str, list[float]] = {method: [] for method in methods}
+    rest: RestFacts | None = None
     for batch in console.progress(batches, len(batches), f"Measuring {path.name}"):
         measured = measure.measure(subject, methods, args.reference, batch)
         if rest is None:
@@ -200,6 +203,7 @@ def _measure(
             summaries[method] += measured.summaries[method]
             times[method] += measured.times[method]
             own[method] += measured.own[method]
+    assert rest is not None, "there is at least one frame"
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],

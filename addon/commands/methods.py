@@ -21,13 +21,17 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods = sinew.methods()
     if args.json:
         rows = [
-            {"name": m.name, "label": m.label, "description": m.description, "needs": m.needs}
+            {"name": m.name, "label": m.label, "description": m.description, "needs": list(m.needs)}
             for m in methods
         ]
         console.say(json.dumps(rows, indent=2))
     else:
         console.table(
             ("method", "label", "when to use it", "needs"),
-            [(m.name, m.label, m.description, m.needs) for m in methods],
+            [(m.name, m.label, m.description, _needs(m)) for m in methods],
         )
     return 0
+
+
+def _needs(method: sinew.Method) -> str:
+    return ", ".join(method.needs).replace("_", " ") or "nothing more"

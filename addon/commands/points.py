@@ -41,7 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 def run(args: argparse.Namespace, console: Console) -> int:
     import bpy
 
-    from ..blender import evaluate, files
+    from ..blender import evaluate, files, properties
 
     frames = parse_frames(args.frames)
     evaluate.check_methods([args.method])
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
         evaluate.set_frame(bpy.context.scene, frame)
         for obj in taken:
-            if args.method != evaluate.BLENDER and not obj.sinew.enabled:
+            if args.method != properties.BLENDER and not obj.sinew.enabled:
                 raise SinewError(f"{args.file}: frame {frame}: {obj.sinew.error}")
             points[keys[obj]].append(evaluate.final_points(obj))
     arrays = {name: _stack(name, per_frame, frames) for name, per_frame in points.items()}

@@ -64,7 +64,7 @@ class Binding:
     @property
     def points(self) -> np.ndarray:
         """The shape of the last frame, float32 [vertices, 3], object space."""
-        if self._is_elsewhere:
+        if self._is_elsewhere and self._last is not None:
             self._shape(self._last, self._points)
             self._is_elsewhere = False
         return self._points
@@ -85,7 +85,8 @@ class Binding:
         return True
 
     def _shape(self, frame: Frame, out: np.ndarray) -> None:
-        rest_points, bones, rest_inverses = frame.rest_points, frame.pose, self._rest_from_armature
+        rest_points, bones = frame.rest_points, frame.pose
+        rest_inverses: np.ndarray | None = self._rest_from_armature
         if self._spread_anew(frame):
             self._bound.clear()
         if frame.scale_rule != BLENDER_4.name:

@@ -66,7 +66,8 @@ class Chain:
                 name = "quat_vec" if module is sinew.quat_vec else "dual_quat"
                 relative = getattr(sinew.affine, f"to_{name}")(relative)
             keys.append(relative)
-        relative, _is_defined = skeleton.interpolate(*keys, t, method)
+        first, second = keys
+        relative, _is_defined = skeleton.interpolate(first, second, t, method)
         pose = skeleton.root_relative(relative)
         if module is not sinew.affine:
             pose = module.to_affine(pose)
@@ -212,7 +213,8 @@ def trimmed(pictures: list[Picture]) -> list[Picture]:
     """The PNGs without the clear margin that all of them have. Requires Pillow."""
     from PIL import Image
 
-    images = [Image.open(io.BytesIO(picture.content)) for picture in pictures]
+    contents = [picture.content for picture in pictures if isinstance(picture.content, bytes)]
+    images = [Image.open(io.BytesIO(content)) for content in contents]
     boxes = np.array([image.getchannel("A").getbbox() or (0, 0, *image.size) for image in images])
     margin = images[0].width // 50
     low, high = boxes[:, :2].min(axis=0) - margin, boxes[:, 2:].max(axis=0) + margin

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sinew
@@ -13,8 +15,20 @@ from ..errors import SinewError
 from . import printed
 from .model import Fact, Figure, Picture
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
 # The report's three first.
-METHODS = ("matrix_linear", "qv_nlerp", "qv_slerp", "dlb", "sclerp", "matrix_polar", "matrix_log", "dib")
+METHODS: tuple[sinew.interpolate.Method, ...] = (
+    "matrix_linear",
+    "qv_nlerp",
+    "qv_slerp",
+    "dlb",
+    "sclerp",
+    "matrix_polar",
+    "matrix_log",
+    "dib",
+)
 ORIGIN, CORNER = np.zeros(3), np.ones(3)
 STEPS = 400
 NO_PLOTS = "Not drawn in this installation: plots need matplotlib; pip install matplotlib and try again."
@@ -34,7 +48,7 @@ class Path:
     turned: np.ndarray
 
 
-def layout(method: str) -> object:
+def layout(method: str) -> ModuleType:
     if method.startswith("matrix"):
         return sinew.affine
     return sinew.quat_vec if method.startswith("qv") else sinew.dual_quat
@@ -49,7 +63,7 @@ def ends() -> np.ndarray:
     return np.array(pairs)
 
 
-def in_layout(module: object, pairs: np.ndarray) -> np.ndarray:
+def in_layout(module: ModuleType, pairs: np.ndarray) -> np.ndarray:
     if module is sinew.quat_vec:
         return pairs
     return sinew.quat_vec.to_affine(pairs) if module is sinew.affine else sinew.quat_vec.to_dual_quat(pairs)
@@ -59,7 +73,7 @@ def paths(point: np.ndarray, steps: int = STEPS) -> dict[str, Path]:
     """By method, for `point` [3]; `other` is that of the other end of (0, 0, 0) to (1, 1, 1)."""
     t = np.linspace(0.0, 1.0, steps + 1)
     other = CORNER if not point.any() else ORIGIN
-    result = {}
+    result: dict[str, Path] = {}
     for method in METHODS:
         module = layout(method)
         a, b = in_layout(module, ends())
@@ -212,7 +226,7 @@ _STYLES = {
 }
 
 
-def _pyplot() -> object:
+def _pyplot() -> tuple[ModuleType, type[Canvas]]:
     """matplotlib without a screen. Raises SinewError where it is not installed."""
     try:
         import matplotlib
@@ -264,7 +278,7 @@ def _settings(salt: str) -> dict[str, object]:
     return {"svg.fonttype": "none", "svg.hashsalt": salt, "font.family": "sans-serif", "font.size": 10}
 
 
-def _svg(figure: object) -> str:
+def _svg(figure: Canvas) -> str:
     """The <svg> element alone, with nothing that points outside the page."""
     file = io.StringIO()
     figure.savefig(file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import sinew
 
@@ -194,8 +196,8 @@ def _time_table(
     each = OPERATIONS[number]
     counts = measurements.counts[_COUNTED_IN.get(number, number)]
 
-    def times(key: str, of: dict[str, Timing]) -> Timing | None:
-        return of.get(f"{number}/{key}")
+    def times(key: str, of: dict[str, Timing]) -> Timing:
+        return of[f"{number}/{key}"]
 
     base_key = next(iter(names))
     base = times(base_key, measurements.optimised)
@@ -203,7 +205,7 @@ def _time_table(
     rows = []
     for key, name in names.items():
         ours = times(key, measurements.optimised)
-        slow = times(key, measurements.unoptimised)
+        slow = measurements.unoptimised.get(f"{number}/{key}")
         ratio = ours.median / base.median
         expected = seconds[key] / seconds[base_key] if key in seconds else None
         agrees, why = None, ""
@@ -376,7 +378,8 @@ def chain(name: str, dtype: type, normalise: str) -> np.ndarray:
 
 def moved_one_by_one(name: str, dtype: type, normalise: str) -> np.ndarray:
     """[4, 3]: the point (0, 0, 0) after each transform in turn."""
-    point, points = np.zeros(3, dtype), []
+    point: np.ndarray = np.zeros(3, dtype)
+    points: list[np.ndarray] = []
     for transform in chain(name, dtype, normalise):
         point = LAYOUTS[name].transform_point(transform, point)
         points.append(point)
@@ -471,7 +474,7 @@ def _chain_row(
     )
 
 
-def _built(compute: object, name: str) -> dict[tuple[str, type], np.ndarray]:
+def _built(compute: Callable[[str, type, str], np.ndarray], name: str) -> dict[tuple[str, type], np.ndarray]:
     return {
         (normalise, dtype): compute(name, dtype, normalise)
         for normalise in ("axis", "quaternion")
@@ -507,7 +510,7 @@ def chain_spreads() -> dict[str, float]:
         "unit_axes": spread(ours(np.float64, "axis")),
         "unit_axes_float32": spread(ours(np.float32, "axis")),
         "quaternions": spread(ours(np.float64, "quaternion")),
-        "axis_error": max(abs(np.linalg.norm(axis) - 1) for _, axis, _ in printed.CHAIN.values()),
+        "axis_error": max(abs(float(np.linalg.norm(axis)) - 1) for _, axis, _ in printed.CHAIN.values()),
     }
 
 
