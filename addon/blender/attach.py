@@ -78,12 +78,12 @@ def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.nda
     """
     if points.are_in_mesh(obj, rest, shown):
         applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
-        drive.remove(obj)
+        drive.take_off(obj)
         for name in applied:
             obj.modifiers.remove(obj.modifiers[name])
         log.info("%s: its shape is in its mesh now, and Sinew is off it", obj.name)
     else:
-        drive.remove(obj)
+        drive.take_off(obj)
         log.info("%s: its modifier was deleted, and Sinew is off it", obj.name)
 
 

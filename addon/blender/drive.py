@@ -128,13 +128,27 @@ def use_one_method(obj: bpy.types.Object, method: str) -> None:
 
 
 def remove(obj: bpy.types.Object) -> None:
+    """As take_off(), for the artist.
+
+    Raises SinewError, and changes nothing, where Sinew would be there again once the file is loaded.
+    """
+    nodes = sinew_modifier(obj)
+    if obj.override_library is not None and nodes is not None and nodes.is_override_data:
+        # Blender lets a script remove it from the override, and loads it again, with the Armature modifier twice.
+        raise SinewError(
+            f"{obj.name}: Sinew comes with it from its library; switch it off here, or remove it there"
+        )
+    take_off(obj)
+
+
+def take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
     with updates_suspended():
-        _remove(obj)
+        _take_off(obj)
     heat_view.tidy()
 
 
-def _remove(obj: bpy.types.Object) -> None:
+def _take_off(obj: bpy.types.Object) -> None:
     switch(obj, on=False)
     resume_after_save(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)

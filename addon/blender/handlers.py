@@ -158,15 +158,16 @@ def prepare_for_save() -> None:
     session.gate.restore()
     objects = [obj for obj in bpy.data.objects if properties.is_driven(obj) and obj.is_editable]
     session.was_on = set()
-    for obj in objects:
-        try:
-            if drive.prepare_for_save(obj):
-                session.was_on.add(obj.session_uid)
-            overrides.keep(obj)
-        except Exception as error:
-            # The others are in the same file.
-            log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
-    note.write([obj for obj in objects if properties.of(obj).is_saved])
+    with updates_suspended():
+        for obj in objects:
+            try:
+                if drive.prepare_for_save(obj):
+                    session.was_on.add(obj.session_uid)
+                overrides.keep(obj)
+            except Exception as error:
+                # The others are in the same file.
+                log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
+        note.write([obj for obj in objects if properties.of(obj).is_saved])
 
 
 def resume_after_save(context: bpy.types.Context) -> None:

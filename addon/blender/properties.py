@@ -242,11 +242,14 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
             for item in getattr(source, name):
                 copy(item, getattr(target, name).add())
         elif not prop.is_readonly and source.is_property_set(name):
+            value = getattr(source, name)
+            # By key: assigning to the property itself calls the listeners.
             if prop.type == "ENUM":
-                # As a number: assigning the name calls the listeners.
-                target[name] = next(i.value for i in prop.enum_items if i.identifier == getattr(source, name))
+                target[name] = next(i.value for i in prop.enum_items if i.identifier == value)
+            elif prop.type == "BOOLEAN":
+                target[name] = value
             else:
-                setattr(target, name, getattr(source, name))
+                setattr(target, name, value)
 
 
 def store(group: bpy.types.PropertyGroup, name: str, value: bool) -> None:

@@ -106,8 +106,13 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
             if not obj.is_editable:
                 left_out.append(f"{obj.name} is linked from another file; restore that one")
                 continue
-            meshes.append({"object": obj.name, "method": properties.of(obj).method, "warnings": []})
-            drive.remove(obj)
+            method = properties.of(obj).method
+            try:
+                drive.remove(obj)
+            except SinewError as error:
+                left_out.append(str(error))
+                continue
+            meshes.append({"object": obj.name, "method": method, "warnings": []})
         handlers.session.forget()
     if not meshes:
         reason = left_out.pop() if left_out else "no mesh is deformed by Sinew"

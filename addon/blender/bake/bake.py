@@ -242,7 +242,7 @@ def _take_off(obj: bpy.types.Object) -> None:
     # A parent that deforms would do so on top of the bake.
     properties.of(obj).parent_type = ""
     run = [modifier.name for modifier in stack.armature_modifiers(obj)]
-    drive.remove(obj)
+    drive.take_off(obj)
     for name in run:
         modifier = obj.modifiers[name]
         modifier.show_viewport = modifier.show_render = False
