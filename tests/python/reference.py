@@ -124,17 +124,13 @@ def dq(point, motions, rotations, weights):
 
 
 @functools.lru_cache(maxsize=1000)
-def logarithms(of_rotation):
-    """scipy's matrix logarithm of a 3x3 rotation (as bytes), and the 3x3 matrix by which that of the rigid 4x4
-    matrix depends on its translation: one column for each axis."""
-    rigid = np.eye(4)
-    rigid[:3, :3] = np.frombuffer(of_rotation).reshape(3, 3)
-    columns = []
-    for axis in range(3):
-        rigid[:3, 3] = np.eye(3)[axis]
-        whole = scipy.linalg.logm(rigid).real
-        columns.append(whole[:3, 3])
-    return whole[:3, :3], np.column_stack(columns)
+def logarithm(of_rotation):
+    """scipy's matrix logarithm of a 3x3 rotation (as bytes), and the 3x3 matrix that makes the last column of the
+    rigid 4x4 matrix's logarithm of its translation: the inverse of the exponential's integral over unit time."""
+    angular = scipy.linalg.logm(np.frombuffer(of_rotation).reshape(3, 3)).real
+    block = np.zeros((6, 6))
+    block[:3, :3], block[:3, 3:] = angular, np.eye(3)
+    return angular, np.linalg.inv(scipy.linalg.expm(block)[:3, 3:])
 
 
 def log(point, motions, rotations, weights):
@@ -142,7 +138,7 @@ def log(point, motions, rotations, weights):
     _, translations = rigid_terms(point, motions, rotations)
     total, margin = np.zeros((4, 4)), 1.0
     for rotated, translated, weight in zip(rotations, translations, weights, strict=True):
-        angular, by_translation = logarithms(np.ascontiguousarray(rotated).tobytes())
+        angular, by_translation = logarithm(np.ascontiguousarray(rotated).tobytes())
         total[:3, :3] += weight * angular
         total[:3, 3] += weight * (by_translation @ translated)
         margin = min(margin, abs(quaternion(rotated)[0]))
