@@ -157,11 +157,11 @@ def _settings(values: Mapping[str, Any]) -> Settings:
 
 def _line_of(text: str, position: Position) -> int:
     """The line, from 1, on which the value at `position` begins."""
-    return _line_where(text, lambda table: _holds(table, position))
+    return _line_where(text, lambda table: _has(table, position))
 
 
-def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
-    """The line on which the statement begins that first makes `holds` true: of the beginnings of the file
+def _line_where(text: str, is_true: Callable[[dict], bool]) -> int:
+    """The line on which the statement begins that first makes `is_true` so: of the beginnings of the file
     that are TOML themselves, the first such ends with it."""
     lines = text.splitlines()
     begin = 0
@@ -170,7 +170,7 @@ def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
             table = tomllib.loads("\n".join(lines[:end]))
         except tomllib.TOMLDecodeError:
             continue
-        if holds(table):
+        if is_true(table):
             break
         begin = end
     while not lines[begin].strip() or lines[begin].lstrip().startswith("#"):
@@ -178,7 +178,7 @@ def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
     return begin + 1
 
 
-def _holds(table: dict, position: Position) -> bool:
+def _has(table: dict, position: Position) -> bool:
     value: Any = table
     for step in position:
         try:

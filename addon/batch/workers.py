@@ -45,7 +45,7 @@ def versions() -> dict[str, str]:
 
 
 class _Blenders:
-    """The Blenders of this process, one for each thread that asks, each kept for its next file."""
+    """The Blenders of this process, one for each thread, each kept for its next file."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -145,16 +145,16 @@ def do_task(
             outcome = run({**task, "unfinished": str(unfinished)}, limits)
         except BlenderLost as lost:
             outcome = {"error": f"{source}: {lost}; tried {attempt} times"}
-            for left in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
+            for leftover in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
                 with contextlib.suppress(OSError):
-                    left.unlink()
+                    leftover.unlink()
             continue
         except SinewError as error:
             outcome = {"error": str(error)}
         break
     if "error" in outcome:
         return {**outcome, **facts}
-    beside = [[left, path, stamp(Path(left))] for left, path in outcome.pop("beside", ())]
+    beside = [[written, path, stamp(Path(written))] for written, path in outcome.pop("beside", ())]
     return {
         **outcome,
         **facts,
@@ -227,7 +227,7 @@ def run_in_dask(
         # Of tls://, with no or half a configuration.
         raise SinewError(f"{scheduler}: {_sentence(error)}; docs/batch.md has how to set up TLS") from None
     except (OSError, ValueError, RuntimeError) as error:
-        raise SinewError(f"{scheduler}: no dask scheduler answers there: {error}") from None
+        raise SinewError(f"{scheduler}: no dask scheduler answers at this address: {error}") from None
     with client:
         _warn_where_open(client.scheduler_info()["address"], warn)
         _check_workers(client, scheduler)
@@ -252,9 +252,9 @@ def _outcome(task: dict, result: Callable[[], dict]) -> dict:
 
 
 def _warn_where_open(address: str, warn: Callable[[str], None]) -> None:
-    """address  where the scheduler itself says that it listens: its machine's own, where it does on all"""
-    scheme, _separator, place = address.rpartition("://")
-    host = place.rpartition(":")[0].strip("[]")
+    """address  as the scheduler reports it; its machine's own where it listens on all"""
+    scheme, _separator, host_and_port = address.rpartition("://")
+    host = host_and_port.rpartition(":")[0].strip("[]")
     if scheme != "tls" and not _is_this_machine(host):
         warn(
             f"{address}: whoever reaches this scheduler can run programs as you, on its workers and here; "
@@ -279,7 +279,7 @@ def _check_workers(client: Client, scheduler: str) -> None:
         found = client.run(versions)
     except Exception as error:
         raise SinewError(
-            f"{scheduler}: a worker can not run Sinew: {_sentence(error)}; install sinew-blender there"
+            f"{scheduler}: a worker can not run Sinew: {_sentence(error)}; install sinew-blender for it"
         ) from None
     blenders = {there["blender"] for there in found.values()}
     if len(blenders) > 1:

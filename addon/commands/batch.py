@@ -36,7 +36,7 @@ class Action:
     done      what a file is afterwards, as in "3 of 4 files re-skinned"
     settings  those given on the command line
     job       path of a job file
-    methods   those that may be asked for; none where no method is needed
+    methods   those that can be chosen; none where no method is needed
     """
 
     command: str
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, console: Console, action: Action) -> int:
-    """Exit status: 0 all went well, 1 something failed or was left as it was."""
+    """Exit status: 0 all went well, 1 something failed or was not changed."""
     job_file = read_job_file(Path(action.job), action.methods) if action.job else JobFile()
     inputs = args.inputs or job_file.inputs
     out = args.out or (job_file.out and folder_to_write(job_file.out))
@@ -279,8 +279,8 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
         return {**before, "unchanged": True}
     record = {key: task[key] for key in ("command", "source", "settings")} | outcome
     record["beside"] = [
-        [journal.name_of(Path(left)), journal.name_of(Path(path)), written]
-        for left, path, written in outcome.get("beside", ())
+        [journal.name_of(Path(unfinished)), journal.name_of(Path(path)), written]
+        for unfinished, path, written in outcome.get("beside", ())
     ]
     if "error" in record:
         _record_failure(journal, target, record, before)

@@ -105,7 +105,7 @@ class Console:
         try:
             yield
         except OSError as error:
-            # What is left of it would be tried again, with a traceback, at the end of the process.
+            # The rest of it would be tried again, with a traceback, at the end of the process.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
             raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
 

@@ -40,7 +40,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 class _JobHelp(argparse.Action):
-    """Prints the keys of a job file in place of doing anything, as --help does."""
+    """Prints the keys of a job file and exits, as --help does."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_others: object) -> None:
         for name, headers, wanted, meaning in rows(job_schema(_methods())):

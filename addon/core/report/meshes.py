@@ -25,7 +25,7 @@ LINK = 0.25
 TITLES = {
     "3.9": "Mesh used for skinning, with linear weighting",
     "3.10": "Comparison of blending methods A: a bent joint",
-    "3.11": "Comparison of blending methods B: a joint turned about the axis of the cylinder",
+    "3.11": "Comparison of blending methods B: a joint rotated about the axis of the cylinder",
 }
 _POSES = "The report does not print its poses; these are those of Sinew's own file."
 
@@ -116,12 +116,12 @@ def hierarchy_figures(
             fact = Fact(
                 "Pairs and dual quaternions are near identical, and rigid.",
                 f"Link volumes change by at most {rigid:.0e} of themselves; the two are at most "
-                f"{apart / length:.0e} of the chain's length apart, as joints that only turn have one centre "
-                "for both.",
+                f"{apart / length:.0e} of the chain's length apart, as joints that only rotate have one "
+                "centre for both.",
                 rigid < 1e-5 and apart < 1e-5 * length,
                 {**values, "largest change of volume": rigid, "apart": apart / length},
             )
-        notes = (_POSES + " Five joints turn from -45 to 45 degrees; each vertex follows one bone.",)
+        notes = (_POSES + " Five joints rotate from -45 to 45 degrees; each vertex follows one bone.",)
         result.append(Figure(number, title, tuple(pictures[method]), (fact,), notes))
     return tuple(result)
 
@@ -185,7 +185,7 @@ def figure_3_10(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         ),
     )
     return Figure(
-        "3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " The joint turns by 120 degrees.",)
+        "3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " The joint rotates by 120 degrees.",)
     )
 
 
@@ -205,7 +205,7 @@ def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         {f"radius, {method}": share for method, share in kept.items()},
     )
     return Figure(
-        "3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " The joint turns by 170 degrees.",)
+        "3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " The joint rotates by 170 degrees.",)
     )
 
 

@@ -40,12 +40,12 @@ class Path:
 
     moved  [steps + 1, 3] of the point
     other  [steps + 1, 3] of the other of the two points
-    turned [steps + 1] degrees from the first end; NaN where the transform is not rigid
+    rotated [steps + 1] degrees from the first end; NaN where the transform is not rigid
     """
 
     moved: np.ndarray
     other: np.ndarray
-    turned: np.ndarray
+    rotated: np.ndarray
 
 
 def layout(method: str) -> ModuleType:
@@ -79,11 +79,11 @@ def paths(point: np.ndarray, steps: int = STEPS) -> dict[str, Path]:
         a, b = in_layout(module, ends())
         between = sinew.interpolate.between(a, b, t, method).transforms
         if method == "matrix_linear":
-            turned = np.full(len(t), np.nan)
+            rotated = np.full(len(t), np.nan)
         else:
-            turned = np.degrees(module.rigid_distance(a, between).angle)
+            rotated = np.degrees(module.rigid_distance(a, between).angle)
         result[method] = Path(
-            module.transform_point(between, point), module.transform_point(between, other), turned
+            module.transform_point(between, point), module.transform_point(between, other), rotated
         )
     return result
 
@@ -94,12 +94,12 @@ def figure_3_4() -> Figure:
     notes = (_spline_note(),)
     title = "The origin under interpolated transforms, seen along z"
     try:
-        turned = {method: path.turned for method, path in all_paths.items()}
+        rotated = {method: path.rotated for method, path in all_paths.items()}
         pictures = (
             Picture(_PATH_CAPTION, _plot_paths(all_paths, "3.4")),
             Picture(
-                "How far each has turned from the first transform; linear matrices do not only turn.",
-                _plot_over_t(turned, "degrees turned", "3.4"),
+                "How far each has rotated from the first transform; linear matrices do not only rotate.",
+                _plot_over_t(rotated, "degrees rotated", "3.4"),
             ),
         )
     except SinewError as error:
@@ -152,7 +152,7 @@ def _bends(all_paths: dict[str, Path]) -> Fact:
     straight = max(values[method] for method in ("matrix_linear", "matrix_polar", "qv_nlerp", "qv_slerp"))
     curved = min(values[method] for method in ("dlb", "sclerp"))
     return Fact(
-        "Dual quaternions do not just turn about the origin, but about an ideal centre: their paths of the "
+        "Dual quaternions do not just rotate about the origin, but about an ideal centre: their paths of the "
         "origin are curved, those of the other methods straight.",
         f"Matrices (linear and polar) and pairs leave the straight line by at most {straight:.0e}, dual "
         f"quaternions by {curved:.2f}, logarithms of matrices by {values['matrix_log']:.2f}.",
@@ -163,7 +163,7 @@ def _bends(all_paths: dict[str, Path]) -> Fact:
 
 def _paces(all_paths: dict[str, Path]) -> Fact:
     dlb, sclerp = all_paths["dlb"], all_paths["sclerp"]
-    angle = float(np.abs(dlb.turned - sclerp.turned).max())
+    angle = float(np.abs(dlb.rotated - sclerp.rotated).max())
     distance = float(np.linalg.norm(dlb.moved - sclerp.moved, axis=1).max())
     a, b = in_layout(sinew.dual_quat, ends())
     t = np.linspace(0.1, 0.9, 9)
@@ -178,8 +178,8 @@ def _paces(all_paths: dict[str, Path]) -> Fact:
     apart = float(max(np.abs(one.axis - other.axis).max(), np.abs(one.moment - other.moment).max()))
     return Fact(
         "DLB uses the same screw axis as ScLERP, but interpolates differently.",
-        f"The axes are the same to {apart:.0e}. Turn and shift along it are not: at the same t the two are "
-        f"up to {angle:.1f} degrees and {distance:.2f} apart.",
+        f"The axes are the same to {apart:.0e}. Rotation and translation along it are not: at the same t "
+        f"the two are up to {angle:.1f} degrees and {distance:.2f} apart.",
         apart < 1e-9 and angle > 1.0,
         {"axis": apart, "degrees": angle, "distance": distance},
     )

@@ -115,7 +115,8 @@ def point_operations(measurements: Measurements | None) -> Table:
         "matrix_4x4": "GLM's 4x4 matrix, fourth row and all",
     }
     why = {
-        "dual_quat": "Ours turns the point by two cross products and reads the translation off 2 dual real*. "
+        "dual_quat": "Ours rotates the point by two cross products and reads the translation from 2 dual "
+        "real*. "
         f"The report's formula, two products of dual quaternions, takes {products[0]} and {products[1]} when "
         "every component is computed; how it comes to the printed numbers, it does not say."
     }
@@ -377,7 +378,7 @@ def chain(name: str, dtype: type, normalise: str) -> np.ndarray:
 
 
 def moved_one_by_one(name: str, dtype: type, normalise: str) -> np.ndarray:
-    """[4, 3]: the point (0, 0, 0) after each transform in turn."""
+    """[4, 3]: the point (0, 0, 0) after each transform, one after the other."""
     point: np.ndarray = np.zeros(3, dtype)
     points: list[np.ndarray] = []
     for transform in chain(name, dtype, normalise):
@@ -431,7 +432,7 @@ def translation() -> Table:
         )
     return Table(
         "3.6",
-        "The translation of one transform: (0, 0, 0) turned about (0, 1, 1) by 80 degrees and moved by (1, "
+        "The translation of one transform: (0, 0, 0) rotated about (0, 1, 1) by 80 degrees and moved by (1, "
         "0, 0.5)",
         ("x", "y", "z"),
         f"A component agrees within {TRANSLATION_TOLERANCE:.1e}, two steps of float32 at 1.",
