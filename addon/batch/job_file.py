@@ -21,11 +21,13 @@ class ObjectRule:
     match: str
     method: str | None = None
     scale: str | None = None
+    set: tuple[str, ...] | None = None
     bake: tuple[str, ...] | None = None
 
     def as_task(self) -> dict:
         bake = None if self.bake is None else list(self.bake)
-        given = {"method": self.method, "scale": self.scale, "bake": bake}
+        parameters = None if self.set is None else list(self.set)
+        given = {"method": self.method, "scale": self.scale, "set": parameters, "bake": bake}
         return {"match": self.match} | {key: value for key, value in given.items() if value is not None}
 
 
@@ -35,6 +37,7 @@ class Settings:
 
     include, exclude  patterns of names of objects and of collections
     scale             name of a scale rule
+    set               parameters as NAME=VALUE; later ones win
     bake              kinds of bakes, written beside the copy
     bake_frames       as typed; None: those of the file's scene
     objects           later ones win
@@ -44,6 +47,7 @@ class Settings:
     include: tuple[str, ...] | None = None
     exclude: tuple[str, ...] | None = None
     scale: str | None = None
+    set: tuple[str, ...] = ()
     bake: tuple[str, ...] | None = None
     bake_frames: str | None = None
     objects: tuple[ObjectRule, ...] = ()
@@ -54,6 +58,7 @@ class Settings:
             self.include if other.include is None else other.include,
             self.exclude if other.exclude is None else other.exclude,
             other.scale or self.scale,
+            self.set + other.set,
             self.bake if other.bake is None else other.bake,
             other.bake_frames or self.bake_frames,
             self.objects + other.objects,
@@ -76,6 +81,7 @@ class Settings:
             "include": list(self.include or ()),
             "exclude": list(self.exclude or ()),
             "scale": self.scale,
+            "set": list(self.set),
             "bake": list(self.bake or ()),
             "bake_frames": self.bake_frames,
             "objects": [rule.as_task() for rule in self.objects],

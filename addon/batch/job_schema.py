@@ -10,6 +10,7 @@ from typing import Any
 from ..core.bake import IN_FILE, KINDS, check_frames
 from ..core.errors import WrongUse
 from ..core.frames import parse_frames
+from ..core.parameters import parse
 from ..core.scale_rule import SCALE_RULES
 from .schema import TEXT, TEXTS, Key, SchemaError, Table, checked, one_of, rows, some_of
 
@@ -22,6 +23,11 @@ def job_schema(methods: Collection[str]) -> Table:
         one_of([rule.name for rule in SCALE_RULES]),
         "what becomes of the bones' scale; without it, each object keeps its own rule",
     )
+    set_ = Key(
+        "set",
+        checked(TEXTS, parse, 'NAME=VALUE, or a list such as ["mix=dq", "mix.group=Arms"]'),
+        "parameters of methods and stages, as of `sinew methods`",
+    )
     bake = Key(
         "bake",
         checked(some_of(KINDS), _check_one_in_file),
@@ -32,6 +38,7 @@ def job_schema(methods: Collection[str]) -> Table:
             Key("match", TEXT, "name or pattern of objects", required=True),
             method,
             scale,
+            set_,
             bake,
         ),
         check=_check_something_set,
@@ -39,6 +46,7 @@ def job_schema(methods: Collection[str]) -> Table:
     settings = (
         method,
         scale,
+        set_,
         Key("include", TEXTS, "only objects, or collections, of these names or patterns"),
         Key("exclude", TEXTS, "but not these"),
         bake,
@@ -103,7 +111,7 @@ def _check_bakes(values: Mapping[str, Any]) -> None:
 
 def _check_something_set(values: Mapping[str, Any]) -> None:
     if len(values) == 1:
-        raise SchemaError((), "these objects have no settings; expected method, scale or bake")
+        raise SchemaError((), "these objects have no settings; expected method, scale, set or bake")
 
 
 def _check_one_in_file(kinds: Sequence[str]) -> None:

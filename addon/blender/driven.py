@@ -45,6 +45,7 @@ class Driven:
     """What is known of a driven object between events; made again whenever it may be out of date.
 
     armatures          the session_uid of each link's armature, 0 for none
+    mix_group          the vertex group whose weights the links have for their mix
     keyed              for each link, whether an animation decides when its modifier is on
     watched            the session_uid of each object that the shape depends on
     frames             what decided the last frame
@@ -82,6 +83,7 @@ class Driven:
     source: Source
     chain: Chain
     facts: RigFacts
+    mix_group: str = ""
     watched: set[int] = field(default_factory=set)
     frames: list[LinkFrame | None] | None = None
     rest_points: np.ndarray | None = None
@@ -528,7 +530,8 @@ def _frames(
             return None
         pose = armature_io.read_pose(armature, link.binding.bones)
         own = properties.method_of_link(method, stand_in.method, is_first=not frames)
-        frames.append(LinkFrame(own, pose, space, scale_rule))
+        mix = settings.mixed_method if own == method else ""
+        frames.append(LinkFrame(own, pose, space, scale_rule, mix))
     return frames
 
 
@@ -558,7 +561,8 @@ def _current(
         pairs = drive.stand_ins(obj)
         armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
         options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]
-        if driven.armatures != armatures or driven.options != options:
+        is_same_mix = driven.mix_group == properties.of(obj).mix.group
+        if driven.armatures != armatures or driven.options != options or not is_same_mix:
             return _bind(obj, depsgraph)
     if bones_changed:
         return _bind(obj, depsgraph, driven)
@@ -592,6 +596,7 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
     bones = [_read_bones(stand_in.armature, depsgraph) for _modifier, stand_in in pairs]
     if (
         old is not None
+        and old.mix_group == properties.of(obj).mix.group
         and read.equals_but_for_points(old.source)
         and all(b.equals(link.binding.bones) for b, link in zip(bones, old.chain.links, strict=False))
     ):
@@ -601,9 +606,11 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
         old.source = read
         return old
     options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]
+    mix_group = properties.of(obj).mix.group
+    mix_weights = _mix_weights(obj, read, mix_group)
     links = [
         Link(
-            Binding(option.weighting(obj, read.weights, its_bones)),
+            Binding(option.weighting(obj, read.weights, its_bones), mix_weights),
             option.mask_weights(obj, read.weights),
             option.multi,
         )
@@ -612,7 +619,13 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
     facts = survey.describe(obj, pairs[0][1].armature, links[0].binding.weighting, read.points, depsgraph)
     armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
     keyed = [animation.is_visibility_animated(obj, modifier) for modifier, _stand_in in pairs]
-    return Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts)
+    return Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts, mix_group)
+
+
+def _mix_weights(obj: bpy.types.Object, read: Source, name: str) -> np.ndarray | None:
+    """float32 [vertices], 0 to 1; None where there is no such group."""
+    group = obj.vertex_groups.get(name) if name else None
+    return None if group is None else read.weights.of_group(group.index)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:

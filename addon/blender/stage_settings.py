@@ -8,11 +8,18 @@ from collections.abc import Callable
 import bpy
 import sinew
 
+from ..core import parameters
+
 STAGES = {stage.name: stage for stage in sinew.stages()}
 # The choice beside the methods where a parameter names one: the stage does nothing.
 OFF = "OFF"
 # Of a library override, only what is marked so is kept with the file.
 _OVERRIDE = {"LIBRARY_OVERRIDABLE"}
+
+
+def as_stored(value: parameters.Value) -> parameters.Value:
+    """The value of a property for one that a command or a job file has."""
+    return OFF if value == parameters.OFF else value
 
 
 def groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:

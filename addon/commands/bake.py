@@ -16,6 +16,7 @@ from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.output import folder_to_write
+from .arguments import add_set
 from .console import Console
 from .outcome import Outcome
 
@@ -52,6 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace what is there already")
+    add_set(parser)
     return parser
 
 
@@ -111,6 +113,7 @@ def _bake(
     outcome.left_out += [
         f"{obj.name} is not in the scene {scene.name}" for obj in elsewhere if obj not in meshes
     ]
+    evaluate.set_parameters(args.set)
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # What is hidden is baked as well, and hidden in the copy.
     with evaluate.shown(meshes):

@@ -18,6 +18,7 @@ from ..core.page import page
 from ..core.scratch import scratch_folder
 from ..core.sheet import require_pillow
 from . import sheet
+from .arguments import add_set
 from .console import Console
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--out", required=True, type=_folder_or_sheet, metavar="DIR", help="a folder, or SHEET.png"
     )
+    add_set(parser)
     return parser
 
 
@@ -89,6 +91,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     evaluate.check_methods([*methods, args.reference])
+    evaluate.set_parameters(args.set)
     if args.size is not None:
         render.check_size(args.size)
     if args.out.suffix.lower() in sheet.PICTURES:

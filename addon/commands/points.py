@@ -15,6 +15,7 @@ from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, write_whole
+from .arguments import add_set
 from .console import Console
 
 
@@ -35,6 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
     )
+    add_set(parser)
     return parser
 
 
@@ -45,6 +47,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     frames = parse_frames(args.frames)
     evaluate.check_methods([args.method])
+    evaluate.set_parameters(args.set)
     files.open_file(args.file)
     try:
         meshes = evaluate.deformed_meshes(bpy.context.scene, args.object)

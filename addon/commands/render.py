@@ -17,6 +17,7 @@ from ..core.golden import (
     picture_name,
 )
 from ..core.output import folder_to_write, remove, write_text
+from .arguments import add_set
 from .console import Console
 
 # In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
@@ -58,6 +59,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the pictures"
     )
+    add_set(parser)
     return parser
 
 
@@ -78,6 +80,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if method is None or frames is None:
         raise WrongUse("render: --method and --frames are needed where there is no --against")
     evaluate.check_methods([method])
+    evaluate.set_parameters(args.set)
     if golden is not None:
         _check_fits(args, golden, frames)
     _check_free(args.out, frames)

@@ -12,7 +12,9 @@ from ..batch.job_schema import job_schema
 from ..batch.schema import rows
 from ..core.errors import WrongUse
 from ..core.frames import parse_frames
+from ..core.parameters import as_texts
 from . import batch
+from .arguments import add_set
 from .console import Console
 
 
@@ -36,6 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--no-pictures", dest="pictures", action="store_false", help="a report without pictures, much faster"
     )
+    add_set(parser)
     return parser
 
 
@@ -58,5 +61,5 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods = _methods()
     if args.method is not None and args.method not in methods:
         raise WrongUse(f"method: expected one of {', '.join(methods)}, got {args.method!r}")
-    given = Settings(method=args.method)
+    given = Settings(method=args.method, set=tuple(as_texts(args.set)))
     return batch.run(args, console, batch.Action("reskin", "re-skinned", given, args.job, methods))

@@ -182,7 +182,7 @@ def test_settings_of_files(tmp_path):
     assert job.inputs == (str(tmp_path / "chars"),)
     assert job.out == str(tmp_path / "done")
     plain = job.settings_of(Path("/x/a.blend"), Settings())
-    none = {"scale": None, "bake": [], "bake_frames": None}
+    none = {"scale": None, "set": [], "bake": [], "bake_frames": None}
     face = {"match": "Face", "method": "dq"}
     assert plain.as_task() == none | {
         "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [face]
@@ -296,6 +296,17 @@ def test_errors_of_bakes_have_a_line(tmp_path, old, new, line, sentence):
         read(tmp_path, BAKES.replace(old, new))
 
 
+def test_parameters_of_files_and_objects(tmp_path):
+    """The command line's win over the file's, and a rule's over both."""
+    text = 'method = "lbs"\nset = ["mix=dq", "mix.group=Arms"]\n[[objects]]\nmatch = "Head"\nset = "mix=off"\n'
+    job = read(tmp_path, text)
+    task = job.settings_of(Path("/x/a.blend"), Settings(set=("mix.group=Legs",))).as_task()
+    assert task["set"] == ["mix=dq", "mix.group=Arms", "mix.group=Legs"]
+    assert task["objects"] == [{"match": "Head", "set": ["mix=off"]}]
+    with pytest.raises(WrongUse, match=r"job\.toml:2: set: mix: expected one of off, lbs, .*, got 'none'"):
+        read(tmp_path, text.replace("mix=dq", "mix=none"))
+
+
 def test_errors_of_the_format_have_a_line(tmp_path):
     with pytest.raises(WrongUse, match=r"line 4, column 10"):
         read(tmp_path, JOB.replace('method = "lbs"\nexclude', "method = lbs\nexclude"))
@@ -315,7 +326,7 @@ def test_the_schema_and_the_settings_have_the_same_keys():
     """A key that is read and then dropped would be accepted and do nothing."""
     known = {name for name, *_others in rows(job_schema(METHODS))}
     assert known == {field.name for field in fields(Settings)} | {"inputs", "out", "files", "match"}
-    assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "bake"}
+    assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "set", "bake"}
 
 
 def saved(folder, name="a.blend"):
