@@ -151,6 +151,7 @@ def test_saved_copied_and_removed(tmp_path):
     copy = obj.copy()
     bpy.context.scene.collection.objects.link(copy)
     assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
+    drive.remove(copy)
     bpy.data.objects.remove(copy)
     bpy.context.scene.frame_set(1)
     drive.remove(obj)
