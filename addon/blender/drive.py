@@ -134,7 +134,7 @@ def remove(obj: bpy.types.Object) -> None:
     """
     nodes = sinew_modifier(obj)
     if obj.override_library is not None and nodes is not None and nodes.is_override_data:
-        # Blender lets a script remove it from the override, and loads it again, with the Armature modifier twice.
+        # A script can remove it from the override; Blender loads it again, and the Armature modifier twice.
         raise SinewError(
             f"{obj.name}: Sinew comes with it from its library; switch it off here, or remove it there"
         )
@@ -266,7 +266,13 @@ def stand_ins(
     obj: bpy.types.Object,
 ) -> list[tuple[bpy.types.ArmatureModifier, properties.SinewStandIn]]:
     """The Armature modifiers that Sinew stands in for, in their order, and what it keeps of each."""
-    return [(modifier, _stand_in(obj, modifier)) for modifier in stack.armature_modifiers(obj)]
+    run, kept = stack.armature_modifiers(obj), properties.of(obj).stand_ins
+    count = len(kept)
+    pairs = [(modifier, _stand_in(obj, modifier)) for modifier in run]
+    if len(kept) != count:
+        # To add one has Blender move those before it in memory.
+        pairs = [(modifier, _stand_in(obj, modifier)) for modifier in run]
+    return pairs
 
 
 def follow_stack(obj: bpy.types.Object) -> None:

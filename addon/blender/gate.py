@@ -39,7 +39,10 @@ class Gate:
     def __init__(self) -> None:
         self._suspended: list[_Suspended] = []
 
-    def suspend(self, obj: bpy.types.Object) -> None:
+    def suspend(self, obj: bpy.types.Object, is_render: bool) -> None:
+        """is_render: not for a view, whose animation Blender writes to the originals, too."""
+        if is_render and _is_animated(obj.data):
+            return
         for modifier in obj.modifiers:
             if (
                 stack.is_on(modifier)
@@ -57,3 +60,14 @@ class Gate:
             # Its object may be gone.
             with contextlib.suppress(ReferenceError):
                 each.restore()
+
+
+# What a copy keeps, or Sinew works out itself.
+_STAYING = ("location", "rotation_", "scale", "delta_", "sinew.")
+
+
+def _is_animated(mesh: bpy.types.Mesh) -> bool:
+    """Whether animation sets anything of an object that has the mesh. To set one of its modifiers has Blender
+    (4.2 to 5.2) copy all of them anew, with what the originals have: in a render that of another frame."""
+    users = (obj for obj in bpy.data.objects if obj.data == mesh)
+    return any(not path.startswith(_STAYING) for obj in users for path in animation.animated_paths(obj))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -41,6 +41,8 @@ class Session:
     was_on: set[int] = field(default_factory=set)  # the objects that Sinew deformed before the file is saved
     is_saving: bool = False  # Blender writes the file: nothing may change
     is_late: bool = False  # something waits for the end of a render
+    is_rendering: bool = False
+    seen: set[int] | None = None  # meshes touched before others were called after Sinew
     all_left: bool = False  # to Blender, and nothing but what they are told of can change that
 
     @property
@@ -55,6 +57,7 @@ class Session:
         self.depsgraph = 0
         self.waiting = set()
         self.missed = None
+        self.seen = None
         self.expected = set()
         self.driven.clear()
         self.known = []
@@ -392,8 +395,52 @@ def _ignore_frames() -> None:
         events.ignore("frame_change_pre", before_frame_change)
 
 
+def _hear_after_others(event: str, function: Callable) -> None:
+    """Before an event: has Blender call `_LAST` after all others where some come behind `function`. Two of
+    them, as Blender leaves out the one behind a function that takes itself off."""
+    if session.seen is not None or events.is_last(event, _LAST[-1]) or events.is_last(event, function):
+        return
+    if session.objects and events.others_follow(event, function):
+        for each in _LAST:
+            events.ignore(event, each)
+            events.hear(event, each)
+
+
+def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
+    """At the end of Sinew's own reaction to an event."""
+    are_called = events.is_last(event, _LAST[-1])
+    session.seen = Changes.meshes_in(depsgraph) or set() if are_called else None
+
+
+@persistent
+def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
+    of updates at once. A mesh that was there before they were called may have changed once more."""
+    seen, session.seen = session.seen, None
+    meshes = Changes.meshes_in(depsgraph) if seen is not None else None
+    if not meshes:
+        return
+    with turn() as is_ours:
+        for obj, state in session.known:
+            with contextlib.suppress(ReferenceError):
+                state.is_suspect |= obj.data.session_uid in meshes & seen
+        if meshes - seen:
+            _react(depsgraph, Changes(touched=meshes - seen, meshes=meshes - seen, complete=True), is_ours)
+    _end_of_announced()
+
+
+@persistent
+def after_others_again(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    after_others(scene, depsgraph)
+
+
 @persistent
 def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    _hear_after_others("depsgraph_update_post", on_depsgraph_update)
+    _forget_answers()
+
+
+def _forget_answers() -> None:
     for obj, state in session.known:
         state.answered, state.is_announced, state.is_touched = 0, True, False
         try:
@@ -404,15 +451,16 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 
 
 @persistent
-def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    before_update(scene, depsgraph)
+def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    _hear_after_others("frame_change_post", on_frame_change)
+    _forget_answers()
     if not any(state.dirtied_by_frames for state in session.driven.values()) or is_rendering_in_window():
         return
     with turn() as is_ours, contextlib.suppress(ReferenceError):
         for obj in session.objects or () if is_ours and not session.is_saving else ():
             state = state_of(obj)
             if state is not None and state.dirtied_by_frames:
-                session.gate.suspend(obj)
+                session.gate.suspend(obj, session.is_rendering)
 
 
 @persistent
@@ -422,11 +470,10 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
         return
     with turn() as is_ours:
         session.gate.restore()
-        if session.idle or _are_all_answered(depsgraph):
-            _end_of_announced()
-            return
-        _react(depsgraph, _read_changes(depsgraph, frame=True), is_ours)
+        if not (session.idle or _are_all_answered(depsgraph)):
+            _react(depsgraph, _read_changes(depsgraph, frame=True), is_ours)
     _end_of_announced()
+    _note_seen("frame_change_post", depsgraph)
 
 
 def _look_at_surprises() -> float:
@@ -454,6 +501,7 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
         if is_ours:
             _ignore_frames()
     _end_of_announced()
+    _note_seen("depsgraph_update_post", depsgraph)
 
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, is_ours: bool) -> None:
@@ -561,9 +609,15 @@ def end_export() -> None:
 
 
 @persistent
+def on_render_start(*_args: object) -> None:
+    session.is_rendering = True
+
+
+@persistent
 def on_render_end(*_args: object) -> None:
     """In the render's thread, where it has one: what waited for its end is for the main one."""
     with turn():
+        session.is_rendering = False
         session.gate.restore()
     if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
         bpy.app.timers.register(_after_render, first_interval=0.05)
@@ -579,6 +633,7 @@ def _after_render() -> float | None:
     return None
 
 
+_LAST = (after_others, after_others_again)
 _FRAME_HANDLERS = {"frame_change_pre": before_frame_change, "frame_change_post": on_frame_change}
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
@@ -592,6 +647,7 @@ _HANDLERS = {
     "save_pre": on_save,
     "save_post": on_saved,
     "save_post_fail": on_saved,
+    "render_init": on_render_start,
     "render_complete": on_render_end,
     "render_cancel": on_render_end,
 }
@@ -625,3 +681,6 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(_look_at_surprises):
         bpy.app.timers.unregister(_look_at_surprises)
     events.ignore_all({**_HANDLERS, **_FRAME_HANDLERS})
+    for event in ("frame_change_post", "depsgraph_update_post"):
+        for function in _LAST:
+            events.ignore(event, function)

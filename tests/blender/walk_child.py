@@ -69,6 +69,7 @@ class Child:
 
     def start(self, _request: dict) -> dict:
         self.claims, self.wrong = {}, []
+        self.side.set_safe(False)
         self.operations.start(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
         # Those of a file that a walk before has left broken.
@@ -259,7 +260,9 @@ class Child:
                 found[f"object {obj.name_full}"] = self.object_state(obj)
         for obj in self.walker.objects("ARMATURE"):
             if obj.library is None and obj.users_collection:
-                found[f"armature {obj.name_full}"] = [bone.name for bone in obj.data.bones]
+                # Those of edit mode are known to others when Blender next needs them.
+                bones = [] if obj.data.is_editmode else [bone.name for bone in obj.data.bones]
+                found[f"armature {obj.name_full}"] = bones
         return found
 
     def object_state(self, obj) -> dict[str, object]:
