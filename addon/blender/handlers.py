@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
 from . import attach, drive, driven, events, note, overrides, points, properties, redraw, stack
-from .changes import Changes
+from .changes import Changes, names_of_touched_meshes
 from .driven import Driven
 from .gate import Gate
 from .heat import heat_map, heat_view, measures
@@ -42,7 +42,7 @@ class Session:
     is_saving: bool = False  # Blender writes the file: nothing may change
     is_late: bool = False  # something waits for the end of a render
     is_rendering: bool = False
-    seen: set[int] | None = None  # meshes touched before others were called after Sinew
+    seen: set[str] | None = None  # meshes touched before others were called after Sinew
     all_left: bool = False  # to Blender, and nothing but what they are told of can change that
 
     @property
@@ -398,18 +398,22 @@ def _ignore_frames() -> None:
 def _hear_after_others(event: str, function: Callable) -> None:
     """Before an event: has Blender call `_LAST` after all others where some come behind `function`. Two of
     them, as Blender leaves out the one behind a function that takes itself off."""
-    if session.seen is not None or events.is_last(event, _LAST[-1]) or events.is_last(event, function):
+    if session.seen is not None or events.is_last(event, function):
         return
-    if session.objects and events.others_follow(event, function):
-        for each in _LAST:
-            events.ignore(event, each)
+    are_there = events.is_last(event, _LAST[-1])
+    are_needed = bool(session.objects) and events.others_follow(event, function)
+    if are_there == are_needed:
+        return
+    for each in _LAST:
+        events.ignore(event, each)
+        if are_needed:
             events.hear(event, each)
 
 
 def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
     """At the end of Sinew's own reaction to an event."""
     are_called = events.is_last(event, _LAST[-1])
-    session.seen = Changes.meshes_in(depsgraph) or set() if are_called else None
+    session.seen = names_of_touched_meshes(depsgraph) if are_called else None
 
 
 @persistent
@@ -417,15 +421,20 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
     of updates at once. A mesh that was there before they were called may have changed once more."""
     seen, session.seen = session.seen, None
-    meshes = Changes.meshes_in(depsgraph) if seen is not None else None
-    if not meshes:
+    names = names_of_touched_meshes(depsgraph) if seen is not None else set()
+    if not names:
         return
+    new = Changes(complete=True)
     with turn() as is_ours:
         for obj, state in session.known:
             with contextlib.suppress(ReferenceError):
-                state.is_suspect |= obj.data.session_uid in meshes & seen
-        if meshes - seen:
-            _react(depsgraph, Changes(touched=meshes - seen, meshes=meshes - seen, complete=True), is_ours)
+                if obj.data.name_full in names & seen:
+                    state.is_suspect = True
+                elif obj.data.name_full in names:
+                    new.meshes.add(obj.data.session_uid)
+        if new.meshes:
+            new.touched |= new.meshes
+            _react(depsgraph, new, is_ours)
     _end_of_announced()
 
 

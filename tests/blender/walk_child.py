@@ -283,11 +283,16 @@ class Child:
             found["weights"] = zlib.crc32(
                 repr([(g.group, round(g.weight, 6)) for v in obj.data.vertices for g in v.groups]).encode()
             )
+        keyed = {c.data_path for c in self.sides.curves_of(obj)}
         if not side.is_on(obj) and obj.mode == "OBJECT":
             found["armature modifiers"] = [
                 {
                     "name": m.name,
-                    "on": (m.show_viewport, m.show_render),
+                    # Keyed ones are as Blender has evaluated them last, which it does not while hidden.
+                    "on": [
+                        getattr(m, name) if m.path_from_id(name) not in keyed else "keyed"
+                        for name in ("show_viewport", "show_render")
+                    ],
                     "object": m.object.name_full if m.object is not None else "",
                     "volume": side.preserve_volume(m),
                     "options": (m.use_multi_modifier, m.vertex_group, m.invert_vertex_group),

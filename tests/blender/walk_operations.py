@@ -423,7 +423,8 @@ def restart(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.3)
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    # Blender's own button does not take what comes from a library off an override.
+    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
     if obj is None or not w.side.is_on(obj):
         return None
     w.side.delete_part(obj, "modifier")
@@ -656,8 +657,9 @@ def parent(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
-    """The command gives a mesh an Armature modifier where none of its own has the armature."""
-    obj, rig = w.mesh(r), w.armature(r)
+    """The command gives a mesh an Armature modifier where none of its own points to the armature, as those do
+    not that Sinew has cleared."""
+    obj, rig = w.mesh(r, lambda o: not w.side.is_driven(o)), w.armature(r)
     is_plain = obj is not None and obj.override_library is None and obj.parent_type != "ARMATURE"
     if not is_plain or rig is None or len(w.modifiers(obj)) > 5 or not w.select(obj, rig):
         return None
@@ -1284,7 +1286,12 @@ def delete_object(w: Walker, r: random.Random) -> str | None:
 @operation(0.2)
 def delete_armature(w: Walker, r: random.Random) -> str | None:
     rig, by_script = w.armature(r), r.random() < 0.4
-    return _delete(w, rig, by_script) if len(w.armatures()) > 1 else None
+    if len(w.armatures()) < 2 or w.compared:
+        # A comparison's copies keep it in the file.
+        return None
+    # So does what Sinew is on, where the command does not take it out of the file by itself.
+    by_script |= any(w.side.is_driven(obj) for obj in w.objects("MESH"))
+    return _delete(w, rig, by_script)
 
 
 @operation(1.5)
