@@ -22,7 +22,6 @@ from ..batch.workers import run_here, run_in_dask, run_on_this_machine
 from ..blender_process import Limits
 from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
-from ..core.html_templates import NO_PAGES, can_render
 from ..core.output import folder_to_write, writing
 from .arguments import count, seconds
 from .console import BatchProgress, Console
@@ -356,8 +355,6 @@ def _conclude(console: Console, action: Action, rows: list[dict], summary: dict,
     unchanged = f", {summary['unchanged']} of them before" if summary["unchanged"] else ""
     console.say(f"{len(complete)} of {len(rows)} files {action.done}{unchanged}")
     console.say(str(report))
-    if not can_render():
-        console.note(f"report.html is left out: {NO_PAGES}")
     return 1 if bad else 0
 
 

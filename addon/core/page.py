@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-
-import numpy as np
 
 from .comparison import Comparison
 from .diagnostics import Finding
 from .heat import HeatScale, viridis
-from .html_templates import render
-from .metrics import Summary
 from .plots import colour_of, line_plot
 
 # Title, unit and entries of the summaries: a line for each method and entry.
@@ -46,40 +44,25 @@ class Sheet:
     legend: HeatScale | None = None
 
 
-OVERVIEW_COLUMNS = (
-    ("Method", ""),
-    ("Distance", "largest, at frame"),
-    ("Volume", "least and most, against rest"),
-    ("Area", "least and most, against rest"),
-    ("Edge stretch", "RMS, longest, shortest"),
-    ("Flipped faces", "most, at frame"),
-    ("Bulge", "farthest out, farthest in"),
-    ("Time a frame", "Blender's whole frame, of it Sinew"),
-)
-
-
 def page(comparison: Comparison, sheets: Sequence[Sheet], note: str = "") -> str:
-    """note  one sentence for the top: what was not possible
-
-    Raises SinewError where Jinja2 is missing.
-    """
-    number_columns, number_rows = _numbers(comparison)
-    return render(
-        "comparison.html",
-        title=f"{comparison.file}: {', '.join(comparison.meshes)}",
-        comparison=comparison,
-        about=_about(comparison),
-        note=note,
-        methods=_methods(comparison),
-        overview_columns=OVERVIEW_COLUMNS,
-        diagnostics={
-            mesh: [(finding, _where(finding)) for finding in findings]
-            for mesh, findings in comparison.findings.items()
-        },
-        plots=_plots(comparison) if len(comparison.frames) > 1 else (),
-        sheets=[_sheet(sheet, comparison.unit) for sheet in sheets],
-        number_columns=number_columns,
-        number_rows=number_rows,
+    """note  one sentence for the top: what was not possible"""
+    title = f"{comparison.file}: {', '.join(comparison.meshes)}"
+    body = [
+        f"<h1>{escape(comparison.file)}</h1>",
+        f'<p class="faint">{_about(comparison)}</p>',
+        f'<p class="note">{escape(note)}</p>' if note else "",
+        _overview(comparison),
+        _diagnostics(comparison),
+        _plots(comparison) if len(comparison.frames) > 1 else "",
+        *(_sheet(sheet, comparison) for sheet in sheets),
+        _numbers(comparison),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+        + "\n".join(part for part in body if part)
+        + "\n</body>\n</html>\n"
     )
 
 
@@ -88,23 +71,30 @@ def _about(comparison: Comparison) -> str:
     span = f"frame {frames[0]}" if len(frames) == 1 else f"{len(frames)} frames, {frames[0]} to {frames[-1]}"
     lengths = "metres" if comparison.unit == "m" else "Blender's units"
     return (
-        f"{', '.join(comparison.meshes)}: {rest.vertices:,} vertices, {rest.triangles:,} triangles, "
+        f"{escape(', '.join(comparison.meshes))}: {rest.vertices:,} vertices, {rest.triangles:,} triangles, "
         f"diagonal {comparison.length(rest.diagonal)}, {span}. Lengths are in {lengths}; shapes are "
         "measured as the skinning leaves them, before the modifiers behind it. Distances are "
-        f"measured to: {_method(comparison, comparison.reference)}. {rest.note}"
+        f"measured to: {escape(_method(comparison, comparison.reference))}. {escape(rest.note)}"
     )
 
 
-def _methods(comparison: Comparison) -> list[dict[str, object]]:
-    return [
-        {
-            "name": method,
-            "label": label,
-            "colour": colour_of(number),
-            "overview": _overview_cells(comparison, method),
-        }
+def _overview(comparison: Comparison) -> str:
+    columns = (
+        ("Method", ""),
+        ("Distance", "largest, at frame"),
+        ("Volume", "least and most, against rest"),
+        ("Area", "least and most, against rest"),
+        ("Edge stretch", "RMS, longest, shortest"),
+        ("Flipped faces", "most, at frame"),
+        ("Bulge", "farthest out, farthest in"),
+        ("Time a frame", "Blender's whole frame, of it Sinew"),
+    )
+    head = "".join(f'<th>{name}<br><span class="faint">{hint}</span></th>' for name, hint in columns)
+    rows = [
+        (f"{_key(number)}{escape(label)} {_faint(method)}", *_overview_cells(comparison, method))
         for number, (method, label) in enumerate(comparison.methods.items())
     ]
+    return f'<div class="wide"><table><tr>{head}</tr>{_table_rows(rows)}</table></div>'
 
 
 def _overview_cells(comparison: Comparison, method: str) -> list[str]:
@@ -137,11 +127,19 @@ def _overview_cells(comparison: Comparison, method: str) -> list[str]:
     ]
 
 
-def _where(finding: Finding) -> list[str]:
-    """Groups, vertices and frames of a finding, one text for each that it has."""
+def _diagnostics(comparison: Comparison) -> str:
+    blocks = []
+    for mesh, findings in comparison.findings.items():
+        title = f"<h3>{escape(mesh)}</h3>" if len(comparison.findings) > 1 else ""
+        text = "".join(_finding(finding) for finding in findings) or "<p>Nothing found.</p>"
+        blocks.append(title + text)
+    return f"<h2>Diagnostics</h2>{''.join(blocks)}"
+
+
+def _finding(finding: Finding) -> str:
     where = []
     if finding.groups:
-        where.append("Groups: " + ", ".join(finding.groups))
+        where.append("Groups: " + escape(", ".join(finding.groups)))
     if len(finding.vertices):
         first = ", ".join(map(str, finding.vertices[:12]))
         more = len(finding.vertices) - 12
@@ -150,10 +148,14 @@ def _where(finding: Finding) -> list[str]:
         )
     if finding.frames:
         where.append(f"Frames: {_frame_list(finding.frames)}")
-    return where
+    return (
+        f'<div class="finding"><b>{escape(finding.title)}: {finding.count:,}</b>'
+        f"<p>{escape(finding.meaning)} <i>{escape(finding.advice)}</i></p>"
+        f'<p class="faint">{". ".join(where)}.</p></div>'
+    )
 
 
-def _plots(comparison: Comparison) -> list[str]:
+def _plots(comparison: Comparison) -> str:
     plots = []
     for title, unit, entries in PLOTS:
         factor = 100.0 if unit == "percent" else 1.0
@@ -163,28 +165,46 @@ def _plots(comparison: Comparison) -> list[str]:
         }
         shown = {"length": comparison.unit, "percent": "%"}.get(unit, unit)
         plots.append(line_plot(title, shown, comparison.frames, lines))
-    return plots
+    keys = "".join(
+        f"<span>{_key(number)}{escape(label)}</span>"
+        for number, label in enumerate(comparison.methods.values())
+    )
+    return f'<h2>Over the frames</h2><p class="keys">{keys}</p><div class="plots">{"".join(plots)}</div>'
 
 
-def _sheet(sheet: Sheet, unit: str) -> dict[str, object]:
-    legend = None if sheet.legend is None else _legend(sheet.legend, unit)
-    return {"title": sheet.title, "text": sheet.text, "rows": sheet.rows, "legend": legend}
+def _sheet(sheet: Sheet, comparison: Comparison) -> str:
+    head = "<th></th>" + "".join(
+        f"<th>{escape(label)} {_faint(method)}</th>" for method, label in comparison.methods.items()
+    )
+    rows = []
+    for row in sheet.rows:
+        cells = "".join(
+            f'<td><img alt="{escape(path.stem)}" src="{_data(path)}"></td>' for path in row.pictures
+        )
+        rows.append(f"<tr><th>{escape(row.label)}</th>{cells}</tr>")
+    legend = _legend(sheet.legend, comparison.unit) if sheet.legend is not None else ""
+    return (
+        f"<h2>{escape(sheet.title)}</h2><p>{escape(sheet.text)}</p>{legend}"
+        f'<div class="wide"><table class="sheet"><tr>{head}</tr>{"".join(rows)}</table></div>'
+    )
 
 
-def _legend(scale: HeatScale, unit: str) -> dict[str, object]:
+def _legend(scale: HeatScale, unit: str) -> str:
+    stops = ", ".join(
+        f"rgb({round(255 * r)},{round(255 * g)},{round(255 * b)})"
+        for r, g, b in viridis([number / 16 for number in range(17)])
+    )
     texts = legend_texts(scale, unit)
-    last = len(texts) - 1
-    return {
-        "stops": [
-            f"rgb({round(255 * r)},{round(255 * g)},{round(255 * b)})"
-            for r, g, b in viridis(np.linspace(0.0, 1.0, 17))
-        ],
-        # Each is centred below its colour, except those at the ends.
-        "ticks": [
-            {"percent": 100 * number / last, "shift": {0: 0, last: 100}.get(number, 50), "text": text}
-            for number, text in enumerate(texts)
-        ],
-    }
+    ticks = []
+    for number, text in enumerate(texts):
+        place = 100 * number / (len(texts) - 1)
+        # Centred below its colour, but for those at the ends.
+        shift = {0: 0, len(texts) - 1: 100}.get(number, 50)
+        ticks.append(f'<span style="left:{place}%;transform:translateX(-{shift}%)">{escape(text)}</span>')
+    return (
+        f'<div class="legend"><div class="ramp" style="background:linear-gradient(to right, {stops})"></div>'
+        f'<div class="ticks">{"".join(ticks)}</div></div>'
+    )
 
 
 def legend_texts(scale: HeatScale, unit: str) -> list[str]:
@@ -202,9 +222,8 @@ def legend_texts(scale: HeatScale, unit: str) -> list[str]:
     return texts
 
 
-def _numbers(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of the table of all frames."""
-    entries: list[tuple[str, Callable[[Summary], str]]] = [
+def _numbers(comparison: Comparison) -> str:
+    entries = [
         ("Distance, largest", lambda s: comparison.length(s.distance_max)),
         ("RMS", lambda s: comparison.length(s.distance_rms)),
         ("Volume", lambda s: _percent(s.volume_change)),
@@ -217,11 +236,27 @@ def _numbers(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
         ("in", lambda s: comparison.length(s.bulge_min)),
     ]
     rows = [
-        [str(frame), label, *(text(comparison.summaries[method][index]) for _name, text in entries)]
+        (str(frame), escape(label), *(text(comparison.summaries[method][index]) for _name, text in entries))
         for index, frame in enumerate(comparison.frames)
         for method, label in comparison.methods.items()
     ]
-    return ["Frame", "Method", *(name for name, _text in entries)], rows
+    head = "".join(f"<th>{escape(name)}</th>" for name in ("Frame", "Method", *(name for name, _ in entries)))
+    return (
+        "<h2>All frames</h2><details><summary>Numbers of every frame</summary>"
+        f'<div class="wide"><table><tr>{head}</tr>{_table_rows(rows)}</table></div></details>'
+    )
+
+
+def _table_rows(rows: Sequence[Sequence[str]]) -> str:
+    return "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+
+
+def _key(number: int) -> str:
+    return f'<span class="key" style="background:{colour_of(number)}"></span>'
+
+
+def _faint(text: str) -> str:
+    return f'<span class="faint">{escape(text)}</span>'
 
 
 def _method(comparison: Comparison, method: str) -> str:
@@ -242,7 +277,7 @@ def _percent_range(values: Sequence[float]) -> str:
 
 
 def _frame_list(frames: Sequence[float]) -> str:
-    """Frames as "3, 7 to 12, 20"."""
+    """ "3, 7 to 12, 20"."""
     runs: list[list[float]] = []
     for frame in frames:
         if runs and frame == runs[-1][-1] + 1:
@@ -250,3 +285,36 @@ def _frame_list(frames: Sequence[float]) -> str:
         else:
             runs.append([frame])
     return ", ".join(" to ".join(map(str, run)) for run in runs)
+
+
+def _data(path: Path) -> str:
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+_STYLE = """
+:root { color-scheme: light dark; --text: #1d1f23; --faint: #676c74; --line: #d5d8dd; --back: #fff;
+  --cell: #3a3d42; --warn: #8a5a00; }
+@media (prefers-color-scheme: dark) { :root { --text: #e8e8e8; --faint: #a0a4aa; --line: #43474e;
+  --back: #1b1d20; --warn: #e3b341; } }
+body { font: 14px/1.45 system-ui, sans-serif; color: var(--text); background: var(--back);
+  margin: 24px auto; max-width: 1500px; padding: 0 24px; }
+h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 32px 0 8px; }
+p { margin: 4px 0 10px; max-width: 100ch; } .faint { color: var(--faint); font-weight: normal; }
+.note { color: var(--warn); } .wide { overflow-x: auto; }
+table { border-collapse: collapse; } td, th { padding: 4px 12px 4px 0; text-align: left;
+  vertical-align: top; border-bottom: 1px solid var(--line); font-variant-numeric: tabular-nums; }
+.sheet td, .sheet th { border: 0; padding: 4px 8px 4px 0; }
+.sheet tr > th:first-child { min-width: 5em; max-width: 9em; }
+.sheet img { display: block; max-width: 100%; min-width: 160px; background: var(--cell); border-radius: 6px; }
+.key { display: inline-block; width: 14px; height: 10px; border-radius: 2px; margin-right: 6px; }
+.keys > span { margin-right: 20px; } .finding { margin: 10px 0; padding-left: 12px;
+  border-left: 3px solid var(--warn); } .finding p { margin: 2px 0; }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(380px, 1fr)); gap: 12px; }
+.plot { width: 100%; } .plot text { font: 11px system-ui, sans-serif; fill: var(--text); }
+.plot .plot-title { font-size: 13px; font-weight: 600; } .plot .faint { fill: var(--faint); }
+.plot polyline { fill: none; stroke-linejoin: round; }
+.plot .grid { stroke: var(--line); } .plot .axis { stroke: var(--faint); }
+.legend { max-width: 560px; margin: 6px 0 10px; } .ramp { height: 14px; border-radius: 3px; }
+.ticks { position: relative; height: 18px; font-size: 12px; }
+.ticks span { position: absolute; white-space: nowrap; }
+"""
