@@ -37,15 +37,15 @@ int main() {
     for (const Kind kind : {Kind::chain, Kind::shuffled, Kind::character}) {
         Scene scene = make_scene({kind, 10'000});
         const std::string of = std::string("/") + kKindNames[static_cast<int>(kind)];
-        for (const Method& method : kMethods) {
-            const Deformer deformer(method.id, scene.data());
+        for (const MethodInfo& method : kMethods) {
+            const Deformer deformer(scene.data(), method);
             count(std::string(method.name) + of, [&] { deformer.deform(scene.pose, {{}, 1}, scene.points); });
         }
-        count("bind" + of, [&] { const Deformer deformer(MethodId::dq, scene.data()); });
+        count("bind" + of, [&] { const Deformer deformer(scene.data(), Dq::info); });
     }
     Scene bones = make_scene({Kind::chain, 1000, 1000, 1});
-    for (const Method& method : kMethods) {
-        const Deformer deformer(method.id, bones.data());
+    for (const MethodInfo& method : kMethods) {
+        const Deformer deformer(bones.data(), method);
         count(std::string(method.name) + "/bones", [&] {
             deformer.deform(bones.pose, {{}, 1}, bones.points);
         });

@@ -18,10 +18,10 @@ using namespace sinew::bench;
 
 struct Bound {
     Scene scene;
-    std::map<MethodId, Deformer> deformers;
+    std::map<int, Deformer> deformers;  // by the number of the method
 
-    const Deformer& deformer(MethodId method) {
-        return deformers.try_emplace(method, method, scene.data()).first->second;
+    const Deformer& deformer(const MethodInfo& method) {
+        return deformers.try_emplace(method.number, scene.data(), method).first->second;
     }
 };
 
@@ -37,7 +37,7 @@ Bound& bound(const Shape& shape) {
 
 Scene& scene_of(const Shape& shape) { return bound(shape).scene; }
 
-void ours(benchmark::State& state, MethodId method, const Shape& shape, std::size_t threads) {
+void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape, std::size_t threads) {
     Scene& scene = scene_of(shape);
     const Deformer& deformer = bound(shape).deformer(method);
     for (auto _ : state) {
@@ -46,30 +46,25 @@ void ours(benchmark::State& state, MethodId method, const Shape& shape, std::siz
     }
 }
 
-void glm_loop(benchmark::State& state, MethodId method, const Shape& shape) {
-    Scene& scene = scene_of(shape);
-    glm::vec3* const points = scene.points.data();
-    for (auto _ : state) {
-        switch (method) {
-            case MethodId::lbs: plain::lbs(scene.plain, scene.matrices, points); break;
-            case MethodId::dq: plain::dq(scene.plain, scene.dual_quats, points); break;
-            case MethodId::qv: plain::qv(scene.plain, scene.rotations, scene.translations, points); break;
-        }
-        benchmark::ClobberMemory();
-    }
-}
+// The loops that one writes first, of methods that have some.
+void glm_loop(Lbs, Scene& s) { plain::lbs(s.plain, s.matrices, s.points.data()); }
+void glm_loop(Dq, Scene& s) { plain::dq(s.plain, s.dual_quats, s.points.data()); }
+void glm_loop(Qv, Scene& s) { plain::qv(s.plain, s.rotations, s.translations, s.points.data()); }
+void eigen_loop(Lbs, Scene& s) { plain::eigen::lbs(s.plain, s.matrices, s.points.data()); }
+void eigen_loop(Dq, Scene& s) { plain::eigen::dq(s.plain, s.dual_quats, s.points.data()); }
+void eigen_loop(Qv, Scene& s) { plain::eigen::qv(s.plain, s.rotations, s.translations, s.points.data()); }
 
-void eigen_loop(benchmark::State& state, MethodId method, const Shape& shape) {
+template <class Method>
+concept HasPlainLoops = requires(Scene& scene) {
+    glm_loop(Method{}, scene);
+    eigen_loop(Method{}, scene);
+};
+
+template <class Loop>
+void plain_loop(benchmark::State& state, const Loop& loop, const Shape& shape) {
     Scene& scene = scene_of(shape);
-    glm::vec3* const points = scene.points.data();
     for (auto _ : state) {
-        switch (method) {
-            case MethodId::lbs: plain::eigen::lbs(scene.plain, scene.matrices, points); break;
-            case MethodId::dq: plain::eigen::dq(scene.plain, scene.dual_quats, points); break;
-            case MethodId::qv:
-                plain::eigen::qv(scene.plain, scene.rotations, scene.translations, points);
-                break;
-        }
+        loop(scene);
         benchmark::ClobberMemory();
     }
 }
@@ -77,14 +72,14 @@ void eigen_loop(benchmark::State& state, MethodId method, const Shape& shape) {
 void bind(benchmark::State& state, const Shape& shape) {
     const Scene& scene = scene_of(shape);
     for (auto _ : state) {
-        const Deformer deformer(MethodId::dq, scene.data());
+        const Deformer deformer(scene.data(), Dq::info);
         benchmark::DoNotOptimize(&deformer);
     }
 }
 
 void new_rest_points(benchmark::State& state, const Shape& shape) {
     const Scene& scene = scene_of(shape);
-    Deformer deformer(MethodId::dq, scene.data());
+    Deformer deformer(scene.data(), Dq::info);
     for (auto _ : state) deformer.set_rest_points(scene.plain.rest_points);
 }
 
@@ -106,25 +101,29 @@ void register_all() {
             const Shape shape{kind, vertices};
             const std::string scene =
                 std::string("/") + kKindNames[static_cast<int>(kind)] + "/" + std::to_string(vertices);
-            for (const Method& row : kMethods) {
-                const MethodId method = row.id;
-                const std::string of = "/" + std::string(row.name) + scene;
+            for_each_method([&]<class Method>(Method) {
+                const std::string of = "/" + std::string(Method::info.name) + scene;
                 for (const std::size_t threads : {1, 2}) {
                     add("sinew" + std::to_string(threads) + of,
-                        [=](benchmark::State& s) { ours(s, method, shape, threads); });
+                        [=](benchmark::State& s) { ours(s, Method::info, shape, threads); });
                 }
-                add("glm" + of, [=](benchmark::State& s) { glm_loop(s, method, shape); });
-                add("eigen" + of, [=](benchmark::State& s) { eigen_loop(s, method, shape); });
-            }
+                if constexpr (HasPlainLoops<Method>) {
+                    add("glm" + of, [=](benchmark::State& s) {
+                        plain_loop(s, [](Scene& data) { glm_loop(Method{}, data); }, shape);
+                    });
+                    add("eigen" + of, [=](benchmark::State& s) {
+                        plain_loop(s, [](Scene& data) { eigen_loop(Method{}, data); }, shape);
+                    });
+                }
+            });
             if (vertices != 100'000) continue;
             add("bind/dq" + scene, [=](benchmark::State& s) { bind(s, shape); });
             add("rest/dq" + scene, [=](benchmark::State& s) { new_rest_points(s, shape); });
         }
     }
     const auto add_cost = [](const std::string& influences, const Shape& shape) {
-        for (const Method& row : kMethods) {
-            const MethodId method = row.id;
-            add("cost/" + std::string(row.name) + "/" + influences + "/" + std::to_string(shape.bones),
+        for (const MethodInfo& method : kMethods) {
+            add("cost/" + std::string(method.name) + "/" + influences + "/" + std::to_string(shape.bones),
                 [=](benchmark::State& s) { ours(s, method, shape, 1); });
         }
     };

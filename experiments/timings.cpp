@@ -175,7 +175,7 @@ void add_skinning(std::string_view name) {
 
 /// Sinew's kernels: a mesh of kMesh vertices at once on one thread, until there are kBlends; three bones to a
 /// vertex, runs of neighbours with the same three, as a mesh has.
-void add_kernels(sinew::MethodId method, std::string_view name) {
+void add_kernels(const sinew::MethodInfo& method, std::string_view name) {
     struct Scene {
         sinew::Deformer deformer;
         std::vector<sinew::Affine<float>> pose;
@@ -198,7 +198,7 @@ void add_kernels(sinew::MethodId method, std::string_view name) {
         offsets.push_back(static_cast<std::int32_t>(bones.size()));
     }
     const auto scene =
-        std::make_shared<Scene>(Scene{sinew::Deformer(method, {rest, offsets, bones, shares, {}}),
+        std::make_shared<Scene>(Scene{sinew::Deformer({rest, offsets, bones, shares, {}}, method),
                                       transforms<Ours<sinew::Affine>>(), std::vector<glm::vec3>(count)});
     const auto run = [scene, times](benchmark::State& state) {
         const sinew::DeformOptions options{.threads = 1};
@@ -266,9 +266,9 @@ void add_all() {
     add_skinning<sinew::Lbs>("sinew_lbs");
     add_skinning<sinew::Qv>("sinew_qv");
     add_skinning<sinew::Dq>("sinew_dq");
-    add_kernels(sinew::MethodId::lbs, "kernel_lbs");
-    add_kernels(sinew::MethodId::qv, "kernel_qv");
-    add_kernels(sinew::MethodId::dq, "kernel_dq");
+    add_kernels(sinew::Lbs::info, "kernel_lbs");
+    add_kernels(sinew::Qv::info, "kernel_qv");
+    add_kernels(sinew::Dq::info, "kernel_dq");
     add_blend<Glm4x4>("glm_4x4");
     add_blend<GlmPair>("glm_quat_vec");
     add_blend<GlmDualQuat>("glm_dual_quat");

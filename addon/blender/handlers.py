@@ -19,7 +19,7 @@ from .gate import Gate
 from .heat import heat_map, heat_view, measures
 from .in_evaluation import Answers
 from .plan import Plan, State
-from .updates import is_rendering_in_window, turn, updates_suspended
+from .updates import is_main_thread, is_rendering_in_window, turn, updates_suspended
 
 log = logging.getLogger("sinew")
 
@@ -485,6 +485,14 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     _note_seen("frame_change_post", depsgraph)
 
 
+def _look_at_surprises() -> float:
+    """What another add-on's handler changed behind Sinew's, Blender evaluates without telling anybody: in a
+    window it is seen to a moment later."""
+    if any(state.is_surprised for _obj, state in session.known):
+        refresh(bpy.context)
+    return 0.25
+
+
 def _end_of_announced() -> None:
     """What Blender evaluates from here to the next event is for a handler that changed something."""
     for _obj, state in session.known:
@@ -507,8 +515,11 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, is_ours: bool) -> None:
     """To an evaluation. What Sinew itself causes, and what Blender evaluates while it saves, is only noted:
-    it may have listed what others changed, too."""
-    if not is_ours or session.is_saving:
+    it may have listed what others changed, too. So is what the window shows while it renders: points that are
+    written after the update are those of the render's frame then."""
+    waits_for_render = is_rendering_in_window() and is_main_thread()
+    session.is_late |= waits_for_render
+    if not is_ours or session.is_saving or waits_for_render:
         if session.missed is None:
             session.missed = changes
         else:
@@ -662,6 +673,8 @@ def register() -> None:
     properties.listeners.heat_changed = _heat_changed
     measures.Listener.changed = refresh
     events.hear_all(_HANDLERS)
+    if not bpy.app.background:
+        bpy.app.timers.register(_look_at_surprises, first_interval=1.0, persistent=True)
 
 
 def adopt_open_file() -> None:
@@ -674,6 +687,8 @@ def adopt_open_file() -> None:
 
 def unregister() -> None:
     session.forget()
+    if bpy.app.timers.is_registered(_look_at_surprises):
+        bpy.app.timers.unregister(_look_at_surprises)
     events.ignore_all({**_HANDLERS, **_FRAME_HANDLERS})
     for event in ("frame_change_post", "depsgraph_update_post"):
         for function in _LAST:

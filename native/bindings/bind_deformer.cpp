@@ -3,10 +3,13 @@
 #include <limits>
 #include <optional>
 
+#include <pybind11/stl.h>
+
 #include "arrays.h"
 #include "gil.h"
 #include "module.h"
 #include "sinew/deform/deformer.h"
+#include "sinew/skinning/methods.h"
 
 namespace sinew::bindings {
 namespace {
@@ -24,28 +27,75 @@ std::span<const T> as_span(const py::array_t<T>& array) {
     return {array.data(), static_cast<std::size_t>(array.size())};
 }
 
-Method checked_method(const py::object& method) {
+std::string names_of_methods() {
     std::string names;
-    for (const Method& row : kMethods) names += (names.empty() ? "" : ", ") + std::string(row.name);
-    const std::string name = checked_name(method, "method", "one of " + names);
-    if (const std::optional<Method> row = find_method(name)) return *row;
-    fail("method", "one of " + names, "'" + name + "'");
+    for (const MethodInfo& method : kMethods) {
+        if (!names.empty()) names += ", ";
+        names += method.name;
+    }
+    return names;
+}
+
+MethodInfo checked_method(const py::object& method, const char* argument) {
+    const std::string wanted = "one of " + names_of_methods();
+    const std::string name = checked_name(method, argument, wanted);
+    if (const std::optional<MethodInfo> found = find_method(name)) return *found;
+    fail(argument, wanted, "'" + name + "'");
+}
+
+/// The arrays that BindData points at.
+struct BindArrays {
+    py::array_t<float> points;
+    py::array_t<std::int32_t> offsets;
+    py::array_t<std::int32_t> bones;
+    py::array_t<float> weights;
+    std::vector<Affine<float>> rest_bones;
+
+    [[nodiscard]] BindData data() const {
+        return {as_points(points), as_span(offsets), as_span(bones), as_span(weights), rest_bones};
+    }
+};
+
+BindArrays checked_arrays(const py::object& rest_points, const py::object& influence_offsets,
+                          const py::object& influence_bones, const py::object& influence_weights,
+                          const py::object& rest_bones) {
+    BindArrays arrays{
+        checked_points(rest_points, "rest_points"),
+        checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]",
+                              kMaxVertices + 1),
+        checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences),
+        checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences),
+        {}};
+    if (!rest_bones.is_none()) arrays.rest_bones = checked_affines(rest_bones, "rest_bones");
+    return arrays;
+}
+
+Binding make_binding(const py::object& rest_points, const py::object& influence_offsets,
+                     const py::object& influence_bones, const py::object& influence_weights,
+                     const py::object& rest_bones) {
+    return Binding(
+        checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights, rest_bones).data());
 }
 
 Deformer make_deformer(const py::object& rest_points, const py::object& influence_offsets,
                        const py::object& influence_bones, const py::object& influence_weights,
                        const py::object& method, const py::object& rest_bones) {
-    const Method row = checked_method(method);
-    const auto points = checked_points(rest_points, "rest_points");
-    const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1,
-                                               "int32 [vertices + 1]", kMaxVertices + 1);
-    const auto bones =
-        checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences);
-    const auto weights =
-        checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences);
-    std::vector<Affine<float>> axes;
-    if (!rest_bones.is_none()) axes = checked_affines(rest_bones, "rest_bones");
-    return Deformer(row.id, {as_points(points), as_span(offsets), as_span(bones), as_span(weights), axes});
+    const MethodInfo row = checked_method(method, "method");
+    return Deformer(
+        checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights, rest_bones).data(),
+        row);
+}
+
+Deformer make_deformer_of(const Binding& binding, const py::object& method, const py::object& mix) {
+    const MethodInfo first = checked_method(method, "method");
+    if (mix.is_none()) return Deformer(binding, first);
+    const char* const wanted = "None or (method, weights)";
+    if (!py::isinstance<py::tuple>(mix)) fail("mix", wanted, describe(mix));
+    const auto pair = py::reinterpret_borrow<py::tuple>(mix);
+    if (pair.size() != 2) fail("mix", wanted, "a tuple of " + std::to_string(pair.size()));
+    const MethodInfo second = checked_method(pair[0], "mix");
+    const auto weights = checked<float>(pair[1], "mix", 1, "weights float32 [vertices]", kMaxVertices);
+    return Deformer(binding, first, MixData{second, as_span(weights)});
 }
 
 // An array to write into: never a silent copy, or the caller's array would keep its old points.
@@ -155,36 +205,56 @@ void set_rest_points(Deformer& deformer, const py::object& rest_points) {
 }  // namespace
 
 void bind_deformer(py::module_& m) {
-    py::class_<Deformer>(m, "Deformer", "A mesh bound to bones, ready to be deformed at any pose.")
-        .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
-             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
-             py::arg("rest_bones") = py::none(),
+    py::class_<Binding>(m, "Binding",
+                        "A mesh bound to bones: immutable, and shared by the deformers made of it.")
+        .def(py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
+             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
              "rest_points: float32 [vertices, 3], model space.\n"
              "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
              "influence_bones: int32 [influences].\n"
              "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
              "    At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.\n"
-             "method: the name of one of sinew.methods().\n"
              "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the "
              "space\n"
              "    of the bone transforms; read where a bone is scaled and the method is rigid. None: "
              "identity.\n\n"
              "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
-        .def_property_readonly("method",
-                               [](const Deformer& deformer) {
-                                   for (const Method& row : kMethods) {
-                                       if (row.id == deformer.method()) return std::string(row.name);
-                                   }
-                                   return std::string();
-                               })
+        .def_property_readonly("vertex_count", &Binding::vertex_count)
+        .def_property_readonly("influence_count", &Binding::influence_count,
+                               "Influences of positive weight.")
+        .def_property_readonly("bone_count", &Binding::bone_count,
+                               "One more than the highest bone that an influence names.");
+
+    py::class_<Deformer>(m, "Deformer", "A binding and a method, ready to deform at any pose.")
+        .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
+             py::arg("mix") = py::none(),
+             "binding: a Binding; not copied.\n"
+             "method: the name of one of sinew.methods().\n"
+             "mix: None, or (name of another method, weights): weights float32 [vertices] say how much of the\n"
+             "    other method each vertex takes, from 0 (none) to 1 (all of it); clamped. As the stage `mix`.")
+        .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
+             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
+             py::arg("rest_bones") = py::none(),
+             "With a binding of its own, of the arguments that Binding has.")
+        .def_property_readonly(
+            "method", [](const Deformer& deformer) { return std::string(deformer.method().name); },
+            "The name of the method.")
+        .def_property_readonly(
+            "mixed_method",
+            [](const Deformer& deformer) -> std::optional<std::string> {
+                const MethodInfo* const method = deformer.mixed_method();
+                if (method == nullptr) return std::nullopt;
+                return std::string(method->name);
+            },
+            "The name of the method that `mix` adds, or None.")
         .def_property_readonly("vertex_count", &Deformer::vertex_count)
         .def_property_readonly("influence_count", &Deformer::influence_count,
                                "Influences of positive weight.")
         .def_property_readonly("bone_count", &Deformer::bone_count,
                                "One more than the highest bone that an influence names.")
         .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
-             "New rest points, float32 [vertices, 3], as when shape keys change. Other threads may deform\n"
-             "meanwhile: each of their results has the old points or the new ones.")
+             "New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. Other\n"
+             "threads may deform meanwhile: each of their results has the old points or the new ones.")
         .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
              py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
              py::arg("rest_inverses") = py::none(),

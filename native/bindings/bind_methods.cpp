@@ -3,36 +3,110 @@
 
 #include "module.h"
 #include "sinew/skinning/methods.h"
+#include "sinew/skinning/stages.h"
 
 namespace sinew::bindings {
+namespace {
 
 namespace py = pybind11;
 
+std::string text(std::string_view view) { return std::string(view); }
+
+/// None where the kind has none.
+py::object initial_value(const Parameter& parameter) {
+    switch (parameter.kind) {
+        case ParameterKind::number: return py::float_(parameter.initial);
+        case ParameterKind::integer: return py::int_(static_cast<long long>(parameter.initial));
+        case ParameterKind::boolean: return py::bool_(parameter.initial != 0.0);
+        case ParameterKind::choice:
+            return py::str(text(parameter.choices[static_cast<std::size_t>(parameter.initial)]));
+        case ParameterKind::vertex_group:
+        case ParameterKind::method: break;
+    }
+    return py::none();
+}
+
+py::object bound_of(const Parameter& parameter, double bound) {
+    if (!is_numeric(parameter.kind)) return py::none();
+    return py::float_(bound);
+}
+
+template <class Row, class Range>
+py::tuple tuple_of(const Range& range) {
+    py::tuple rows(range.size());
+    for (std::size_t i = 0; i < range.size(); ++i) rows[i] = py::cast(Row(range[i]));
+    return rows;
+}
+
+py::tuple names_of(Needs needs) {
+    if (needs == Needs::nothing) return py::tuple();
+    return py::make_tuple("rest_bones");
+}
+
+/// A property that is the text of this field.
+template <auto field, class Class>
+void def_text(Class& of, const char* name, const char* doc) {
+    of.def_property_readonly(
+        name, [](const typename Class::type& row) { return text(row.*field); }, doc);
+}
+
+/// What methods and stages have alike.
+template <class Row>
+void def_facts(py::class_<Row>& of, const char* type) {
+    def_text<&Row::name>(of, "name", "What programs say.");
+    def_text<&Row::label>(of, "label", "What people read.");
+    def_text<&Row::description>(of, "description", "One sentence: when to use it.");
+    def_text<&Row::source>(of, "source", "The papers.");
+    of.def_property_readonly(
+        "parameters", [](const Row& row) { return tuple_of<Parameter>(row.parameters); },
+        "Its settings, one Parameter each.");
+    of.def("__repr__", [type](const Row& row) { return "<sinew." + std::string(type) + " " + text(row.name) + ">"; });
+}
+
+}  // namespace
+
 void bind_methods(py::module_& m) {
-    py::class_<Method>(m, "Method", "A row of the table of skinning methods.")
+    py::class_<Parameter> parameter(m, "Parameter", "A setting of a method or of a stage.");
+    def_text<&Parameter::id>(parameter, "id", "What programs say.");
+    def_text<&Parameter::label>(parameter, "label", "What people read.");
+    def_text<&Parameter::description>(parameter, "description", "One sentence.");
+    def_text<&Parameter::unit>(parameter, "unit", "\"\", \"length\", \"angle\" (radians) or \"factor\".");
+    parameter
         .def_property_readonly(
-            "number", [](const Method& row) { return row.number; },
+            "kind", [](const Parameter& row) { return text(name_of(row.kind)); },
+            "\"float\", \"int\", \"bool\", \"enum\" (one of `choices`), \"vertex_group\" (a weight for each "
+            "vertex)\nor \"method\" (the name of a method).")
+        .def_property_readonly("default", &initial_value, "None for a vertex group and a method.")
+        .def_property_readonly(
+            "min", [](const Parameter& row) { return bound_of(row, row.minimum); },
+            "The least value of a number, -inf where there is none; None for other kinds.")
+        .def_property_readonly(
+            "max", [](const Parameter& row) { return bound_of(row, row.maximum); },
+            "The largest value of a number, inf where there is none; None for other kinds.")
+        .def_property_readonly(
+            "choices", [](const Parameter& row) { return tuple_of<std::string>(row.choices); },
+            "The values of an enum.")
+        .def("__repr__", [](const Parameter& row) { return "<sinew.Parameter " + text(row.id) + ">"; });
+
+    py::class_<MethodInfo> method(m, "Method", "The facts of a skinning method.");
+    def_facts(method, "Method");
+    method
+        .def_property_readonly(
+            "number", [](const MethodInfo& row) { return row.number; },
             "Number that .blend files store; never changes.")
         .def_property_readonly(
-            "name", [](const Method& row) { return std::string(row.name); },
-            "What programs say: the `method` of a Deformer.")
-        .def_property_readonly(
-            "label", [](const Method& row) { return std::string(row.label); }, "What people read.")
-        .def_property_readonly(
-            "description", [](const Method& row) { return std::string(row.description); },
-            "One sentence: when to use it.")
-        .def_property_readonly(
-            "needs", [](const Method& row) { return std::string(row.needs); },
-            "What it takes besides points, influences and bone transforms.")
-        .def("__repr__", [](const Method& row) { return "<sinew.Method " + std::string(row.name) + ">"; });
+            "needs", [](const MethodInfo& row) { return names_of(row.needs); },
+            "What it takes besides points, influences and bone transforms: \"rest_bones\" where bones are "
+            "scaled.");
+
+    py::class_<StageInfo> stage(m, "Stage", "The facts of a stage: what may follow a method.");
+    def_facts(stage, "Stage");
+
     m.def(
-        "methods",
-        [] {
-            py::tuple rows(kMethods.size());
-            for (std::size_t i = 0; i < kMethods.size(); ++i) rows[i] = py::cast(kMethods[i]);
-            return rows;
-        },
-        "Every skinning method, one Method each.");
+        "methods", [] { return tuple_of<MethodInfo>(kMethods); }, "Every skinning method, one Method each.");
+    m.def(
+        "stages", [] { return tuple_of<StageInfo>(kStages); },
+        "Every stage, one Stage each. `mix` is an argument of Deformer.");
 }
 
 }  // namespace sinew::bindings

@@ -257,7 +257,7 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
 
 
 @pytest.mark.parametrize("what", ["rename", "delete", "add", "delete object", "throw"])
-def test_suspended_modifiers_come_back_whatever_a_neighbour_does(neighbour, what):
+def test_suspended_modifiers_come_back_whatever_a_neighbour_does(monkeypatch, neighbour, what):
     obj, armature = scenes.make_arm()
     for name in ("Behind", "Further"):
         obj.modifiers.new(name, "CAST").factor = 0.1
@@ -265,7 +265,7 @@ def test_suspended_modifiers_come_back_whatever_a_neighbour_does(neighbour, what
     armature.keyframe_insert("location", frame=1)
     armature.location.x = 3.0
     armature.keyframe_insert("location", frame=11)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Twin", obj.data))
+    monkeypatch.setattr(safe_mode, "is_on", lambda: True)
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj, "dq")
     scenes.shapes(obj, [2, 3, 4])

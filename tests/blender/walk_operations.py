@@ -1585,6 +1585,24 @@ def render(w: Walker, r: random.Random) -> str | None:
     return "render"
 
 
+def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: list[int]) -> None:
+    """What another add-on does to an object, and to the modifier of that name."""
+    if what == "add":
+        obj.modifiers.new(new, "CAST")
+    elif what == "weights" and obj.vertex_groups:
+        obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
+    elif what == "move":
+        obj.location.z += 0.1
+    elif what == "name":
+        obj.name = new
+    elif what == "rename":
+        obj.modifiers[modifier].name = new
+    elif what == "toggle":
+        obj.modifiers[modifier].show_viewport = not obj.modifiers[modifier].show_viewport
+    elif what == "delete":
+        obj.modifiers.remove(obj.modifiers[modifier])
+
+
 @operation(0.7)
 def export(w: Walker, r: random.Random) -> str | None:
     """What another program gets."""
@@ -1640,21 +1658,7 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
 
     def act(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
         handlers.remove(act)
-        obj = bpy.data.objects[name]
-        if what == "add":
-            obj.modifiers.new(new, "CAST")
-        elif what == "weights" and obj.vertex_groups:
-            obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
-        elif what == "move":
-            obj.location.z += 0.1
-        elif what == "name":
-            obj.name = new
-        elif what == "rename":
-            obj.modifiers[modifier_name].name = new
-        elif what == "toggle":
-            obj.modifiers[modifier_name].show_viewport = not obj.modifiers[modifier_name].show_viewport
-        elif what == "delete":
-            obj.modifiers.remove(obj.modifiers[modifier_name])
+        meddle(bpy.data.objects[name], what, modifier_name, new, vertices)
 
     handlers.append(act)
     if when == "depsgraph_update_post":

@@ -25,9 +25,9 @@ using test::same_bits;
 using test::scaling;
 using test::Scene;
 
-class Deform : public testing::TestWithParam<Method> {
+class Deform : public testing::TestWithParam<MethodInfo> {
 protected:
-    static MethodId method() { return GetParam().id; }
+    static const MethodInfo& method() { return GetParam(); }
 };
 
 INSTANTIATE_TEST_SUITE_P(every, Deform, testing::ValuesIn(kMethods),
@@ -39,7 +39,7 @@ TEST_P(Deform, agrees_with_skinning_in_double) {
         for (std::uint32_t seed = 0; seed < 5; ++seed) {
             const Scene scene = random_scene(seed, 500, extent);
             const auto expected = in_double(method(), scene);
-            const auto points = deformed(Deformer(method(), scene.data()), scene);
+            const auto points = deformed(Deformer(scene.data(), method()), scene);
             for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
                 worst = std::max(worst, distance(Vec3<double>(points[vertex]), expected[vertex]) / extent);
             }
@@ -52,7 +52,7 @@ TEST_P(Deform, agrees_with_skinning_in_double) {
 TEST_P(Deform, threads_change_no_bit) {
     for (const std::size_t vertices : {0, 1, 4095, 4096, 4097, 8191, 8192, 8193, 12289, 20000}) {
         const Scene scene = random_scene(7, vertices, 1.0);
-        const Deformer deformer(method(), scene.data());
+        const Deformer deformer(scene.data(), method());
         const auto expected = deformed(deformer, scene, {{}, 1});
         for (std::size_t threads = 0; threads <= 8; ++threads) {
             const auto points = deformed(deformer, scene, {{}, threads});
@@ -69,7 +69,7 @@ TEST_P(Deform, vertices_without_weight_stay_to_the_bit) {
     const Vec3<float> rest(0.1f, -2e-20f, 3e20f);
     scene.add_vertex(rest, {});
     scene.add_vertex(rest, {{0, 0.0f}, {11, 0.0f}});
-    const Deformer deformer(method(), scene.data());
+    const Deformer deformer(scene.data(), method());
     DeformOptions options;
     for (int space = 0; space < 2; ++space) {
         const auto points = deformed(deformer, scene, options);
@@ -81,12 +81,12 @@ TEST_P(Deform, vertices_without_weight_stay_to_the_bit) {
 
 TEST_P(Deform, weights_are_normalised) {
     const Scene scene = random_scene(9, 200, 1.0);
-    const auto expected = deformed(Deformer(method(), scene.data()), scene);
+    const auto expected = deformed(Deformer(scene.data(), method()), scene);
     // Powers of two scale without rounding, so that nothing is left to differ.
     for (const float factor : {0x1p-80f, 0.25f, 0x1p80f}) {
         Scene scaled = scene;
         for (float& weight : scaled.weights) weight *= factor;
-        const auto points = deformed(Deformer(method(), scaled.data()), scaled);
+        const auto points = deformed(Deformer(scaled.data(), method()), scaled);
         for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
             ASSERT_TRUE(same_bits(points[vertex], expected[vertex])) << factor;
         }
@@ -99,14 +99,14 @@ TEST_P(Deform, the_largest_weights_do_not_overflow) {
     scene.add_vertex({1, 2, 3}, {{0, most}, {1, most}, {2, most}});
     Scene plain = random_scene(10, 0, 1.0);
     plain.add_vertex({1, 2, 3}, {{0, 1.0f}, {1, 1.0f}, {2, 1.0f}});
-    EXPECT_TRUE(same_bits(deformed(Deformer(method(), scene.data()), scene)[0],
-                          deformed(Deformer(method(), plain.data()), plain)[0]));
+    EXPECT_TRUE(same_bits(deformed(Deformer(scene.data(), method()), scene)[0],
+                          deformed(Deformer(plain.data(), method()), plain)[0]));
 }
 
 TEST_P(Deform, rest_pose_is_unchanged_to_the_bit) {
     Scene scene = random_scene(11, 500, 1000.0);
     scene.posed_from_rest.assign(scene.posed_from_rest.size(), {});
-    const auto points = deformed(Deformer(method(), scene.data()), scene);
+    const auto points = deformed(Deformer(scene.data(), method()), scene);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         ASSERT_TRUE(same_bits(points[vertex], scene.rest_points[vertex]));
     }
@@ -114,10 +114,10 @@ TEST_P(Deform, rest_pose_is_unchanged_to_the_bit) {
 
 TEST_P(Deform, new_rest_points_equal_a_new_deformer) {
     Scene scene = random_scene(12, 300, 1.0);
-    Deformer deformer(method(), scene.data());
+    Deformer deformer(scene.data(), method());
     for (Vec3<float>& point : scene.rest_points) point = 0.5f * point + Vec3<float>(0, 1, 0);
     deformer.set_rest_points(scene.rest_points);
-    const auto expected = deformed(Deformer(method(), scene.data()), scene);
+    const auto expected = deformed(Deformer(scene.data(), method()), scene);
     const auto points = deformed(deformer, scene);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         ASSERT_TRUE(same_bits(points[vertex], expected[vertex]));
@@ -128,10 +128,10 @@ TEST_P(Deform, bones_from_model_goes_there_and_back) {
     const Scene scene = random_scene(13, 300, 1.0);
     const Affine<double> turn = to_affine(QuatVec<double>{about<double>({1, 2, 3}, 40.0), {1, -2, 3}});
     const Affine<float> bones_from_model = cast<float>(turn * scaling<double>({2.0, 0.5, -1.5}));
-    const auto points = deformed(Deformer(method(), scene.data()), scene, {bones_from_model, 0});
+    const auto points = deformed(Deformer(scene.data(), method()), scene, {bones_from_model, 0});
     Scene there = scene;
     for (Vec3<float>& point : there.rest_points) point = transform_point(bones_from_model, point);
-    const auto moved = deformed(Deformer(method(), there.data()), there);
+    const auto moved = deformed(Deformer(there.data(), method()), there);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         const Vec3<float> expected = transform_point(inverse(bones_from_model), moved[vertex]);
         ASSERT_LT(distance(points[vertex], expected), 1e-5);
@@ -145,16 +145,16 @@ TEST_P(Deform, bones_from_model_conjugates_one_bone) {
         to_affine(QuatVec<double>{about<double>({1, 2, 3}, 40.0), {1, -2, 3}});
     const Affine<double> expected =
         inverse(bones_from_model) * cast<double>(scene.posed_from_rest[0]) * bones_from_model;
-    const auto points = deformed(Deformer(method(), scene.data()), scene, {cast<float>(bones_from_model), 0});
+    const auto points = deformed(Deformer(scene.data(), method()), scene, {cast<float>(bones_from_model), 0});
     EXPECT_LT(distance(Vec3<double>(points[0]), transform_point(expected, {0.1, 0.2, 0.3})), 5e-6);
 }
 
 TEST_P(Deform, empty_rest_bones_mean_identity) {
     Scene scene = random_scene(15, 200, 1.0);
     scene.rest_bones.clear();
-    const auto points = deformed(Deformer(method(), scene.data()), scene);
+    const auto points = deformed(Deformer(scene.data(), method()), scene);
     scene.rest_bones.assign(scene.posed_from_rest.size(), {});
-    const auto expected = deformed(Deformer(method(), scene.data()), scene);
+    const auto expected = deformed(Deformer(scene.data(), method()), scene);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         ASSERT_TRUE(same_bits(points[vertex], expected[vertex]));
     }
@@ -163,7 +163,7 @@ TEST_P(Deform, empty_rest_bones_mean_identity) {
 TEST_P(Deform, bones_that_no_influence_names_are_not_needed) {
     Scene scene = random_scene(16, 0, 1.0);
     scene.add_vertex({1, 2, 3}, {{1, 1.0f}});
-    const Deformer deformer(method(), scene.data());
+    const Deformer deformer(scene.data(), method());
     EXPECT_EQ(deformer.bone_count(), 2u);
     const auto expected = deformed(deformer, scene);
     scene.posed_from_rest.resize(2);
@@ -180,7 +180,7 @@ TEST_P(Deform, bones_that_the_pose_lacks_stay_at_rest) {
             // Of no unit length, so seen to one by one whatever the pose.
             scene.rest_bones[11] = cast<float>(scaling<double>({2.0, 2.0, 2.0}));
         }
-        const Deformer deformer(method(), scene.data());
+        const Deformer deformer(scene.data(), method());
         for (const std::size_t bones : {0, 1, 5, 11}) {
             Scene whole = scene;
             for (std::size_t bone = bones; bone < 12; ++bone) whole.posed_from_rest[bone] = {};
@@ -203,7 +203,7 @@ TEST_P(Deform, bones_that_the_pose_lacks_stay_at_rest) {
 
 TEST_P(Deform, writes_nothing_to_points_of_another_number) {
     const Scene scene = random_scene(19, 30, 1.0);
-    const Deformer deformer(method(), scene.data());
+    const Deformer deformer(scene.data(), method());
     for (const std::size_t size : {0, 29, 31}) {
         const Vec3<float> mark(-1e9f);
         std::vector<Vec3<float>> points(size, mark);
@@ -214,7 +214,7 @@ TEST_P(Deform, writes_nothing_to_points_of_another_number) {
 
 TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
     Scene scene = random_scene(20, 10000, 1.0);
-    Deformer deformer(method(), scene.data());
+    Deformer deformer(scene.data(), method());
     const std::vector<Vec3<float>> old_rest(scene.rest_points.size(), Vec3<float>(0.25f));
     const std::vector<Vec3<float>> new_rest(scene.rest_points.size(), Vec3<float>(-0.5f));
     const auto results = [&](const std::vector<Vec3<float>>& rest) {
@@ -246,7 +246,7 @@ TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
 
 TEST_P(Deform, moved_deformers_go_on) {
     const Scene scene = random_scene(21, 30, 1.0);
-    Deformer first(method(), scene.data());
+    Deformer first(scene.data(), method());
     const auto expected = deformed(first, scene);
     Deformer second(std::move(first));
     EXPECT_TRUE(same_bits(deformed(second, scene)[7], expected[7]));
@@ -258,7 +258,7 @@ TEST_P(Deform, says_what_it_was_made_of) {
     Scene scene = random_scene(17, 0, 1.0);
     scene.add_vertex({1, 2, 3}, {{1, 1.0f}, {4, 0.0f}});
     scene.add_vertex({1, 2, 3}, {});
-    const Deformer deformer(method(), scene.data());
+    const Deformer deformer(scene.data(), method());
     EXPECT_EQ(deformer.method(), method());
     EXPECT_EQ(deformer.vertex_count(), 2u);
     EXPECT_EQ(deformer.influence_count(), 1u);
@@ -279,7 +279,7 @@ std::string refusal(const std::function<void(Scene&)>& spoil) {
     scene.add_vertex({0, 0, 0}, {{0, 1.0f}});
     scene.add_vertex({1, 1, 1}, {{0, 0.5f}, {1, 0.5f}});
     spoil(scene);
-    return message_of([&] { const Deformer deformer(MethodId::lbs, scene.data()); });
+    return message_of([&] { const Deformer deformer(scene.data(), Lbs::info); });
 }
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -349,11 +349,11 @@ TEST(Deformer, refuses_more_than_it_can_number) {
     const Vec3<float> point(0.0f);
     const std::size_t many = std::size_t{1} << 31;
     BindData data{{&point, many}, {}, {}, {}, {}};
-    EXPECT_EQ(message_of([&] { const Deformer deformer(MethodId::lbs, data); }),
+    EXPECT_EQ(message_of([&] { const Deformer deformer(data, Lbs::info); }),
               "rest_points: expected at most 2147483647 vertices, got 2147483648");
     const std::int32_t bone = 0;
     data = {{&point, 1}, {}, {&bone, many}, {}, {}};
-    EXPECT_EQ(message_of([&] { const Deformer deformer(MethodId::lbs, data); }),
+    EXPECT_EQ(message_of([&] { const Deformer deformer(data, Lbs::info); }),
               "influence_bones: expected at most 2147483647 influences, got 2147483648");
 }
 
@@ -362,7 +362,7 @@ TEST(Deformer, refuses_more_influences_of_a_vertex_than_the_limit) {
         Scene scene;
         scene.add_vertex({0, 0, 0}, {{0, 1.0f}});
         scene.add_vertex({0, 0, 0}, std::vector<Influence<float>>(count, {0, 1.0f}));
-        return message_of([&] { const Deformer deformer(MethodId::dq, scene.data()); });
+        return message_of([&] { const Deformer deformer(scene.data(), Dq::info); });
     };
     EXPECT_EQ(with_influences(65536), "nothing thrown");
     EXPECT_EQ(with_influences(65537),
@@ -398,7 +398,7 @@ TEST(Deformer, refuses_too_few_rest_bones) {
 TEST(Deformer, refuses_other_new_rest_points) {
     Scene scene;
     scene.add_vertex({0, 0, 0}, {{0, 1.0f}});
-    Deformer deformer(MethodId::lbs, scene.data());
+    Deformer deformer(scene.data(), Lbs::info);
     const std::vector<Vec3<float>> two(2);
     const std::vector<Vec3<float>> spoilt{{0, kNan, 0}};
     EXPECT_EQ(message_of([&] { deformer.set_rest_points(two); }), "rest_points: expected 1 points, got 2");
@@ -410,7 +410,7 @@ TEST(Deformer, refuses_other_new_rest_points) {
 
 TEST(Deformer, empty_mesh_works) {
     const Scene scene;
-    const Deformer deformer(MethodId::dq, scene.data());
+    const Deformer deformer(scene.data(), Dq::info);
     EXPECT_EQ(deformer.bone_count(), 0u);
     EXPECT_TRUE(deformed(deformer, scene).empty());
 }

@@ -72,7 +72,7 @@ Scene reordered(const Scene& scene, const std::vector<std::size_t>& order) {
 }
 
 /// How far each of `points` is from that of skinning/ in double, rising.
-std::vector<double> errors_of(const std::vector<Vec3<float>>& points, MethodId method, const Scene& scene) {
+std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const MethodInfo& method, const Scene& scene) {
     const auto expected = in_double(method, scene);
     std::vector<double> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
@@ -82,8 +82,8 @@ std::vector<double> errors_of(const std::vector<Vec3<float>>& points, MethodId m
     return result;
 }
 
-std::vector<double> errors(MethodId method, const Scene& scene, const DeformOptions& options = {}) {
-    return errors_of(deformed(Deformer(method, scene.data()), scene, options), method, scene);
+std::vector<double> errors(const MethodInfo& method, const Scene& scene, const DeformOptions& options = {}) {
+    return errors_of(deformed(Deformer(scene.data(), method), scene, options), method, scene);
 }
 
 /// `sets` sets of `vertices` vertices. Each has bones up to `farthest` away in any order, by weights that fall as
@@ -116,11 +116,11 @@ Scene scene_of_unlike_bones(std::uint32_t seed, std::size_t sets, std::size_t ve
     return scene;
 }
 
-class Kernels : public testing::TestWithParam<std::tuple<std::string_view, Method>> {
+class Kernels : public testing::TestWithParam<std::tuple<std::string_view, MethodInfo>> {
 protected:
     void SetUp() override { use_simd_target(std::get<0>(GetParam())); }
     void TearDown() override { use_simd_target(simd_targets().front()); }
-    static MethodId method() { return std::get<1>(GetParam()).id; }
+    static const MethodInfo& method() { return std::get<1>(GetParam()); }
 };
 
 INSTANTIATE_TEST_SUITE_P(every, Kernels,
@@ -223,7 +223,7 @@ TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
         for (std::size_t vertex = 0; vertex < more.rest_points.size(); ++vertex) {
             scene.add_vertex(more.rest_points[vertex], influences_of(more, vertex));
         }
-        const auto expected = deformed(Deformer(method(), scene.data()), scene);
+        const auto expected = deformed(Deformer(scene.data(), method()), scene);
         std::vector<std::size_t> order(scene.rest_points.size());
         std::iota(order.begin(), order.end(), std::size_t{0});
         Random random(5);
@@ -235,7 +235,7 @@ TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
             // Ever fewer vertices, so that sets also lose vertices and change from one kernel to another.
             order.resize(order.size() / 2);
             const Scene other = reordered(scene, order);
-            const auto points = deformed(Deformer(method(), other.data()), other);
+            const auto points = deformed(Deformer(other.data(), method()), other);
             for (std::size_t i = 0; i < order.size(); ++i) {
                 ASSERT_TRUE(same_bits(points[i], expected[order[i]])) << i << (scaled ? " scaled" : "");
             }
@@ -245,7 +245,7 @@ TEST_P(Kernels, place_in_the_mesh_changes_no_bit) {
 
 TEST_P(Kernels, threads_change_no_bit) {
     const Scene scene = scene_of_sets(6, 700, 30, 4, true);
-    const Deformer deformer(method(), scene.data());
+    const Deformer deformer(scene.data(), method());
     const auto expected = deformed(deformer, scene, {{}, 1});
     for (std::size_t threads = 2; threads <= 5; ++threads) {
         const auto points = deformed(deformer, scene, {{}, threads});
@@ -259,7 +259,7 @@ TEST_P(Kernels, rest_pose_is_unchanged_to_the_bit) {
     Scene scene = scene_of_sets(7, 30, 25, 6, false);
     scene.posed_from_rest.assign(scene.posed_from_rest.size(), {});
     for (Vec3<float>& point : scene.rest_points) point *= 1000.0f;
-    const auto points = deformed(Deformer(method(), scene.data()), scene);
+    const auto points = deformed(Deformer(scene.data(), method()), scene);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         ASSERT_TRUE(same_bits(points[vertex], scene.rest_points[vertex]));
     }
@@ -268,7 +268,7 @@ TEST_P(Kernels, rest_pose_is_unchanged_to_the_bit) {
 TEST_P(Kernels, bones_from_model_goes_there_and_back) {
     const Scene scene = scene_of_sets(8, 20, 25, 6, true);
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
-    const auto points = deformed(Deformer(method(), scene.data()), scene, {bones_from_model, 0});
+    const auto points = deformed(Deformer(scene.data(), method()), scene, {bones_from_model, 0});
     Scene there = scene;
     for (Vec3<float>& point : there.rest_points) point = transform_point(bones_from_model, point);
     const auto moved = in_double(method(), there);
@@ -280,7 +280,7 @@ TEST_P(Kernels, bones_from_model_goes_there_and_back) {
 
 TEST_P(Kernels, write_no_other_point) {
     const Scene scene = scene_of_sets(9, 7, 23, 4, false);
-    const Deformer deformer(method(), scene.data());
+    const Deformer deformer(scene.data(), method());
     const Vec3<float> mark(-1e9f);
     std::vector<Vec3<float>> points(scene.rest_points.size() + 2, mark);
     deformer.deform(scene.posed_from_rest, {}, std::span(points).subspan(1, scene.rest_points.size()));

@@ -11,7 +11,7 @@ extern "C" __attribute__((visibility("default"))) int work_on_threads(int thread
     std::vector<std::int32_t> offsets(count + 1), bones(count, 0);
     for (std::size_t i = 0; i <= count; ++i) offsets[i] = static_cast<std::int32_t>(i);
     const std::vector<float> weights(count, 1.0f);
-    const sinew::Deformer deformer(sinew::MethodId::dq, {rest, offsets, bones, weights});
+    const sinew::Deformer deformer({rest, offsets, bones, weights}, sinew::Dq::info);
     std::vector<sinew::Affine<float>> pose(1);
     pose[0].translation = {1.0f, 1.0f, 1.0f};
     std::vector<sinew::Vec3<float>> points(count);

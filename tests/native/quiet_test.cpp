@@ -91,7 +91,10 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     Scene scene = random_scene(1, 20000, 1.0);
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
     std::vector<Deformer> deformers;
-    for (const Method& method : kMethods) deformers.emplace_back(method.id, scene.data());
+    for (const MethodInfo& method : kMethods) deformers.emplace_back(scene.data(), method);
+    std::vector<float> shares(scene.rest_points.size());
+    for (std::size_t i = 0; i < shares.size(); ++i) shares[i] = static_cast<float>(i % 100) / 50.0f - 0.5f;
+    deformers.emplace_back(scene.data(), Lbs::info, MixData{Dq::info, shares});
     std::vector<Vec3<float>> other_rest_points = scene.rest_points;
     const auto frames = [&](std::vector<Vec3<float>>& points) {
         for (Deformer& deformer : deformers) {
@@ -129,6 +132,19 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     EXPECT_EQ(in_frames, 0);
 }
 
+TEST(Bindings, are_packed_once) {
+    const Scene scene = random_scene(2, 20000, 1.0);
+    const std::size_t before = bytes;
+    const Binding binding(scene.data());
+    const std::size_t of_binding = bytes - before;
+    std::vector<Deformer> deformers;
+    deformers.reserve(kMethodCount);
+    const std::size_t alone = bytes;
+    for (const MethodInfo& method : kMethods) deformers.emplace_back(binding, method);
+    // What is left is room for bones.
+    EXPECT_LT(bytes - alone, of_binding / 10);
+}
+
 // As a number of a bone is no size: what is made for it does not grow with it.
 TEST(Bones, of_high_numbers_take_no_memory) {
     std::vector<std::size_t> sizes;
@@ -136,7 +152,7 @@ TEST(Bones, of_high_numbers_take_no_memory) {
         Scene scene;
         scene.add_vertex({1, 2, 3}, {{bone, 1.0f}});
         const std::size_t before = bytes;
-        const Deformer deformer(MethodId::dq, scene.data());
+        const Deformer deformer(scene.data(), Dq::info);
         sizes.push_back(bytes - before);
     }
     // What the numbers are sorted by is 4 bytes each, and gone afterwards.

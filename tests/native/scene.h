@@ -4,15 +4,13 @@
 #include <ostream>
 
 #include "sinew/deform/deformer.h"
-#include "sinew/skinning/dq.h"
-#include "sinew/skinning/lbs.h"
-#include "sinew/skinning/qv.h"
+#include "sinew/skinning/methods.h"
 #include "support.h"
 
 namespace sinew {
 
 // Found by argument: without it GoogleTest names each test by the bytes of its row, addresses included.
-inline void PrintTo(const Method& method, std::ostream* stream) { *stream << method.name; }
+inline void PrintTo(const MethodInfo& method, std::ostream* stream) { *stream << method.name; }
 
 namespace test {
 
@@ -94,16 +92,15 @@ std::vector<Vec3<T>> by_skinning(const Scene& scene) {
 }
 
 template <class T>
-std::vector<Vec3<T>> by_skinning(MethodId method, const Scene& scene) {
-    switch (method) {
-        case MethodId::lbs: return by_skinning<T, Lbs>(scene);
-        case MethodId::qv: return by_skinning<T, Qv>(scene);
-        case MethodId::dq: return by_skinning<T, Dq>(scene);
-    }
-    return {};
+std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene) {
+    std::vector<Vec3<T>> points;
+    for_each_method([&]<class Method>(Method) {
+        if (Method::info == method) points = by_skinning<T, Method>(scene);
+    });
+    return points;
 }
 
-inline std::vector<Vec3<double>> in_double(MethodId method, const Scene& scene) {
+inline std::vector<Vec3<double>> in_double(const MethodInfo& method, const Scene& scene) {
     return by_skinning<double>(method, scene);
 }
 

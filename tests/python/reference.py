@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Skinning in float64 numpy and matrix form, from the papers: what the library is measured against.
 
-Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv) and Kavan,
-Collins, Zara, O'Sullivan 2008, algorithm 1 (dq); slow, one vertex at a time, and shares no formula with the
-library where there are two. Quaternions are (w, x, y, z).
+Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
+Collins, Zara, O'Sullivan 2008, algorithm 1 (dq) and Alexa 2002 (log); slow, one vertex at a time, and shares no
+formula with the library where there are two. Quaternions are (w, x, y, z).
 """
 
+import functools
+
 import numpy as np
+import scipy.linalg
 
 
 def turn(rotation):
@@ -120,7 +123,29 @@ def dq(point, motions, rotations, weights):
     return rotation(real) @ point + translation(real, dual), margin
 
 
-METHODS = {"lbs": lbs, "qv": qv, "dq": dq}
+@functools.lru_cache(maxsize=1000)
+def logarithm(of_rotation):
+    """scipy's matrix logarithm of a 3x3 rotation (as bytes), and the 3x3 matrix that makes the last column of the
+    rigid 4x4 matrix's logarithm of its translation: the inverse of the exponential's integral over unit time."""
+    angular = scipy.linalg.logm(np.frombuffer(of_rotation).reshape(3, 3)).real
+    block = np.zeros((6, 6))
+    block[:3, :3], block[:3, 3:] = angular, np.eye(3)
+    return angular, np.linalg.inv(scipy.linalg.expm(block)[:3, 3:])
+
+
+def log(point, motions, rotations, weights):
+    """The tie is at 180 degrees from rest."""
+    _, translations = rigid_terms(point, motions, rotations)
+    total, margin = np.zeros((4, 4)), 1.0
+    for rotated, translated, weight in zip(rotations, translations, weights, strict=True):
+        angular, by_translation = logarithm(np.ascontiguousarray(rotated).tobytes())
+        total[:3, :3] += weight * angular
+        total[:3, 3] += weight * (by_translation @ translated)
+        margin = min(margin, abs(quaternion(rotated)[0]))
+    return (scipy.linalg.expm(total) @ np.append(point, 1.0))[:3], margin
+
+
+METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "log": log}
 
 
 def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=None):

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The deformer: its methods against float64 reference code, its threads, what it refuses."""
+
 import os
 import subprocess
 import sys
@@ -7,6 +9,7 @@ import threading
 import numpy as np
 import pytest
 import reference
+import scipy.linalg
 import sinew
 from rigs import Rig, about, random_motion, random_rig, shift, transform
 
@@ -36,12 +39,45 @@ def test_methods_have_a_reference():
 def test_methods_say_what_they_are():
     rows = sinew.methods()
     assert len({row.number for row in rows}) == len({row.name for row in rows}) == len(rows)
-    assert {row.name: row.number for row in rows} == {"lbs": 1, "qv": 2, "dq": 3}
+    assert {row.name: row.number for row in rows}.items() >= {"lbs": 1, "qv": 2, "dq": 3, "log": 4}.items()
     for row in rows:
         assert row.label
         assert row.description
-        assert row.needs
+        assert row.source
+        assert set(row.needs) <= {"rest_bones"}
         assert row.name in repr(row)
+        assert parameters_are_whole(row.parameters)
+
+
+def parameters_are_whole(parameters):
+    for row in parameters:
+        assert row.id.isidentifier()
+        assert row.label
+        assert row.description
+        assert row.unit in ("", "length", "angle", "factor")
+        if row.kind in ("float", "int", "bool"):
+            assert row.min <= row.default <= row.max
+        elif row.kind == "enum":
+            assert row.default in row.choices
+        else:
+            assert row.kind in ("vertex_group", "method")
+            assert (row.default, row.min, row.max) == (None, None, None)
+    return len({row.id for row in parameters}) == len(parameters)
+
+
+def test_stages_say_what_they_are():
+    rows = sinew.stages()
+    assert [row.name for row in rows] == ["mix"]
+    for row in rows:
+        assert row.label
+        assert row.description
+        assert row.source
+        assert row.name in repr(row)
+        assert parameters_are_whole(row.parameters)
+    assert [(row.id, row.kind) for row in rows[0].parameters] == [
+        ("method", "method"),
+        ("weights", "vertex_group"),
+    ]
 
 
 @every_method
@@ -113,12 +149,68 @@ def test_rest_pose_is_unchanged_to_the_bit(method):
 @every_method
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 def test_rigid_motion_after_the_pose_commutes(method, scaled):
+    if method == "log":
+        pytest.skip("the logarithm of a product is no sum of logarithms: rotations are measured from rest")
     rig = random_rig(26, scaled=scaled)
     motion = random_motion(np.random.default_rng(27), 2.0)
     _, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
     moved = rig.with_motions(motion @ rig.transforms.astype(np.float64)).deform(method)
     expected = transform(motion, rig.deform(method).astype(np.float64))
     np.testing.assert_allclose(moved[margins > NO_TIE], expected[margins > NO_TIE], atol=4 * TOLERANCE)
+
+
+def test_log_is_the_exponential_of_the_sum_of_logarithms():
+    """Of the 4x4 matrices as a whole, by scipy: nothing of the reference's splitting comes between."""
+    rig = random_rig(60, vertices=100)
+    motions = rig.transforms.astype(np.float64)
+    logarithms = np.array([scipy.linalg.logm(motion).real for motion in motions])
+    # Near 180 degrees from rest the two directions are as good as each other.
+    sure = np.array([(np.trace(motion[:3, :3]) + 1.0) / 4.0 > 1e-6 for motion in motions])
+    assert sure.all()
+    points = rig.deform("log")
+    for vertex, point in enumerate(rig.rest_points.astype(np.float64)):
+        span = slice(rig.offsets[vertex], rig.offsets[vertex + 1])
+        share = rig.weights[span].astype(np.float64) / rig.weights[span].sum(dtype=np.float64)
+        total = np.tensordot(share, logarithms[rig.bones[span]], axes=1)
+        expected = (scipy.linalg.expm(total) @ np.append(point, 1.0))[:3]
+        np.testing.assert_allclose(points[vertex], expected, atol=TOLERANCE)
+
+
+def test_log_spreads_a_twist_evenly():
+    weights = np.linspace(0.0, 1.0, 9, dtype=np.float32)
+    rest = np.tile(np.float32([2.0, 1.0, 0.0]), (9, 1))
+    arrays = (
+        rest,
+        np.arange(0, 20, 2, dtype=np.int32),
+        np.tile(np.int32([0, 1]), 9),
+        np.column_stack([1 - weights, weights]).ravel(),
+    )
+    twist = np.array([np.eye(4), about((1, 0, 0), 170)], np.float32)
+    angles = {}
+    for method in ("log", "dq"):
+        points = sinew.Deformer(*arrays, method).deform(twist)
+        angles[method] = np.degrees(np.arctan2(points[:, 2], points[:, 1]))
+    np.testing.assert_allclose(angles["log"], 170.0 * weights, atol=1e-4)
+    # Which is what sets it apart: the others are fast in the middle.
+    assert np.abs(angles["dq"] - 170.0 * weights).max() > 5.0
+
+
+@pytest.mark.parametrize("size", [1e-30, 1.0, 1e6, 1e12])
+def test_log_is_finite_for_whatever_is_finite(size):
+    """Half turns of all axes, bones without width, far bones, in every kernel that a mesh can come to."""
+    rng = np.random.default_rng(61)
+    axes = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (-1, -2, 3)]
+    motions = [np.eye(4), np.diag([0.0, 0.0, 0.0, 1.0]), np.diag([-1.0, -1.0, -1.0, 1.0])]
+    motions += [about(axis, degrees) for axis in axes for degrees in (180.0, -180.0, 179.9999, 360.0)]
+    motions = np.array(motions)
+    motions[:, :3, 3] = rng.uniform(-size, size, (len(motions), 3))
+    counts = np.repeat([1, 2, 3, 5, 9, 40], 50)
+    bones = np.concatenate([rng.integers(0, len(motions), count) for count in counts]).astype(np.int32)
+    weights = rng.choice([1e-30, 1e-3, 1.0], len(bones)).astype(np.float32)
+    rest = rng.uniform(-size, size, (len(counts), 3)).astype(np.float32)
+    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    points = sinew.Deformer(rest, offsets, bones, weights, "log").deform(motions.astype(np.float32))
+    assert np.isfinite(points).all()
 
 
 def change_by_space(method, rig, other_from_space):
@@ -474,6 +566,52 @@ def test_deforms_in_a_forked_child():
             os._exit(code)
     _, status = os.waitpid(child, 0)
     assert os.waitstatus_to_exitcode(status) == 0
+
+
+@every_method
+@pytest.mark.parametrize("other", METHODS)
+def test_mix_is_each_vertex_share_of_two_methods(method, other):
+    rig = random_rig(70, vertices=600, most_influences=3, scaled=True)
+    binding = sinew.Binding(*rig.mesh, rig.rest_bones)
+    shares = np.clip(np.linspace(-0.5, 1.5, 600, dtype=np.float32), 0.0, 1.0)
+    deformer = sinew.Deformer(binding, method, mix=(other, shares))
+    assert (deformer.method, deformer.mixed_method) == (method, other)
+    a, b = (sinew.Deformer(binding, name).deform(rig.transforms) for name in (method, other))
+    points = deformer.deform(rig.transforms)
+    np.testing.assert_allclose(points, a + shares[:, None] * (b.astype(np.float64) - a), atol=1e-6)
+    np.testing.assert_array_equal(points[shares == 0.0], a[shares == 0.0])
+    np.testing.assert_array_equal(points[shares == 1.0], b[shares == 1.0])
+    np.testing.assert_array_equal(deformer.deform(rig.transforms, threads=3), points)
+
+
+@every_method
+def test_deformers_share_a_binding(method):
+    rig = random_rig(71, scaled=True)
+    binding = sinew.Binding(*rig.mesh, rig.rest_bones)
+    counts = (binding.vertex_count, binding.influence_count, binding.bone_count)
+    deformer, other = (sinew.Deformer(binding, method) for _ in range(2))
+    assert counts == (deformer.vertex_count, deformer.influence_count, deformer.bone_count)
+    assert deformer.mixed_method is None
+    del binding
+    np.testing.assert_array_equal(deformer.deform(rig.transforms), rig.deform(method))
+    moved = rig.rest_points + np.float32(1.0)
+    deformer.set_rest_points(moved)
+    np.testing.assert_array_equal(
+        deformer.deform(rig.transforms), rig.with_(rest_points=moved).deform(method)
+    )
+    np.testing.assert_array_equal(other.deform(rig.transforms), rig.deform(method))
+
+
+def test_mix_in_another_space_goes_there_and_back():
+    rig = random_rig(72, scaled=True)
+    binding = sinew.Binding(*rig.mesh, rig.rest_bones)
+    space = random_motion(np.random.default_rng(73), 2.0).astype(np.float32)
+    shares = np.random.default_rng(74).uniform(0, 1, 200).astype(np.float32)
+    a, b = (
+        sinew.Deformer(binding, name).deform(rig.transforms, bones_from_model=space) for name in ("lbs", "dq")
+    )
+    points = sinew.Deformer(binding, "lbs", mix=("dq", shares)).deform(rig.transforms, bones_from_model=space)
+    np.testing.assert_allclose(points, a + shares[:, None] * (b - a), atol=2e-6)
 
 
 NOT_A_NAME = [(3, "int"), (None, "NoneType"), (b"dq", "bytes"), (["dq"], "list"), ("\ud800", "'\\ud800'")]

@@ -44,6 +44,7 @@ POINTS, OFFSETS = "float32 [n, 3]", "int32 [vertices + 1]"
 BONES, WEIGHTS = "int32 [influences]", "float32 [influences]"
 AFFINES = "float32 [n, 4, 4] or [n, 3, 4]"
 FINITE_WEIGHTS = "finite values, 0 or more"
+METHOD = "one of " + ", ".join(method.name for method in sinew.methods())
 
 CONSTRUCTOR = [
     ("rest_points", good()["rest_points"].astype(np.float64), POINTS, "float64 [2, 3]"),
@@ -89,8 +90,8 @@ CONSTRUCTOR = [
     ("influence_weights", np.float32([1, -0.5, 1]), FINITE_WEIGHTS, "-0.500000 at influence 1"),
     ("influence_weights", np.float32([NAN, 1, 1]), FINITE_WEIGHTS, "nan at influence 0"),
     ("influence_weights", np.float32([1, 1, INF]), FINITE_WEIGHTS, "inf at influence 2"),
-    ("method", "DQ", "one of lbs, qv, dq", "'DQ'"),
-    ("method", "", "one of lbs, qv, dq", "''"),
+    ("method", "DQ", METHOD, "'DQ'"),
+    ("method", "", METHOD, "''"),
     ("rest_bones", bones().astype(np.float64), AFFINES, "float64 [2, 4, 4]"),
     ("rest_bones", bones()[0], AFFINES, "float32 [4, 4]"),
     ("rest_bones", bones()[:, :, :3], AFFINES, "float32 [2, 4, 3]"),
@@ -105,6 +106,46 @@ CONSTRUCTOR = [
 def test_constructor_refuses(argument, value, wanted, got):
     message = refusal(sinew.Deformer, **{**good(), argument: value})
     assert message == f"{argument}: expected {wanted}, got {got}"
+
+
+def binding():
+    return sinew.Binding(**{name: value for name, value in good().items() if name != "method"})
+
+
+@pytest.mark.parametrize(("argument", "value", "wanted", "got"), [c for c in CONSTRUCTOR if c[0] != "method"])
+def test_binding_refuses(argument, value, wanted, got):
+    arguments = {**good(), argument: value}
+    del arguments["method"]
+    assert refusal(sinew.Binding, **arguments) == f"{argument}: expected {wanted}, got {got}"
+
+
+HALF = np.float32([0.5, 0.5])
+MIX, MIX_WEIGHTS = "None or (method, weights)", "weights float32 [vertices]"
+
+
+@pytest.mark.parametrize(
+    ("mix", "wanted", "got"),
+    [
+        ("dq", MIX, "str"),
+        (("dq",), MIX, "a tuple of 1"),
+        (("dq", HALF, HALF), MIX, "a tuple of 3"),
+        (("DQ", HALF), METHOD, "'DQ'"),
+        (("dq", [0.5, 0.5]), MIX_WEIGHTS, "list"),
+        (("dq", HALF.astype(np.float64)), MIX_WEIGHTS, "float64 [2]"),
+        (("dq", HALF[None]), MIX_WEIGHTS, "float32 [1, 2]"),
+        (("dq", HALF[:1]), "a weight for each of the 2 vertices", "1"),
+        (("dq", np.float32([0, NAN])), "weights from 0 to 1", "NaN at vertex 1"),
+    ],
+)
+def test_mix_refuses(mix, wanted, got):
+    assert refusal(sinew.Deformer, binding(), "lbs", mix=mix) == f"mix: expected {wanted}, got {got}"
+
+
+def test_deformers_of_nothing_are_refused():
+    with pytest.raises(TypeError):
+        sinew.Deformer()
+    with pytest.raises(TypeError, match="mix"):
+        sinew.Deformer(binding(), "lbs", mix=(3, HALF))
 
 
 def test_method_that_is_no_text_is_a_type_error():

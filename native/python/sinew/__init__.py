@@ -6,12 +6,26 @@ sinew.interpolate, sinew.spline.
 """
 
 from . import affine, dual_quat, interpolate, quat_vec, spline
-from ._native import Deformer, Method, Skeleton, __version__, keep_thread_state, methods
+from ._native import (
+    Binding,
+    Deformer,
+    Method,
+    Parameter,
+    Skeleton,
+    Stage,
+    __version__,
+    keep_thread_state,
+    methods,
+    stages,
+)
 
 __all__ = [
+    "Binding",
     "Deformer",
     "Method",
+    "Parameter",
     "Skeleton",
+    "Stage",
     "__version__",
     "affine",
     "dual_quat",
@@ -20,4 +34,5 @@ __all__ = [
     "methods",
     "quat_vec",
     "spline",
+    "stages",
 ]

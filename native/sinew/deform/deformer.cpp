@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sinew/deform/kernels.h"
+#include "sinew/deform/mixed_blocks.h"
 #include "sinew/deform/packed_mesh.h"
 #include "sinew/deform/palette_store.h"
 #include "sinew/deform/thread_pool.h"
@@ -23,7 +24,7 @@ constexpr std::size_t kVerticesWorthAThread = 32768;
 
 // 4096 vertices: small enough to even out threads of unequal speed, large enough that taking one costs
 // nothing.
-constexpr std::size_t kBlocksOfAPiece = 256;
+constexpr std::size_t kBlocksOfAChunk = 256;
 
 [[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got) {
     throw std::invalid_argument(argument + ": expected " + wanted + ", got " + got);
@@ -42,8 +43,8 @@ void check_points(std::span<const Vec3<float>> points) {
     }
 }
 
-void check_most(const std::string& argument, const std::string& of, std::size_t most, std::size_t got) {
-    if (got > most) fail(argument, "at most " + std::to_string(most) + " " + of, std::to_string(got));
+void check_limit(const std::string& argument, const std::string& of, std::size_t limit, std::size_t got) {
+    if (got > limit) fail(argument, "at most " + std::to_string(limit) + " " + of, std::to_string(got));
 }
 
 /// bone_count  one more than the highest bone that an influence names
@@ -64,8 +65,8 @@ void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bon
 void check(const BindData& data) {
     const std::size_t vertex_count = data.rest_points.size();
     const std::size_t influence_count = data.influence_bones.size();
-    check_most("rest_points", "vertices", kMaxVertices, vertex_count);
-    check_most("influence_bones", "influences", kMaxInfluences, influence_count);
+    check_limit("rest_points", "vertices", kMaxVertices, vertex_count);
+    check_limit("influence_bones", "influences", kMaxInfluences, influence_count);
     check_points(data.rest_points);
     if (data.influence_weights.size() != influence_count) {
         fail("influence_weights",
@@ -117,23 +118,50 @@ void check(const BindData& data) {
     }
 }
 
+/// The kernel of each method, in the order of the list.
+const Kernel& kernel_at(std::size_t method) noexcept {
+    static const auto kernels =
+        std::apply([](const auto&... methods) { return std::array{&methods.kernel()...}; }, Methods{});
+    return *kernels[method];
+}
+
+std::size_t checked_method(const std::string& argument, const MethodInfo& method) {
+    const std::size_t index = index_of(method);
+    if (index < kMethodCount) return index;
+    std::string names;
+    for (const MethodInfo& known : kMethods) names += (names.empty() ? "" : ", ") + std::string(known.name);
+    fail(argument, "one of " + names, "a method of number " + std::to_string(method.number));
+}
+
+MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, std::size_t vertex_count) {
+    if (weights.size() != vertex_count) {
+        fail("mix", "a weight for each of the " + std::to_string(vertex_count) + " vertices",
+             std::to_string(weights.size()));
+    }
+    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
+        if (std::isnan(weights[vertex])) {
+            fail("mix", "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
+        }
+    }
+    return pack_mix(mesh, weights);
+}
+
 }  // namespace
 
-struct Deformer::Bound {
-    MethodId method;
+struct Binding::Packed {
+    explicit Packed(const BindData& data);
+
     PackedMesh mesh;
     std::vector<Affine<float>> rest_bones;      // of mesh.used_bones; or empty: all identity
     std::vector<std::int32_t> stretched_bones;  // of mesh.used_bones, those whose axes are not of unit length
     std::size_t vertex_count;
     std::size_t influence_count;
-    std::size_t bone_count;
-    PaletteStore palettes;
+    std::size_t bone_count = 0;
 };
 
-Deformer::Deformer(MethodId method, const BindData& data) {
+Binding::Packed::Packed(const BindData& data) {
     check(data);
-    const std::size_t vertex_count = data.rest_points.size();
-    std::size_t bone_count = 0;
+    vertex_count = data.rest_points.size();
     for (const std::int32_t bone : data.influence_bones) {
         bone_count = std::max(bone_count, static_cast<std::size_t>(bone) + 1);
     }
@@ -157,70 +185,134 @@ Deformer::Deformer(MethodId method, const BindData& data) {
         }
         offsets.push_back(static_cast<std::uint32_t>(influences.size()));
     }
-    PackedMesh mesh = pack(data.rest_points, offsets, influences);
+    influence_count = influences.size();
+    mesh = pack(data.rest_points, offsets, influences);
 
-    std::vector<Affine<float>> rest_bones;
-    std::vector<std::int32_t> stretched_bones;
-    if (!data.rest_bones.empty() && method != MethodId::lbs) {
-        for (const std::int32_t bone : mesh.used_bones) {
-            const Affine<float>& rest_bone = data.rest_bones[static_cast<std::size_t>(bone)];
-            if (!has_unit_axes(cast<double>(rest_bone))) {
-                stretched_bones.push_back(static_cast<std::int32_t>(rest_bones.size()));
-            }
-            rest_bones.push_back(rest_bone);
+    if (data.rest_bones.empty()) return;
+    for (const std::int32_t bone : mesh.used_bones) {
+        const Affine<float>& rest_bone = data.rest_bones[static_cast<std::size_t>(bone)];
+        if (!has_unit_axes(cast<double>(rest_bone))) {
+            stretched_bones.push_back(static_cast<std::int32_t>(rest_bones.size()));
         }
+        rest_bones.push_back(rest_bone);
     }
-    const std::size_t used = mesh.used_bones.size();
-    bound_.reset(new Bound{method, std::move(mesh), std::move(rest_bones), std::move(stretched_bones),
-                           vertex_count, influences.size(), bone_count, PaletteStore(method, used)});
 }
+
+Binding::Binding(const BindData& data) : packed_(std::make_shared<const Packed>(data)) {}
+
+std::size_t Binding::vertex_count() const noexcept { return packed_->vertex_count; }
+std::size_t Binding::influence_count() const noexcept { return packed_->influence_count; }
+std::size_t Binding::bone_count() const noexcept { return packed_->bone_count; }
+
+struct Deformer::State {
+    State(std::shared_ptr<const Binding::Packed> packed, std::vector<Lanes<float>> own_rows,
+          const MethodInfo& method, const std::optional<MixData>& mix);
+
+    /// With the rows of `packed`, which nothing else reads.
+    static std::unique_ptr<State> alone(const BindData& data, const MethodInfo& method,
+                                        const std::optional<MixData>& mix) {
+        const auto packed = std::make_shared<Binding::Packed>(data);
+        std::vector<Lanes<float>> rows = std::move(packed->mesh.rows);
+        return std::make_unique<State>(packed, std::move(rows), method, mix);
+    }
+
+    [[nodiscard]] std::span<const Kernel* const> kernels_in_use() const {
+        return std::span(kernels).first(mix ? 2 : 1);
+    }
+
+    std::shared_ptr<const Binding::Packed> packed;
+    std::vector<Lanes<float>> own_rows;  // empty: those of the binding
+    std::array<std::size_t, 2> methods;  // places in the list; the second is that of the mix
+    std::array<const Kernel*, 2> kernels;
+    std::optional<MixWeights> mix;
+    PaletteStore palettes;
+};
+
+Deformer::State::State(std::shared_ptr<const Binding::Packed> from, std::vector<Lanes<float>> rows,
+                       const MethodInfo& method, const std::optional<MixData>& with)
+    : packed(std::move(from)),
+      own_rows(std::move(rows)),
+      methods{checked_method("method", method), with ? checked_method("mix", with->method) : 0},
+      kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
+      mix(with ? std::optional(checked_mix(packed->mesh, with->weights, packed->vertex_count)) : std::nullopt),
+      palettes(kernels_in_use(), packed->mesh.used_bones.size()) {}
+
+Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
+    : state_(std::make_unique<State>(binding.packed_, std::vector<Lanes<float>>{}, method, mix)) {}
+
+Deformer::Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix)
+    : state_(State::alone(data, method, mix)) {}
 
 Deformer::Deformer(Deformer&&) noexcept = default;
 Deformer& Deformer::operator=(Deformer&&) noexcept = default;
 Deformer::~Deformer() = default;
 
-MethodId Deformer::method() const noexcept { return bound_->method; }
-std::size_t Deformer::vertex_count() const noexcept { return bound_->vertex_count; }
-std::size_t Deformer::influence_count() const noexcept { return bound_->influence_count; }
-std::size_t Deformer::bone_count() const noexcept { return bound_->bone_count; }
+const MethodInfo& Deformer::method() const noexcept { return kMethods[state_->methods[0]]; }
+const MethodInfo* Deformer::mixed_method() const noexcept {
+    return state_->mix ? &kMethods[state_->methods[1]] : nullptr;
+}
+std::size_t Deformer::vertex_count() const noexcept { return state_->packed->vertex_count; }
+std::size_t Deformer::influence_count() const noexcept { return state_->packed->influence_count; }
+std::size_t Deformer::bone_count() const noexcept { return state_->packed->bone_count; }
 
 void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
-    if (rest_points.size() != bound_->vertex_count) {
-        fail("rest_points", std::to_string(bound_->vertex_count) + " points",
-             std::to_string(rest_points.size()));
+    const PackedMesh& mesh = state_->packed->mesh;
+    if (rest_points.size() != vertex_count()) {
+        fail("rest_points", std::to_string(vertex_count()) + " points", std::to_string(rest_points.size()));
     }
     check_points(rest_points);
-    const PaletteStore::Writing writing(bound_->palettes);
-    repack_points(bound_->mesh, rest_points);
+    const PaletteStore::Writing writing(state_->palettes);
+    if (state_->own_rows.empty()) state_->own_rows = mesh.rows;
+    repack_points(mesh, rest_points, state_->own_rows);
 }
 
 void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                       std::span<Vec3<float>> points) const noexcept {
-    if (points.size() != bound_->vertex_count) return;
-    const MethodId method = bound_->method;
-    const PackedMesh& mesh = bound_->mesh;
-    const PaletteStore::Reading reading(bound_->palettes);
-    Palette& palette = reading.palette();
-    prepare(method, mesh.used_bones, bound_->stretched_bones, posed_from_rest, bound_->rest_bones,
-            options.bones_from_model, palette);
-
-    Frame frame{method, &mesh, &palette, nullptr, nullptr, points.data()};
-    std::array<Quad, kDisplacementQuads> there;
-    std::array<Quad, kDisplacementQuads> back;
-    if (method != MethodId::lbs && !is_identity(options.bones_from_model)) {
-        const auto bones_from_model = cast<double>(options.bones_from_model);
-        there = displacement_quads(bones_from_model);
-        back = displacement_quads(inverse(bones_from_model));
-        frame.bones_from_model = there.data();
-        frame.model_from_bones = back.data();
+    const Binding::Packed& packed = *state_->packed;
+    if (points.size() != packed.vertex_count) return;
+    const PaletteStore::Reading reading(state_->palettes);
+    const Bones bones{packed.mesh.used_bones, packed.stretched_bones, posed_from_rest, packed.rest_bones,
+                      options.bones_from_model};
+    const Lanes<float>* const rows =
+        state_->own_rows.empty() ? packed.mesh.rows.data() : state_->own_rows.data();
+    const bool same_space = is_identity(options.bones_from_model);
+    std::array<Float4, kDisplacementRows> bones_from_model;
+    std::array<Float4, kDisplacementRows> model_from_bones;
+    if (!same_space) {
+        const auto transform = cast<double>(options.bones_from_model);
+        write_displacement(transform, bones_from_model.data());
+        write_displacement(inverse(transform), model_from_bones.data());
+    }
+    struct Work {
+        const State& state;
+        std::array<Frame, 2> frames;
+    } work{*state_, {}};
+    for (std::size_t k = 0; k < state_->kernels_in_use().size(); ++k) {
+        const Kernel& kernel = *state_->kernels[k];
+        Palette& palette = reading.palette(k);
+        prepare(kernel, bones, palette);
+        const bool there_and_back = kernel.is_rigid && !same_space;
+        work.frames[k] = {&packed.mesh,
+                          rows,
+                          &palette,
+                          there_and_back ? bones_from_model.data() : nullptr,
+                          there_and_back ? model_from_bones.data() : nullptr,
+                          points.data()};
     }
     const std::size_t threads = options.threads > 0
                                     ? options.threads
                                     : std::min(hardware_threads(), 1 + points.size() / kVerticesWorthAThread);
     // By one reference: a larger capture makes std::function allocate.
     parallel_for(
-        mesh.blocks.size(), threads,
-        [&frame](std::size_t begin, std::size_t end) { deform_blocks(frame, begin, end); }, kBlocksOfAPiece);
+        packed.mesh.blocks.size(), threads,
+        [&work](std::size_t begin, std::size_t end) {
+            if (work.state.mix) {
+                deform_mixed_blocks(work.state.kernels, work.frames, *work.state.mix, begin, end);
+            } else {
+                work.state.kernels[0]->target().deform(work.frames[0], begin, end);
+            }
+        },
+        kBlocksOfAChunk);
 }
 
 }  // namespace sinew

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
-#include <vector>
 
 #include "sinew/export.h"
 #include "sinew/skinning/methods.h"
@@ -13,14 +13,14 @@
 
 namespace sinew {
 
-/// What a Deformer takes at most; more is refused.
+/// What a Binding takes at most; more is refused.
 inline constexpr std::size_t kMaxVertices = 0x7FFFFFFF;    // 2^31 - 1
 inline constexpr std::size_t kMaxInfluences = 0x7FFFFFFF;  // of all vertices
 inline constexpr std::size_t kMaxVertexInfluences = std::size_t{1} << 16;
 inline constexpr std::size_t kMaxBones = std::size_t{1}
                                          << 20;  // an influence names one of 0 to kMaxBones - 1
 
-/// What a Deformer is made of. Nothing is kept by reference.
+/// What a Binding is made of. Nothing is kept by reference.
 struct BindData {
     std::span<const Vec3<float>> rest_points;  // [vertices] model space
     std::span<const std::int32_t>
@@ -41,29 +41,62 @@ struct DeformOptions {
     std::size_t threads = 0;
 };
 
-/// A mesh bound to bones, ready to be deformed at any pose. Once constructed it is valid, and deforming can not
-/// fail and allocates nothing. Any number of threads may use one Deformer at once; of more than 16 that deform,
-/// some wait for others. One that was moved from can only be assigned to or destroyed.
-class SINEW_EXPORT Deformer {
+/// A mesh bound to bones: immutable, and shared by all its copies and by the deformers made of it. Binding sorts the
+/// vertices by their bones, which takes longer than many frames; a Deformer made of a Binding takes next to nothing.
+class SINEW_EXPORT Binding {
 public:
     /// Throws std::invalid_argument that names the field, what was wanted and what came: sizes that do not
     /// fit or are beyond the limits above, offsets that do not rise from 0 to the number of influences, a
     /// negative bone, a weight that is negative, a value that is not finite.
-    Deformer(MethodId method, const BindData& data);
-    Deformer(Deformer&&) noexcept;
-    Deformer& operator=(Deformer&&) noexcept;
-    ~Deformer();
+    explicit Binding(const BindData& data);
 
-    [[nodiscard]] MethodId method() const noexcept;
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// Influences of positive weight.
     [[nodiscard]] std::size_t influence_count() const noexcept;
     /// One more than the highest bone that an influence names.
     [[nodiscard]] std::size_t bone_count() const noexcept;
 
-    /// New rest points [vertices], as when shape keys change. Throws std::invalid_argument for another
-    /// number of points or a value that is not finite. Waits for threads that deform, and they for it: each
-    /// of their results has the old points or the new ones.
+private:
+    friend class Deformer;
+    struct Packed;
+    std::shared_ptr<const Packed> packed_;
+};
+
+/// The stage `mix`: a second method, and the share of it that each vertex takes. See skinning/mix.h.
+struct MixData {
+    MethodInfo method;
+    std::span<const float> weights;  // [vertices] clamped to 0 to 1; not NaN; copied
+};
+
+/// A binding and a method, ready to deform at any pose. Once constructed it is valid, and deforming can not
+/// fail and allocates nothing. Any number of threads may use one Deformer at once; of more than 16 that deform,
+/// some wait for others. One that was moved from can only be assigned to or destroyed.
+class SINEW_EXPORT Deformer {
+public:
+    /// Throws std::invalid_argument, as Binding does, for a method that is not in the list of methods, for a number
+    /// of mix weights that is not that of vertices, and for one that is NaN.
+    Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix = {});
+
+    /// With a binding of its own, from which nothing else deforms.
+    Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {});
+
+    Deformer(Deformer&&) noexcept;
+    Deformer& operator=(Deformer&&) noexcept;
+    ~Deformer();
+
+    [[nodiscard]] const MethodInfo& method() const noexcept;
+    /// The method that the stage `mix` adds, or null.
+    [[nodiscard]] const MethodInfo* mixed_method() const noexcept;
+    [[nodiscard]] std::size_t vertex_count() const noexcept;
+    /// Influences of positive weight.
+    [[nodiscard]] std::size_t influence_count() const noexcept;
+    /// One more than the highest bone that an influence names.
+    [[nodiscard]] std::size_t bone_count() const noexcept;
+
+    /// New rest points [vertices] for this deformer alone, as when shape keys change. Throws std::invalid_argument
+    /// for another number of points or a value that is not finite. Waits for threads that deform, and they for it:
+    /// each of their results has the old points or the new ones. The first call on a deformer of a shared binding
+    /// copies the mesh; later ones allocate nothing.
     void set_rest_points(std::span<const Vec3<float>> rest_points);
 
     /// Writes the deformed points, model space.
@@ -77,8 +110,8 @@ public:
                 std::span<Vec3<float>> points) const noexcept;
 
 private:
-    struct Bound;
-    std::unique_ptr<Bound> bound_;
+    struct State;
+    std::unique_ptr<State> state_;
 };
 
 }  // namespace sinew

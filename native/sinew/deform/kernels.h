@@ -1,37 +1,68 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "sinew/deform/packed_mesh.h"
 #include "sinew/deform/palette.h"
-#include "sinew/skinning/methods.h"
 
 namespace sinew {
 
 /// What every block of one frame reads.
 struct Frame {
-    MethodId method;
     const PackedMesh* mesh;
+    const Lanes<float>* rows;  // of the mesh, or with other rest points
     const Palette* palette;
-    const Quad* bones_from_model;  // displacements of points to the space of the bones and back;
-    const Quad* model_from_bones;  // null: the same space
+    const Float4* bones_from_model;  // displacements of points to the space of the bones and back;
+    const Float4* model_from_bones;  // null: the same space
     Vec3<float>* points;
 };
 
-/// Writes the rows of the bones `used` to `palette.bones`, and their sizes. Under the rigid methods as if each were
-/// rigid; the indices of those that are not are added to `palette.scaled`.
-void prepare_bones(MethodId method, std::span<const std::int32_t> used,
-                   std::span<const Affine<float>> posed_from_rest, Palette& palette) noexcept;
+/// The functions of a kernel that are compiled once for each instruction set.
+struct TargetKernel {
+    /// Deforms the blocks [begin, end). The meaning of each method is in skinning/; its kernel agrees with it.
+    ///
+    /// A vertex's result depends on its own rest point and influences and on the pose alone: not on its lane,
+    /// its block or on other vertices. On other instruction sets it may differ by rounding, as only some of
+    /// them multiply and add in one step.
+    void (*deform)(const Frame& frame, std::size_t begin, std::size_t end);
 
-/// Deforms the blocks [begin, end) on the instruction set in use. What a method means is in skinning/;
-/// the kernels agree with it.
-///
-/// A vertex's result depends on its own rest point and influences and on the pose alone: not on its lane,
-/// its block or on other vertices. On other instruction sets it may differ by rounding, as only some of
-/// them multiply and add in one step.
-void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) noexcept;
+    /// Writes the rows of the bones `used` to `palette.bones`, and their sizes. Under a rigid method as if each
+    /// were rigid; the indices of those that are not are added to `palette.scaled`.
+    void (*prepare)(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                    Palette& palette);
+};
+
+/// Instruction sets, see targets.h.
+inline constexpr std::size_t kTargetCount = 5;
+
+/// How the library deforms whole meshes by one method. The file of this name in kernels/ defines it.
+struct Kernel {
+    /// A bone that does not move, in Palette::bones: its size is that of each bone there.
+    std::span<const Float4> rest_row;
+
+    /// Whether rotations are blended: the scale of bones is then kept apart, and points are taken to the space of
+    /// the bones and back. A method that is not rigid has that space in its bones.
+    bool is_rigid;
+
+    /// Fills `palette` for `bones`, all of which are posed.
+    void (*prepare)(const Kernel& kernel, const Bones& bones, Palette& palette);
+
+    std::array<TargetKernel, kTargetCount> targets;
+
+    /// The functions for the instruction set in use.
+    [[nodiscard]] const TargetKernel& target() const noexcept;
+};
+
+/// The place in Kernel::targets of the instruction set in use.
+[[nodiscard]] std::size_t target_in_use() noexcept;
+
+inline const TargetKernel& Kernel::target() const noexcept { return targets[target_in_use()]; }
+
+/// Fills `palette` for `bones`. A bone that the pose lacks stays at rest.
+void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcept;
 
 }  // namespace sinew

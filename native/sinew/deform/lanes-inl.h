@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points in lanes: compiled once for each instruction set, see kernels.cpp.
+// Points in lanes: compiled once for each instruction set, see kernels/.
 #if defined(SINEW_DEFORM_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_LANES_INL_H_
 #undef SINEW_DEFORM_LANES_INL_H_
@@ -26,7 +26,7 @@ using Vec = hn::Vec<D>;
 
 /// Where a frame's blocks are and where their points go. A copy on the stack, as the compiler would read what
 /// the frame refers to anew after every vector that it stores.
-struct Places {
+struct MeshPointers {
     const Block* blocks;
     const Lanes<float>* rows;
     const Lanes<std::int32_t>* vertices;
@@ -34,9 +34,9 @@ struct Places {
     Vec3<float>* points;
 };
 
-HWY_INLINE Places places_of(const Frame& frame) {
+HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
     const PackedMesh& mesh = *frame.mesh;
-    return {mesh.blocks.data(), mesh.rows.data(), mesh.vertices.data(), mesh.runs.data(), frame.points};
+    return {mesh.blocks.data(), frame.rows, mesh.vertices.data(), mesh.runs.data(), frame.points};
 }
 
 /// The weights of the first influence of block `b`, which is not mixed.
@@ -180,7 +180,7 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* place, Vec3<float>* po
 
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
 template <class D>
-HWY_INLINE void store_points(D d, const Places& to, std::size_t b, std::size_t lane, const Points<D>& p) {
+HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane, const Points<D>& p) {
     const Block& block = to.blocks[b];
     const std::int32_t* const place = to.vertices[b].lane.data() + lane;
     if constexpr (hn::MaxLanes(D()) == 1) {
@@ -213,12 +213,12 @@ HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std:
 /// Blocks [begin, end), which have no bones.
 inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
     const Full d;
-    const Places places = places_of(frame);
+    const MeshPointers pointers = pointers_of(frame);
     for (std::size_t b = begin; b < end; ++b) {
-        const Block& block = places.blocks[b];
+        const Block& block = pointers.blocks[b];
         const std::size_t lanes = lanes_end(d, block);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            store_points(d, places, b, lane, load_points(d, places.rows + block.first_row, lane));
+            store_points(d, pointers, b, lane, load_points(d, pointers.rows + block.first_row, lane));
         }
     }
 }

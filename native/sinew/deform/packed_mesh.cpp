@@ -10,10 +10,10 @@ namespace {
 
 // A block costs the same however few of its lanes are filled: as much as two to six vertices of a mixed one,
 // by processor. It also bounds the memory: 16 / 6 of 24 bytes a vertex at four influences.
-constexpr std::size_t kFewestLanes = 6;
+constexpr std::size_t kMinLanes = 6;
 
 // A run takes three masked stores; with more runs than this, one for each vertex is as fast.
-constexpr std::size_t kMostRuns = 5;
+constexpr std::size_t kMaxRuns = 5;
 
 class BoneSets {
 public:
@@ -132,7 +132,7 @@ private:
         bool named = false;
         for (std::size_t i = 0; i < vertices.size(); i += kLanes) {
             const auto part = vertices.subspan(i, std::min(kLanes, vertices.size() - i));
-            if (part.size() < kFewestLanes && influences > 0) {
+            if (part.size() < kMinLanes && influences > 0) {
                 scattered.insert(scattered.end(), part.begin(), part.end());
                 continue;
             }
@@ -160,9 +160,9 @@ private:
 
     void add_block(std::span<const std::uint32_t> vertices, std::uint32_t first_bone, std::size_t influences,
                    bool mixed) {
-        Lanes<std::int32_t> places;
+        Lanes<std::int32_t> numbers;
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
-            places.lane[lane] = static_cast<std::int32_t>(vertices[std::min(lane, vertices.size() - 1)]);
+            numbers.lane[lane] = static_cast<std::int32_t>(vertices[std::min(lane, vertices.size() - 1)]);
         }
         // Rising within a set, and within a number of influences.
         const bool consecutive =
@@ -173,7 +173,7 @@ private:
         mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences), place,
                                 static_cast<std::uint8_t>(vertices.size()), static_cast<std::uint8_t>(runs),
                                 mixed, consecutive});
-        mesh_.vertices.push_back(places);
+        mesh_.vertices.push_back(numbers);
         row_count_ += static_cast<std::uint32_t>(3 + (mixed ? influences : weights_kept(influences)));
     }
 
@@ -187,7 +187,7 @@ private:
         for (std::size_t begin = 0, end = 0; begin < vertices.size(); begin = end) {
             end = begin + 1;
             while (end < vertices.size() && vertices[end] == vertices[begin] + (end - begin)) ++end;
-            if (mesh_.runs.size() - before == kMostRuns) {
+            if (mesh_.runs.size() - before == kMaxRuns) {
                 mesh_.runs.resize(before);
                 return 0;
             }
@@ -203,7 +203,7 @@ private:
     void fill(std::span<const Vec3<float>> rest_points) {
         mesh_.rows.resize(row_count_);
         mesh_.first_weights.resize(mesh_.blocks.size());
-        repack_points(mesh_, rest_points);
+        repack_points(mesh_, rest_points, mesh_.rows);
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             const Block& block = mesh_.blocks[b];
             Lanes<float>* const weights = &mesh_.rows[block.first_row] + 3;
@@ -219,7 +219,7 @@ private:
         }
     }
 
-    /// Finds the bones that are used, and numbers those of the mesh by their places among them: what a frame
+    /// Finds the bones that are used, and numbers those of the mesh by their place among them: what a frame
     /// needs for its bones does not grow with the highest number.
     void number_used_bones() {
         if (mesh_.bones.empty()) return;
@@ -249,16 +249,27 @@ PackedMesh pack(std::span<const Vec3<float>> rest_points, std::span<const std::u
     return Packer(offsets, influences).run(rest_points);
 }
 
-void repack_points(PackedMesh& mesh, std::span<const Vec3<float>> rest_points) noexcept {
+void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                   std::span<Lanes<float>> rows) noexcept {
     for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
-        Lanes<float>* const rows = &mesh.rows[mesh.blocks[b].first_row];
+        Lanes<float>* const xyz = &rows[mesh.blocks[b].first_row];
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const Vec3<float>& point = rest_points[static_cast<std::size_t>(mesh.vertices[b].lane[lane])];
-            rows[0].lane[lane] = point.x;
-            rows[1].lane[lane] = point.y;
-            rows[2].lane[lane] = point.z;
+            xyz[0].lane[lane] = point.x;
+            xyz[1].lane[lane] = point.y;
+            xyz[2].lane[lane] = point.z;
         }
     }
+}
+
+std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values) {
+    std::vector<Lanes<float>> packed(mesh.blocks.size());
+    for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            packed[b].lane[lane] = values[static_cast<std::size_t>(mesh.vertices[b].lane[lane])];
+        }
+    }
+    return packed;
 }
 
 }  // namespace sinew

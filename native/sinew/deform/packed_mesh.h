@@ -59,7 +59,11 @@ struct PackedMesh {
                               std::span<const std::uint32_t> offsets,
                               std::span<const Influence<float>> influences);
 
-/// Other rest points [vertices] for the same influences.
-void repack_points(PackedMesh& mesh, std::span<const Vec3<float>> rest_points) noexcept;
+/// Writes other rest points [vertices] to `rows`, which are those of `mesh` or a copy of them.
+void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                   std::span<Lanes<float>> rows) noexcept;
+
+/// A number of each vertex [vertices] in the order of the mesh: [blocks]. Lanes without a vertex repeat the last.
+[[nodiscard]] std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values);
 
 }  // namespace sinew

@@ -22,27 +22,30 @@ std::uint32_t of_this_process(std::uint32_t state) noexcept {
 
 }  // namespace
 
-PaletteStore::PaletteStore(MethodId method, std::size_t bones) {
+PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones) {
     // Left as the system gives it: only the first palette is ever touched where one thread at a time deforms.
-    const bool may_scale = method != MethodId::lbs;
-    const std::size_t of_bones = bone_quads(method) * bones;
-    const std::size_t of_scales = may_scale ? kDisplacementQuads * bones : 0;
-    quads_ = std::make_unique_for_overwrite<Quad[]>(kMax * (of_bones + of_scales));
-    const std::size_t of_sizes = bones + kSizesAtOnce;
-    sizes_ = std::make_unique_for_overwrite<float[]>(kMax * of_sizes);
-    if (may_scale) {
-        // A bone may be there twice: for its rest axes, and for its pose.
-        scaled_ = std::make_unique_for_overwrite<std::int32_t[]>(kMax * 2 * bones);
-        has_scale_ = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * bones);
-    }
-    for (std::size_t i = 0; i < kMax; ++i) {
-        Palette& palette = palettes_[i];
-        palette.bones = quads_.get() + i * (of_bones + of_scales);
-        palette.sizes = sizes_.get() + i * of_sizes;
-        if (!may_scale) continue;
-        palette.scales = palette.bones + of_bones;
-        palette.scaled = scaled_.get() + i * 2 * bones;
-        palette.has_scale = has_scale_.get() + i * bones;
+    for (std::size_t k = 0; k < kernels.size(); ++k) {
+        const bool may_scale = kernels[k]->is_rigid;
+        const std::size_t of_bones = kernels[k]->rest_row.size() * bones;
+        const std::size_t of_scales = may_scale ? kDisplacementRows * bones : 0;
+        const std::size_t of_sizes = bones + kSizesAtOnce;
+        Memory& memory = memory_[k];
+        memory.float4s = std::make_unique_for_overwrite<Float4[]>(kMax * (of_bones + of_scales));
+        memory.sizes = std::make_unique_for_overwrite<float[]>(kMax * of_sizes);
+        if (may_scale) {
+            // A bone may be listed twice: for its rest axes, and for its pose.
+            memory.scaled = std::make_unique_for_overwrite<std::int32_t[]>(kMax * 2 * bones);
+            memory.has_scale = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * bones);
+        }
+        for (std::size_t i = 0; i < kMax; ++i) {
+            Palette& palette = palettes_[k][i];
+            palette.bones = memory.float4s.get() + i * (of_bones + of_scales);
+            palette.sizes = memory.sizes.get() + i * of_sizes;
+            if (!may_scale) continue;
+            palette.scales = palette.bones + of_bones;
+            palette.scaled = memory.scaled.get() + i * 2 * bones;
+            palette.has_scale = memory.has_scale.get() + i * bones;
+        }
     }
 }
 

@@ -5,8 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
-#include "sinew/deform/palette.h"
+#include "sinew/deform/kernels.h"
 
 namespace sinew {
 
@@ -17,11 +18,13 @@ namespace sinew {
 class PaletteStore {
 public:
     static constexpr std::uint32_t kMax = 16;
+    static constexpr std::size_t kMaxKernels = 2;
 
-    /// bones  that the mesh uses
-    PaletteStore(MethodId method, std::size_t bones);
+    /// kernels  one or two, that each thread deforms by
+    /// bones    that the mesh uses
+    PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones);
 
-    /// A palette that is the caller's, and the mesh to read, as long as this lives.
+    /// Palettes that are the caller's, and the mesh to read, as long as this lives.
     class Reading {
     public:
         explicit Reading(PaletteStore& store) noexcept : store_(store), index_(store.start_reading()) {}
@@ -29,7 +32,10 @@ public:
         Reading(const Reading&) = delete;
         Reading& operator=(const Reading&) = delete;
 
-        [[nodiscard]] Palette& palette() const noexcept { return store_.palettes_[index_]; }
+        /// Of the kernel with this index.
+        [[nodiscard]] Palette& palette(std::size_t kernel) const noexcept {
+            return store_.palettes_[kernel][index_];
+        }
 
     private:
         PaletteStore& store_;
@@ -56,11 +62,16 @@ private:
     template <class Next>
     std::uint32_t change(const Next& next) noexcept;
 
-    std::unique_ptr<Quad[]> quads_;
-    std::unique_ptr<float[]> sizes_;
-    std::unique_ptr<std::int32_t[]> scaled_;
-    std::unique_ptr<std::uint8_t[]> has_scale_;
-    Palette palettes_[kMax];
+    /// Of one kernel's palettes.
+    struct Memory {
+        std::unique_ptr<Float4[]> float4s;
+        std::unique_ptr<float[]> sizes;
+        std::unique_ptr<std::int32_t[]> scaled;
+        std::unique_ptr<std::uint8_t[]> has_scale;
+    };
+
+    Memory memory_[kMaxKernels];
+    Palette palettes_[kMaxKernels][kMax];
     std::atomic<std::uint32_t> state_{0};  // a bit for each palette in use, one for a writer, then the forks
 };
 

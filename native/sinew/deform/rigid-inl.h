@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Blocks under a rigid method: compiled once for each instruction set, see kernels.cpp.
+// Blocks under a rigid method: compiled once for each instruction set, see kernels/.
 #if defined(SINEW_DEFORM_RIGID_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_DEFORM_RIGID_INL_H_
 #undef SINEW_DEFORM_RIGID_INL_H_
@@ -10,16 +10,16 @@
 #include <cmath>
 #include <cstring>
 
-#include "sinew/deform/rigid_methods-inl.h"
+#include "sinew/deform/blend-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-inline constexpr std::size_t kRowQuads = kRow / 4;
+inline constexpr std::size_t kRowFloat4s = kRow / 4;
 
 // Above this many influences a set's signs are found vertex by vertex.
-inline constexpr std::size_t kMostResolved = 32;
+inline constexpr std::size_t kMaxResolved = 32;
 
 HWY_INLINE float dot(const float* a, const float* b) {
     return (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3]);
@@ -64,12 +64,12 @@ HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
 /// Copies rows of the palette, each turned to the side of the first; the least of their cosines.
 ///
 /// kDifferences  of all but the first, what they differ from it
-template <class Kernel, bool kDifferences>
-HWY_INLINE float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t count,
+template <class Rigid, bool kDifferences>
+HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              float* rows) {
     const Four d;
     const auto quad_of = [&](std::size_t k, std::size_t q) HWY_ATTR {
-        return hn::Load(d, palette.bones[kRowQuads * static_cast<std::size_t>(bones[k]) + q].value.data());
+        return hn::Load(d, palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k]) + q].value.data());
     };
     const Vec<Four> first = quad_of(0, 0);
     const Vec<Four> first_second = quad_of(0, 1);
@@ -82,8 +82,8 @@ HWY_INLINE float copy_turned(const Palette& palette, const std::int32_t* bones, 
         const Vec<Four> cosine = dot(quad, first);
         const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
         least = hn::Min(least, hn::Abs(cosine));
-        quad = hn::Xor(quad, sign);
-        if (Kernel::kSignedQuads == 2) second = hn::Xor(second, sign);
+        if (Rigid::kSignedFloat4s >= 1) quad = hn::Xor(quad, sign);
+        if (Rigid::kSignedFloat4s == 2) second = hn::Xor(second, sign);
         hn::Store(kDifferences ? hn::Sub(quad, first) : quad, d, rows + kRow * k);
         hn::Store(kDifferences ? hn::Sub(second, first_second) : second, d, rows + kRow * k + 4);
     }
@@ -92,17 +92,17 @@ HWY_INLINE float copy_turned(const Palette& palette, const std::int32_t* bones, 
 
 #else
 
-template <class Kernel, bool kDifferences>
-float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
+template <class Rigid, bool kDifferences>
+float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
     float least = 1.0f;
     for (std::size_t k = 0; k < count; ++k) {
         float* const row = rows + kRow * k;
-        std::memcpy(row, &palette.bones[kRowQuads * static_cast<std::size_t>(bones[k])],
-                    sizeof(Quad) * kRowQuads);
+        std::memcpy(row, &palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k])],
+                    sizeof(Float4) * kRowFloat4s);
         const float cosine = dot(row, rows);
         least = std::min(least, std::abs(cosine));
         if (cosine < 0.0f) {
-            for (std::size_t i = 0; i < 4 * Kernel::kSignedQuads; ++i) row[i] = -row[i];
+            for (std::size_t i = 0; i < 4 * Rigid::kSignedFloat4s; ++i) row[i] = -row[i];
         }
     }
     if (kDifferences) subtract_first(rows, count);
@@ -114,17 +114,18 @@ float copy_turned(const Palette& palette, const std::int32_t* bones, std::size_t
 /// Copies the first bone of a set to `rows` and what the others differ from it, or if plain the others, each turned
 /// to the side on which it is added. False where that depends on the weights, or where a bone has scale and so
 /// depends on the vertex.
-template <class Kernel, bool kPlain>
-HWY_INLINE bool resolve(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
-    if (count > kMostResolved) return false;
+template <class Rigid, bool kPlain>
+HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
+    if (count > kMaxResolved) return false;
     if (palette.any_scale) {
         for (std::size_t k = 0; k < count; ++k) {
             if (palette.has_scale[static_cast<std::size_t>(bones[k])] != 0) return false;
         }
     }
     // Within 45 degrees of the first, all lie within 90 of each other.
-    if (copy_turned<Kernel, !kPlain>(palette, bones, count, rows) > 0.7072f) return true;
-    if (!kPlain) copy_turned<Kernel, false>(palette, bones, count, rows);
+    const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
+    if (Rigid::kSignedFloat4s == 0 || least > 0.7072f) return true;
+    if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
     if (!signs_agree(rows, kRow, count)) return false;
     if (!kPlain) subtract_first(rows, count);
     return true;
@@ -150,18 +151,18 @@ HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const fl
 }
 
 /// The same for bones with scale, or with signs that depend on the weights.
-template <class Kernel, class D>
+template <class Rigid, class D>
 HWY_INLINE Sum<D> blend_bones(D d, const Palette& palette, const std::int32_t* bones, std::size_t count,
                               bool plain, const float* first_weight, const float* weights,
                               const Points<D>& rest) {
     const Vec<D> first = hn::Load(d, first_weight);
     const float* const base = plain ? kNoBase : row_of(palette, bones[0]);
     Blend<D> blend = begin_blend(d, row_of(palette, bones[0]), first, plain);
-    Kernel::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
+    Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
     for (std::size_t k = 1; k < count; ++k) {
         const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
-        const Vec<D> signed_weight = add_to_blend<Kernel>(d, base, row_of(palette, bones[k]), weight, blend);
-        Kernel::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
+        const Vec<D> signed_weight = add_to_blend<Rigid>(d, base, row_of(palette, bones[k]), weight, blend);
+        Rigid::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
     }
     return blend.sum;
 }
@@ -177,12 +178,12 @@ HWY_INLINE Spaces spaces_of(const Frame& frame) {
     return {frame.bones_from_model->value.data(), frame.model_from_bones->value.data()};
 }
 
-template <class Kernel, class D>
-HWY_INLINE void finish_and_store(D d, const Places& places, const Spaces& spaces, std::size_t b,
+template <class Rigid, class D>
+HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                                  std::size_t lane, const Sum<D>& sum, const Points<D>& rest) {
-    Points<D> points = Kernel::finish(d, sum, rest);
+    Points<D> points = Rigid::finish(d, sum, rest);
     if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
-    store_points(d, places, b, lane, points);
+    store_points(d, pointers, b, lane, points);
 }
 
 template <class D>
@@ -196,93 +197,93 @@ HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].la
 /// Blocks [begin, end), which have the same resolved bones.
 ///
 /// kCount  their influences, or 0 for any number
-template <class Kernel, std::size_t kCount, bool kPlain = false>
+template <class Rigid, std::size_t kCount, bool kPlain = false>
 void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
     const Full d;
-    const Places places = places_of(frame);
+    const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
-    const std::size_t influences = places.blocks[begin].influences;
+    const std::size_t influences = pointers.blocks[begin].influences;
     for (std::size_t b = begin; b < end; ++b) {
-        const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
-        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
             const auto sum =
                 blend_rows<kCount, kPlain>(d, bone_rows, influences, first_weights, weights_of(rows) + lane);
-            finish_and_store<Kernel>(d, places, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
+            finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
         }
     }
 }
 
-template <class Kernel>
+template <class Rigid>
 void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, bool plain) {
     const Full d;
-    const Places places = places_of(frame);
+    const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
-    const std::size_t influences = places.blocks[begin].influences;
-    const std::int32_t* const bones = &frame.mesh->bones[places.blocks[begin].first_bone];
+    const std::size_t influences = pointers.blocks[begin].influences;
+    const std::int32_t* const bones = &frame.mesh->bones[pointers.blocks[begin].first_bone];
     for (std::size_t b = begin; b < end; ++b) {
-        const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
-        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             const Points<Full> rest = load_rest(d, rows, spaces, lane);
             const auto sum =
-                blend_bones<Kernel>(d, *frame.palette, bones, influences, plain,
+                blend_bones<Rigid>(d, *frame.palette, bones, influences, plain,
                                     first_weights_of(frame, b) + lane, weights_of(rows) + lane, rest);
-            finish_and_store<Kernel>(d, places, spaces, b, lane, sum, rest);
+            finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
         }
     }
 }
 
 /// Blocks [begin, end), which have the same bones, where these are added plainly.
-template <class Kernel>
+template <class Rigid>
 HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
-    alignas(64) float rows[kMostResolved * kRow];
+    alignas(64) float rows[kMaxResolved * kRow];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
-    if (resolve<Kernel, true>(*frame.palette, bones, block.influences, rows)) {
-        deform_resolved<Kernel, 0, true>(frame, begin, end, rows);
+    if (resolve_signs<Rigid, true>(*frame.palette, bones, block.influences, rows)) {
+        deform_resolved<Rigid, 0, true>(frame, begin, end, rows);
     } else {
-        deform_unresolved<Kernel>(frame, begin, end, true);
+        deform_unresolved<Rigid>(frame, begin, end, true);
     }
 }
 
 /// Blocks [begin, end), which have the same bones.
-template <class Kernel>
+template <class Rigid>
 void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
-    alignas(64) float rows[kMostResolved * kRow];
+    alignas(64) float rows[kMaxResolved * kRow];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
-    if (is_plain(*frame.palette, bones, block.influences)) return deform_plain_set<Kernel>(frame, begin, end);
-    if (!resolve<Kernel, false>(*frame.palette, bones, block.influences, rows)) {
-        return deform_unresolved<Kernel>(frame, begin, end, false);
+    if (is_plain(*frame.palette, bones, block.influences)) return deform_plain_set<Rigid>(frame, begin, end);
+    if (!resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows)) {
+        return deform_unresolved<Rigid>(frame, begin, end, false);
     }
     switch (block.influences) {
-        case 1: return deform_resolved<Kernel, 1>(frame, begin, end, rows);
-        case 2: return deform_resolved<Kernel, 2>(frame, begin, end, rows);
-        case 3: return deform_resolved<Kernel, 3>(frame, begin, end, rows);
-        case 4: return deform_resolved<Kernel, 4>(frame, begin, end, rows);
-        default: return deform_resolved<Kernel, 0>(frame, begin, end, rows);
+        case 1: return deform_resolved<Rigid, 1>(frame, begin, end, rows);
+        case 2: return deform_resolved<Rigid, 2>(frame, begin, end, rows);
+        case 3: return deform_resolved<Rigid, 3>(frame, begin, end, rows);
+        case 4: return deform_resolved<Rigid, 4>(frame, begin, end, rows);
+        default: return deform_resolved<Rigid, 0>(frame, begin, end, rows);
     }
 }
 
 /// A mixed block vertex by vertex: with scale, or without vectors.
-template <class Kernel>
+template <class Rigid>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
-    const Places places = places_of(frame);
+    const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
-    const Block& block = places.blocks[b];
-    const Lanes<float>* const rows = places.rows + block.first_row;
+    const Block& block = pointers.blocks[b];
+    const Lanes<float>* const rows = pointers.rows + block.first_row;
     const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const Points<One> rest = load_rest(d, rows, spaces, lane);
         const std::int32_t* const of_vertex = bones + block.influences * lane;
         const bool plain = is_plain(*frame.palette, of_vertex, block.influences);
         const float* const weights = weights_of(rows) + lane;
-        const auto sum = blend_bones<Kernel>(d, *frame.palette, of_vertex, block.influences, plain, weights,
+        const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, plain, weights,
                                              weights + kLanes, rest);
-        finish_and_store<Kernel>(d, places, spaces, b, lane, sum, rest);
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
     }
 }
 
@@ -293,98 +294,98 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 ///
 /// weights  of each influence, kLanes apart
 /// sums     where the sum's quads are written, 4 * kLanes apart
-template <class Kernel, bool kPlain>
+template <class Rigid, bool kPlain>
 HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, std::size_t count,
                             const float* weights, float* sums) {
     const Four d;
     using V4 = Vec<Four>;
     const auto row_at = [&](std::size_t k) {
-        return &palette.bones[kRowQuads * static_cast<std::size_t>(bones[k])];
+        return &palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k])];
     };
-    const Quad* const first = row_at(0);
+    const Float4* const first = row_at(0);
     const float size = palette.sizes[bones[0]];
     float least = size;
-    V4 sum[kRowQuads];
-    for (std::size_t q = 0; q < kRowQuads; ++q) sum[q] = hn::Load(d, first[q].value.data());
+    V4 sum[kRowFloat4s];
+    for (std::size_t q = 0; q < kRowFloat4s; ++q) sum[q] = hn::Load(d, first[q].value.data());
     V4 side = hn::Mul(hn::Set(d, weights[0]), sum[0]);
     if (kPlain) {
         for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
     }
     for (std::size_t k = 1; k < count; ++k) {
-        const Quad* const row = row_at(k);
+        const Float4* const row = row_at(k);
         least = std::min(least, palette.sizes[bones[k]]);
         const V4 weight = hn::Set(d, weights[kLanes * k]);
         const V4 quaternion = hn::Load(d, row->value.data());
         const auto below = hn::Lt(dot(quaternion, side), hn::Zero(d));
         const V4 away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
-        for (std::size_t q = 0; q < kRowQuads; ++q) {
+        for (std::size_t q = 0; q < kRowFloat4s; ++q) {
             V4 by = hn::Load(d, row[q].value.data());
-            if (q < Kernel::kSignedQuads) by = hn::Xor(by, away);
+            if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
             if (!kPlain) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
             sum[q] = hn::MulAdd(weight, by, sum[q]);
         }
         side = hn::MulAdd(hn::Xor(weight, away), quaternion, side);
     }
-    for (std::size_t q = 0; q < kRowQuads; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
+    for (std::size_t q = 0; q < kRowFloat4s; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
     return kPlain == is_plain(size, least);
 }
 
 /// Apart, so that its registers are not those of every vertex.
-template <class Kernel>
+template <class Rigid>
 HWY_NOINLINE void blend_quads_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
                                       const float* weights, float* sums) {
-    blend_quads<Kernel, true>(palette, bones, count, weights, sums);
+    blend_quads<Rigid, true>(palette, bones, count, weights, sums);
 }
 
 /// A mixed block: the sums of all vertices are turned into lanes.
-template <class Kernel>
+template <class Rigid>
 void deform_mixed(const Frame& frame, std::size_t b) {
-    const Places places = places_of(frame);
+    const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
-    const Block& block = places.blocks[b];
-    const Lanes<float>* const rows = places.rows + block.first_row;
+    const Block& block = pointers.blocks[b];
+    const Lanes<float>* const rows = pointers.rows + block.first_row;
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     const Palette palette = *frame.palette;
-    alignas(64) float sums[kRowQuads][4 * kLanes];
+    alignas(64) float sums[kRowFloat4s][4 * kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
         const float* const weights = weights_of(rows) + lane;
         float* const to = sums[0] + 4 * lane;
-        if (!blend_quads<Kernel, false>(palette, bones, block.influences, weights, to)) {
-            blend_quads_plainly<Kernel>(palette, bones, block.influences, weights, to);
+        if (!blend_quads<Rigid, false>(palette, bones, block.influences, weights, to)) {
+            blend_quads_plainly<Rigid>(palette, bones, block.influences, weights, to);
         }
     }
     const Full d;
     for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
         Sum<Full> sum;
-        for (std::size_t q = 0; q < kRowQuads; ++q) {
+        for (std::size_t q = 0; q < kRowFloat4s; ++q) {
             Vec<Full>* const value = sum.value + 4 * q;
             hn::LoadInterleaved4(d, sums[q] + 4 * lane, value[0], value[1], value[2], value[3]);
         }
-        finish_and_store<Kernel>(d, places, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
+        finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
     }
 }
 
 #else
 
-template <class Kernel>
+template <class Rigid>
 void deform_mixed(const Frame& frame, std::size_t b) {
-    deform_one_by_one<Kernel>(frame, b);
+    deform_one_by_one<Rigid>(frame, b);
 }
 
 #endif
 
-template <class Kernel>
+template <class Rigid>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
     const bool scaled = frame.palette->any_scale;
     for (std::size_t b = begin; b < end;) {
         const Block& block = frame.mesh->blocks[b];
         if (block.mixed) {
-            scaled ? deform_one_by_one<Kernel>(frame, b) : deform_mixed<Kernel>(frame, b);
+            scaled ? deform_one_by_one<Rigid>(frame, b) : deform_mixed<Rigid>(frame, b);
             ++b;
             continue;
         }
         const std::size_t after = end_of_set(frame, b, end);
-        block.influences == 0 ? keep_blocks(frame, b, after) : deform_set<Kernel>(frame, b, after);
+        block.influences == 0 ? keep_blocks(frame, b, after) : deform_set<Rigid>(frame, b, after);
         b = after;
     }
 }

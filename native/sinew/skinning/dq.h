@@ -4,6 +4,7 @@
 #include <span>
 
 #include "sinew/skinning/influence.h"
+#include "sinew/skinning/method_info.h"
 #include "sinew/skinning/scaled_rigid.h"
 
 namespace sinew {
@@ -11,6 +12,15 @@ namespace sinew {
 /// Dual quaternion skinning by DLB (Kavan, Collins, Zara, O'Sullivan 2008, algorithm 1; Smith 2013,
 /// section 3.6), with the choice of signs and the scale rule of Blender's Preserve Volume.
 struct Dq {
+    static constexpr MethodInfo info{
+        3,
+        "dq",
+        "Dual Quaternion",
+        "Keeps the volume of twisted joints anywhere on the body; strong bends bulge outwards",
+        "Kavan, Collins, Zara, O'Sullivan 2008",
+        Needs::rest_bones};
+    static const Kernel& kernel() noexcept;
+
     template <class T>
     using Bone = ScaledRigid<DualQuat<T>, T>;
 

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "sinew/skinning/influence.h"
+#include "sinew/skinning/method_info.h"
 #include "sinew/transform/affine.h"
 
 namespace sinew {
@@ -11,6 +12,15 @@ namespace sinew {
 /// Linear blend skinning: the weighted mean of where each bone alone would put the vertex
 /// (Magnenat-Thalmann et al. 1988; Smith 2013, section 2.3.1 with matrix linear blending).
 struct Lbs {
+    static constexpr MethodInfo info{
+        1,
+        "lbs",
+        "Linear Blend",
+        "Fast, smooth and what every engine plays; twisted and strongly bent joints lose volume",
+        "Magnenat-Thalmann, Laperriere, Thalmann 1988",
+        Needs::nothing};
+    static const Kernel& kernel() noexcept;
+
     template <class T>
     using Bone = Affine<T>;
 

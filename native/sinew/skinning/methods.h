@@ -2,39 +2,44 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string_view>
+#include <tuple>
+
+#include "sinew/skinning/dq.h"
+#include "sinew/skinning/lbs.h"
+#include "sinew/skinning/log.h"
+#include "sinew/skinning/qv.h"
 
 namespace sinew {
 
-enum class MethodId { lbs, qv, dq };
+/// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
+/// line and panel are made from it.
+using Methods = std::tuple<Lbs, Qv, Dq, Log>;
 
-/// A row of the table of methods.
-struct Method {
-    MethodId id;
-    int number;                    // stored in .blend files: never changed, never used again
-    std::string_view name;         // what programs say
-    std::string_view label;        // what people read
-    std::string_view description;  // one sentence: when to use it
-    std::string_view needs;        // what it takes besides points, influences and bone transforms
-};
+inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
-/// THE table of methods: panel, command line, tests, bench and documentation read it here.
-inline constexpr std::array kMethods{
-    Method{MethodId::lbs, 1, "lbs", "Linear Blend",
-           "Fast, smooth and what every engine plays; twisted and strongly bent joints lose volume",
-           "nothing more"},
-    Method{MethodId::qv, 2, "qv", "Quaternion-Vector",
-           "Keeps twisted limbs round near the armature's origin; joints far from it drift off their bones",
-           "nothing more; rest bones where bones are scaled"},
-    Method{MethodId::dq, 3, "dq", "Dual Quaternion",
-           "Keeps the volume of twisted joints anywhere on the body; strong bends bulge outwards",
-           "nothing more; rest bones where bones are scaled"},
-};
+/// call(Method{}) for each method.
+template <class Call>
+constexpr void for_each_method(const Call& call) {
+    std::apply([&call](const auto&... methods) { (call(methods), ...); }, Methods{});
+}
 
-/// The row called `name`, or nothing.
-[[nodiscard]] constexpr std::optional<Method> find_method(std::string_view name) noexcept {
-    for (const Method& method : kMethods) {
+/// The facts of each method.
+inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
+    std::apply([](const auto&... methods) { return std::array{methods.info...}; }, Methods{});
+
+/// The place of `method` in the list, or kMethodCount.
+[[nodiscard]] constexpr std::size_t index_of(const MethodInfo& method) noexcept {
+    std::size_t index = 0;
+    while (index < kMethodCount && !(kMethods[index] == method)) ++index;
+    return index;
+}
+
+/// The method called `name`, or nothing.
+[[nodiscard]] constexpr std::optional<MethodInfo> find_method(std::string_view name) noexcept {
+    for (const MethodInfo& method : kMethods) {
         if (method.name == name) return method;
     }
     return std::nullopt;

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "sinew/skinning/influence.h"
+#include "sinew/skinning/method_info.h"
 #include "sinew/skinning/scaled_rigid.h"
 
 namespace sinew {
@@ -12,6 +13,15 @@ namespace sinew {
 /// (Smith 2013, section 3.6, "direct quaternion blending"; Hejl 2004). Every blend turns about the
 /// origin of the space it is computed in, so the result depends on where that origin is.
 struct Qv {
+    static constexpr MethodInfo info{
+        2,
+        "qv",
+        "Quaternion-Vector",
+        "Keeps twisted limbs round near the armature's origin; joints far from it drift off their bones",
+        "Hejl 2004",
+        Needs::rest_bones};
+    static const Kernel& kernel() noexcept;
+
     template <class T>
     using Bone = ScaledRigid<QuatVec<T>, T>;
 

@@ -27,8 +27,8 @@ void deform() {
     std::vector<sinew::Affine<float>> pose(2);
     pose[0].translation = {10, 20, 30};
     pose[1].translation = {100, 200, 300};
-    for (const sinew::Method& method : sinew::kMethods) {
-        sinew::Deformer deformer(method.id, {rest, offsets, bones, weights});
+    for (const sinew::MethodInfo& method : sinew::kMethods) {
+        sinew::Deformer deformer({rest, offsets, bones, weights}, method);
         std::vector<sinew::Vec3<float>> points(rest.size());
         deformer.deform(pose, {}, points);
         expect(points[0] == sinew::Vec3<float>(11, 20, 30), "the first point is moved by its bone");
@@ -36,7 +36,7 @@ void deform() {
         expect(points[2] == sinew::Vec3<float>(100, 200, 303), "the third point is moved by its bone");
         deformer.set_rest_points(points);
         expect(deformer.vertex_count() == 3 && deformer.influence_count() == 3 &&
-                   deformer.bone_count() == 2 && deformer.method() == method.id,
+                   deformer.bone_count() == 2 && deformer.method() == method,
                "a Deformer says what it was made of");
     }
 }

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Linear blend on blocks: compiled once for each instruction set, see kernels.cpp.
-//
-// A vertex's bones are added up as Palette says.
-#if defined(SINEW_DEFORM_LBS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef SINEW_DEFORM_LBS_INL_H_
-#undef SINEW_DEFORM_LBS_INL_H_
-#else
-#define SINEW_DEFORM_LBS_INL_H_
-#endif
+// Linear blend on lanes. A bone is the columns x, y, z and translation of its displacement, each with a 0 behind it.
+// The bones of a vertex are added up as Palette says.
+// This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include "sinew/skinning/lbs.h"
 
 #include <cstring>
+#include <limits>
 
+#include "sinew/deform/kernels.h"
+#include "sinew/transform/convert.h"
+#include "sinew/deform/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sinew/deform/kernels/lbs.cpp"
+#include "hwy/foreach_target.h"
+//
+#include "hwy/highway.h"
 #include "sinew/deform/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -27,8 +32,11 @@ HWY_INLINE V in_register(V v) {
     return v;
 }
 
-/// Numbers of a bone: the columns of its displacement.
-inline constexpr std::size_t kColumns = 4 * kLbsQuads;
+/// Of a bone's displacement.
+inline constexpr std::size_t kLbsColumns = 4;
+
+/// The numbers of these columns.
+inline constexpr std::size_t kColumns = 4 * kLbsColumns;
 
 /// `columns`, of which the compiler then does not know that they stay the same for all blocks: it would keep
 /// each spread over a vector on the stack, at three times the bytes to read.
@@ -60,25 +68,30 @@ struct Differences {
     }
 };
 
-/// Adds to each of kVectors `sum` what the displacement with these columns makes of `p`, by `weight` where
-/// there is one.
+/// One coordinate of add_bone().
+template <std::size_t kVectors, bool kWeighted, class D, class Bone>
+HWY_INLINE void add_along(D d, const Bone& bone, std::size_t row, Vec<D> Points<D>::*axis,
+                          const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
+    const Vec<D> x = bone.at(d, row);
+    const Vec<D> y = bone.at(d, 4 + row);
+    const Vec<D> z = bone.at(d, 8 + row);
+    const Vec<D> translation = bone.at(d, 12 + row);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+        const Vec<D> moved =
+            hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, translation)));
+        sum[v].*axis =
+            kWeighted ? hn::MulAdd(weight[v], moved, sum[v].*axis) : hn::Add(moved, sum[v].*axis);
+    }
+}
+
+/// Adds to each of kVectors `sum` the displacement of `p` by this bone, times `weight` where there is one.
 template <std::size_t kVectors, bool kWeighted, class D, class Bone>
 HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Points<D>* p, Points<D>* sum) {
-    // Coordinate by coordinate, so that few of the bone's numbers are in registers at once.
-    const auto add_along = [&](std::size_t row, Vec<D> Points<D>::*axis) HWY_ATTR {
-        const Vec<D> x = bone.at(d, row);
-        const Vec<D> y = bone.at(d, 4 + row);
-        const Vec<D> z = bone.at(d, 8 + row);
-        const Vec<D> shift = bone.at(d, 12 + row);
-        for (std::size_t v = 0; v < kVectors; ++v) {
-            const Vec<D> moved = hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, shift)));
-            sum[v].*axis =
-                kWeighted ? hn::MulAdd(weight[v], moved, sum[v].*axis) : hn::Add(moved, sum[v].*axis);
-        }
-    };
-    add_along(0, &Points<D>::x);
-    add_along(1, &Points<D>::y);
-    add_along(2, &Points<D>::z);
+    // Coordinate by coordinate, so that few of the bone's numbers are in registers at once. A lambda for one is at
+    // times called instead of inlined.
+    add_along<kVectors, kWeighted>(d, bone, 0, &Points<D>::x, weight, p, sum);
+    add_along<kVectors, kWeighted>(d, bone, 1, &Points<D>::y, weight, p, sum);
+    add_along<kVectors, kWeighted>(d, bone, 2, &Points<D>::z, weight, p, sum);
 }
 
 /// Lanes [lane, lane + kVectors * N) of block `b`, which is not mixed.
@@ -87,9 +100,9 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
 /// other_of  what the bone of an influence differs from it; if plain, that bone
 /// kCount    the number of influences, or 0 for `count`
 template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class OtherOf>
-HWY_INLINE void deform_lanes(D d, const Frame& frame, const Places& places, std::size_t b, std::size_t lane,
+HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b, std::size_t lane,
                              std::size_t count, const float* first, const OtherOf& other_of) {
-    const Lanes<float>* const rows = places.rows + places.blocks[b].first_row;
+    const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
     const std::size_t step = hn::Lanes(d);
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
@@ -106,11 +119,11 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const Places& places, std:
         for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
         add_bone<kVectors, true>(d, other_of(k), weight, p, sum);
     }
-    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, places, b, lane + v * step, sum[v]);
+    for (std::size_t v = 0; v < kVectors; ++v) store_points(d, pointers, b, lane + v * step, sum[v]);
 }
 
 HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
-    return frame.palette->bones[kLbsQuads * static_cast<std::size_t>(bone)].value.data();
+    return frame.palette->bones[kLbsColumns * static_cast<std::size_t>(bone)].value.data();
 }
 
 template <std::size_t kCount, bool kPlain, class OtherOf>
@@ -119,12 +132,12 @@ HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t e
     const Full d;
     // A bone's numbers are spread over a vector once for two: a quarter of the time on AVX2.
     constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
-    const Places places = places_of(frame);
-    const std::size_t count = places.blocks[begin].influences;
+    const MeshPointers pointers = pointers_of(frame);
+    const std::size_t count = pointers.blocks[begin].influences;
     for (std::size_t b = begin; b < end; ++b) {
-        const std::size_t lanes = lanes_end(d, places.blocks[b]);
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
-            deform_lanes<kCount, kVectors, kPlain>(d, frame, places, b, lane, count, first, other_of);
+            deform_lanes<kCount, kVectors, kPlain>(d, frame, pointers, b, lane, count, first, other_of);
         }
     }
 }
@@ -187,17 +200,17 @@ HWY_INLINE bool deform_vertex(const Frame& frame, const std::int32_t* bones, std
     };
     // Not by way of memory: a vector load of what was just stored in parts waits for it.
     V4 sum = hn::IfThenElse(hn::FirstN(four, 1), x, hn::IfThenElse(hn::FirstN(four, 2), y, z));
-    V4 first[kLbsQuads];
+    V4 first[kLbsColumns];
     const float* const stored_first = columns_of_bone(frame, bones[0]);
-    for (std::size_t c = 0; c < kLbsQuads; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
+    for (std::size_t c = 0; c < kLbsColumns; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
     const V4 by_first = moved_by(first);
     sum = kPlain ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
     float least = size_of(0);
     for (std::size_t k = 1; k < count; ++k) {
         const float* const stored = columns_of_bone(frame, bones[k]);
         least = std::min(least, size_of(k));
-        V4 columns[kLbsQuads];
-        for (std::size_t c = 0; c < kLbsQuads; ++c) {
+        V4 columns[kLbsColumns];
+        for (std::size_t c = 0; c < kLbsColumns; ++c) {
             columns[c] = hn::Load(four, stored + 4 * c);
             if (!kPlain) columns[c] = hn::Sub(columns[c], first[c]);
         }
@@ -217,7 +230,7 @@ inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int3
 
 inline void deform_mixed(const Frame& frame, std::size_t b) {
     const Block& block = frame.mesh->blocks[b];
-    const Lanes<float>* const rows = &frame.mesh->rows[block.first_row];
+    const Lanes<float>* const rows = &frame.rows[block.first_row];
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
         const float* const of_vertex = rows->lane.data() + lane;
@@ -232,9 +245,9 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
 
 inline void deform_mixed(const Frame& frame, std::size_t b) {
     const One d;
-    const Places places = places_of(frame);
-    const Block& block = places.blocks[b];
-    const Lanes<float>* const rows = places.rows + block.first_row;
+    const MeshPointers pointers = pointers_of(frame);
+    const Block& block = pointers.blocks[b];
+    const Lanes<float>* const rows = pointers.rows + block.first_row;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
         const bool plain = is_plain(*frame.palette, bones, block.influences);
@@ -250,13 +263,13 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
             plain ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
                   : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
         }
-        store_points(d, places, b, lane, sum);
+        store_points(d, pointers, b, lane, sum);
     }
 }
 
 #endif
 
-inline void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
+void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end;) {
         const Block& block = frame.mesh->blocks[b];
         if (block.mixed) {
@@ -287,8 +300,96 @@ inline void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
+/// The columns of each displacement, for lbs.
+void prepare_lbs(std::span<const std::int32_t> used,
+                            std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    const hn::CappedTag<float, 4> d;
+    const auto three = hn::FirstN(d, 3);
+    // Of vectors, as the identity's other columns are this one in other lanes.
+    alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        const float* const from = &posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+        float* const to = palette.bones[kLbsColumns * i].value.data();
+        auto squares = hn::Zero(d);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const auto column = hn::IfThenElseZero(three, hn::LoadU(d, from + 3 * c));
+            const auto displacement = hn::Sub(column, hn::Load(d, kIdentity[c]));
+            squares = hn::MulAdd(displacement, displacement, squares);
+            hn::Store(displacement, d, to + 4 * c);
+        }
+        // From one before, as there is none after the last.
+        const auto shift = hn::ShiftRightLanes<1>(d, hn::LoadU(d, from + 8));
+        hn::Store(shift, d, to + 12);
+        const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(shift, shift)));
+        const float length = hn::GetLane(hn::SumOfLanes(d, squares));
+        palette.sizes[i] = length < kLong ? std::max(size, kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
+    }
+}
+
+#else
+
+void prepare_lbs(std::span<const std::int32_t> used,
+                            std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+    for (std::size_t i = 0; i < used.size(); ++i) {
+        const Affine<float>& motion = posed_from_rest[static_cast<std::size_t>(used[i])];
+        const Mat3<float> m = motion.linear - Mat3<float>(1.0f);
+        Float4* const to = &palette.bones[kLbsColumns * i];
+        for (int c = 0; c < 3; ++c) to[c] = {{m[c].x, m[c].y, m[c].z, 0.0f}};
+        const Vec3<float>& shift = motion.translation;
+        to[3] = {{shift.x, shift.y, shift.z, 0.0f}};
+        const float length = glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]);
+        palette.sizes[i] =
+            length < kLong ? std::max(glm::dot(shift, shift), kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
+    }
+}
+
+#endif
+
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace sinew {
+namespace {
+
+using HWY_NAMESPACE::kLbsColumns;
+
+constexpr Float4 kRestRow[kLbsColumns] = {};
+
+void prepare_between_spaces(const Bones& bones, Palette& palette) {
+    const auto bones_from_model = cast<double>(bones.bones_from_model);
+    const Affine<double> model_from_bones = inverse(bones_from_model);
+    for (std::size_t i = 0; i < bones.used.size(); ++i) {
+        const Affine<float>& posed = bones.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
+        const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
+        const Mat3<double> m = motion.linear - Mat3<double>(1.0);
+        Float4* const columns = &palette.bones[kLbsColumns * i];
+        for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
+        const Vec3<double>& translation = motion.translation;
+        columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
+        palette.sizes[i] =
+            size_of(translation, glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+    }
+}
+
+void prepare_bones(const Kernel& kernel, const Bones& bones, Palette& palette) {
+    if (is_identity(bones.bones_from_model)) {
+        kernel.target().prepare(bones.used, bones.posed_from_rest, palette);
+    } else {
+        prepare_between_spaces(bones, palette);
+    }
+}
+
+constexpr Kernel kKernel{kRestRow, false, prepare_bones, SINEW_TARGETS(deform_lbs, prepare_lbs)};
+
+}  // namespace
+
+const Kernel& Lbs::kernel() noexcept { return kKernel; }
+
+}  // namespace sinew
 
 #endif

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The rigid methods on lanes, agreeing with skinning/: compiled once for each instruction set, see
+// kernels/.
+//
+// Rows of bones are summed as Palette says; `finish` makes points of the sums. There is no case for blends that
+// cancel: a term never points against the sum before it, so |sum|^2 >= the sum of squared weights
+// >= 1 / influences, and kDegenerateBlend takes 1e12 influences.
+#if defined(SINEW_DEFORM_BLEND_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SINEW_DEFORM_BLEND_INL_H_
+#undef SINEW_DEFORM_BLEND_INL_H_
+#else
+#define SINEW_DEFORM_BLEND_INL_H_
+#endif
+
+#include "sinew/deform/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+/// Numbers of a bone's row: two quads.
+inline constexpr std::size_t kRow = 8;
+
+/// The weighted sum of rows.
+template <class D>
+struct Sum {
+    Vec<D> value[kRow];
+};
+
+template <class D>
+HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin, std::size_t end,
+                        Sum<D>& sum) {
+    for (std::size_t i = begin; i < end; ++i) {
+        sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
+    }
+}
+
+/// A weighted sum, and that of the quaternions alone up to here, which says on what side the next is added.
+template <class D>
+struct Blend {
+    Sum<D> sum;
+    Vec<D> side[4];
+};
+
+/// The base that rows are added without where they are added plainly.
+inline constexpr float kNoBase[kRow] = {};
+
+/// plain  whether the first row is added by its weight
+template <class D>
+HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight, bool plain) {
+    Blend<D> blend;
+    for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Set(d, row[i]);
+    for (std::size_t i = 0; i < 4; ++i) blend.side[i] = hn::Mul(weight, hn::Set(d, row[i]));
+    if (plain) {
+        for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Mul(weight, hn::Set(d, row[i]));
+    }
+    return blend;
+}
+
+/// Adds what `row`, turned to the side of the blend, differs from the `base`: the first row, or kNoBase; the
+/// weight, negative where it was turned.
+///
+/// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
+/// must decide a tie alike.
+template <class Rigid, class D>
+HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight, Blend<D>& blend) {
+    Vec<D>* const side = blend.side;
+    const Vec<D> dot =
+        hn::Add(hn::Add(hn::Mul(hn::Set(d, row[0]), side[0]), hn::Mul(hn::Set(d, row[2]), side[2])),
+                hn::Add(hn::Mul(hn::Set(d, row[1]), side[1]), hn::Mul(hn::Set(d, row[3]), side[3])));
+    const auto away = hn::Lt(dot, hn::Zero(d));
+    const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
+    for (std::size_t i = 0; i < kRow; ++i) {
+        const Vec<D> difference = hn::Set(d, row[i] - base[i]);
+        const Vec<D> turned = hn::Set(d, -row[i] - base[i]);
+        const Vec<D> by =
+            i < 4 * Rigid::kSignedFloat4s ? hn::IfThenElse(away, turned, difference) : difference;
+        blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
+    }
+    for (std::size_t i = 0; i < 4; ++i) side[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), side[i]);
+    return signed_weight;
+}
+
+HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
+    return palette.bones[kRow / 4 * static_cast<std::size_t>(bone)].value.data();
+}
+
+/// What the scale of `bone` adds to `rest`, or false where it has none.
+template <class D>
+HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest, Points<D>& by) {
+    const auto index = static_cast<std::size_t>(bone);
+    if (!palette.any_scale || palette.has_scale[index] == 0) return false;
+    by = displacement(d, palette.scales[kDisplacementRows * index].value.data(), rest);
+    return true;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#endif

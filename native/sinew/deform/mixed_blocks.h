@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sinew/deform/kernels.h"
+
+namespace sinew {
+
+/// How much of a block the second method deforms.
+enum class Share : std::uint8_t { none, some, all };
+
+/// The weights of the stage `mix` in the order of a packed mesh.
+struct MixWeights {
+    std::vector<Lanes<float>> weights;  // [blocks] 0 to 1
+    std::vector<Share> shares;          // [blocks]
+};
+
+/// weights  [vertices] not NaN; clamped to 0 to 1
+[[nodiscard]] MixWeights pack_mix(const PackedMesh& mesh, std::span<const float> weights);
+
+/// Deforms the blocks [begin, end) as Mix says, by two kernels. One that no vertex of a block takes is left out there,
+/// so such blocks have the bits that the other kernel alone gives.
+///
+/// frames  for each kernel; of one mesh, and with the same points to write
+void deform_mixed_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
+                         const MixWeights& mix, std::size_t begin, std::size_t end) noexcept;
+
+}  // namespace sinew

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+
+namespace sinew {
+
+/// What the value of a parameter is.
+enum class ParameterKind {
+    number,        // float
+    integer,       // int
+    boolean,       // bool
+    choice,        // one of Parameter::choices
+    vertex_group,  // float32 [vertices]: a weight for each vertex
+    method,        // the name of a method
+};
+
+/// The name of a kind for programs: "float", "int", "bool", "enum", "vertex_group", "method".
+[[nodiscard]] constexpr std::string_view name_of(ParameterKind kind) noexcept {
+    constexpr std::string_view kNames[] = {"float", "int", "bool", "enum", "vertex_group", "method"};
+    return kNames[static_cast<std::size_t>(kind)];
+}
+
+/// Whether `kind` has Parameter::initial, minimum and maximum.
+[[nodiscard]] constexpr bool is_numeric(ParameterKind kind) noexcept {
+    return kind == ParameterKind::number || kind == ParameterKind::integer || kind == ParameterKind::boolean;
+}
+
+/// A setting of a method or of a stage.
+struct Parameter {
+    std::string_view id;           // what programs say
+    std::string_view label;        // what people read
+    std::string_view description;  // one sentence
+    std::string_view unit;         // "", "length", "angle" (radians), "factor"
+    ParameterKind kind;
+    double initial = 0.0;  // the default; 0 or 1 of a boolean, the place in `choices` of a choice
+    double minimum = -std::numeric_limits<double>::infinity();
+    double maximum = std::numeric_limits<double>::infinity();
+    std::span<const std::string_view> choices{};  // of a choice
+};
+
+/// What a method takes besides points, influences and bone transforms.
+enum class Needs : unsigned {
+    nothing = 0,
+    rest_bones = 1,  // where bones are scaled
+};
+
+/// Facts of a method. Each method has its own, as `info`.
+struct MethodInfo {
+    int number;                    // stored in .blend files: never changed, never used again
+    std::string_view name;         // what programs say
+    std::string_view label;        // what people read
+    std::string_view description;  // one sentence: when to use it
+    std::string_view source;       // the papers
+    Needs needs;
+    std::span<const Parameter> parameters{};
+};
+
+/// The number is the method's identity.
+[[nodiscard]] constexpr bool operator==(const MethodInfo& a, const MethodInfo& b) noexcept {
+    return a.number == b.number;
+}
+
+/// Facts of a stage: what may follow a method.
+struct StageInfo {
+    std::string_view name;
+    std::string_view label;
+    std::string_view description;
+    std::string_view source;
+    std::span<const Parameter> parameters{};
+};
+
+/// How the library deforms whole meshes by a method: see deform/kernels.h.
+struct Kernel;
+
+}  // namespace sinew

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Deformers of a shared binding, and the stage `mix`.
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "scene.h"
+#include "sinew/deform/simd.h"
+#include "sinew/skinning/mix.h"
+
+namespace sinew {
+namespace {
+
+using test::about;
+using test::deformed;
+using test::distance;
+using test::in_double;
+using test::kTolerance;
+using test::Random;
+using test::random_scene;
+using test::same_bits;
+using test::Scene;
+
+/// Whole stretches of 0 and of 1, as painted weights have them, and all between.
+std::vector<float> painted(std::uint32_t seed, std::size_t vertices) {
+    Random random(seed);
+    std::vector<float> weights(vertices);
+    for (std::size_t begin = 0; begin < vertices;) {
+        const std::size_t end = std::min(vertices, begin + 1 + static_cast<std::size_t>(random.index(90)));
+        const int kind = random.index(3);
+        for (; begin < end; ++begin) {
+            weights[begin] =
+                kind < 2 ? static_cast<float>(kind) : static_cast<float>(random.uniform(0.0, 1.0));
+        }
+    }
+    return weights;
+}
+
+/// A scene of few sets of bones in order, so that whole blocks have weights of 0 and of 1.
+Scene scene_in_order(std::uint32_t seed, std::size_t vertices) {
+    Random random(seed);
+    Scene scene = random_scene(seed, 0, 1.0);
+    for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+        auto influences = random.influences<float>(1 + vertex / 200 % 5, 12);
+        for (std::size_t k = 0; k < influences.size(); ++k) {
+            influences[k].bone = static_cast<std::int32_t>((vertex / 200 + 2 * k) % 12);
+        }
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+    }
+    return scene;
+}
+
+class Mixes : public testing::TestWithParam<std::tuple<std::string_view, MethodInfo, MethodInfo>> {
+protected:
+    void SetUp() override { use_simd_target(std::get<0>(GetParam())); }
+    void TearDown() override { use_simd_target(simd_targets().front()); }
+    static const MethodInfo& first() { return std::get<1>(GetParam()); }
+    static const MethodInfo& second() { return std::get<2>(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, Mixes,
+                         testing::Combine(testing::ValuesIn(simd_targets()), testing::ValuesIn(kMethods),
+                                          testing::ValuesIn(kMethods)),
+                         [](const auto& info) {
+                             return std::string(std::get<0>(info.param)) + "_" +
+                                    std::string(std::get<1>(info.param).name) + "_" +
+                                    std::string(std::get<2>(info.param).name);
+                         });
+
+TEST_P(Mixes, agree_with_skinning_in_double) {
+    for (const bool ordered : {false, true}) {
+        const Scene scene = ordered ? scene_in_order(1, 1500) : random_scene(1, 700, 1.0);
+        const auto weights = painted(2, scene.rest_points.size());
+        const auto a = in_double(first(), scene);
+        const auto b = in_double(second(), scene);
+        const auto points =
+            deformed(Deformer(Binding(scene.data()), first(), MixData{second(), weights}), scene);
+        for (std::size_t v = 0; v < points.size(); ++v) {
+            const Vec3<double> expected = Mix::deform_vertex(a[v], b[v], static_cast<double>(weights[v]));
+            ASSERT_LT(distance(Vec3<double>(points[v]), expected), kTolerance) << v;
+        }
+    }
+}
+
+TEST_P(Mixes, where_weights_are_0_or_1_have_the_bits_of_one_method) {
+    const Scene scene = scene_in_order(3, 3000);
+    const Binding binding(scene.data());
+    const auto weights = painted(4, scene.rest_points.size());
+    ASSERT_GT(std::ranges::count(weights, 0.0f), 500);
+    ASSERT_GT(std::ranges::count(weights, 1.0f), 500);
+    const DeformOptions in_another_space{{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}}, 0};
+    for (const DeformOptions& options : {DeformOptions{}, in_another_space}) {
+        const auto a = deformed(Deformer(binding, first()), scene, options);
+        const auto b = deformed(Deformer(binding, second()), scene, options);
+        const auto points = deformed(Deformer(binding, first(), MixData{second(), weights}), scene, options);
+        for (std::size_t v = 0; v < points.size(); ++v) {
+            if (weights[v] == 0.0f) {
+                ASSERT_TRUE(same_bits(points[v], a[v])) << v;
+            } else if (weights[v] == 1.0f) {
+                ASSERT_TRUE(same_bits(points[v], b[v])) << v;
+            }
+        }
+    }
+}
+
+TEST_P(Mixes, keep_the_rest_pose_to_the_bit) {
+    Scene scene = random_scene(5, 500, 1000.0);
+    scene.posed_from_rest.assign(scene.posed_from_rest.size(), {});
+    const auto weights = painted(6, scene.rest_points.size());
+    const auto points = deformed(Deformer(Binding(scene.data()), first(), MixData{second(), weights}), scene);
+    for (std::size_t v = 0; v < points.size(); ++v) {
+        ASSERT_TRUE(same_bits(points[v], scene.rest_points[v]));
+    }
+}
+
+TEST_P(Mixes, threads_change_no_bit) {
+    const Scene scene = scene_in_order(7, 20000);
+    const auto weights = painted(8, scene.rest_points.size());
+    const Deformer deformer(Binding(scene.data()), first(), MixData{second(), weights});
+    const auto expected = deformed(deformer, scene, {{}, 1});
+    for (std::size_t threads = 2; threads <= 5; ++threads) {
+        const auto points = deformed(deformer, scene, {{}, threads});
+        ASSERT_TRUE(std::ranges::equal(points, expected, same_bits<float>)) << threads;
+    }
+}
+
+TEST(Mix, weights_beyond_0_to_1_are_clamped) {
+    const Scene scene = random_scene(9, 200, 1.0);
+    const Binding binding(scene.data());
+    std::vector<float> weights(200, -3.0f);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    std::fill_n(weights.begin(), 100, kInfinity);
+    const auto lbs = deformed(Deformer(binding, Lbs::info), scene);
+    const auto dq = deformed(Deformer(binding, Dq::info), scene);
+    const auto points = deformed(Deformer(binding, Lbs::info, MixData{Dq::info, weights}), scene);
+    for (std::size_t v = 0; v < points.size(); ++v) {
+        ASSERT_TRUE(same_bits(points[v], v < 100 ? dq[v] : lbs[v])) << v;
+    }
+}
+
+TEST(Mix, says_what_it_was_made_of) {
+    const Scene scene = random_scene(10, 3, 1.0);
+    const std::vector<float> weights(3, 0.5f);
+    const Binding binding(scene.data());
+    EXPECT_EQ(Deformer(binding, Lbs::info).mixed_method(), nullptr);
+    const Deformer deformer(binding, Lbs::info, MixData{Dq::info, weights});
+    EXPECT_EQ(deformer.method(), Lbs::info);
+    EXPECT_EQ(*deformer.mixed_method(), Dq::info);
+}
+
+template <class Call>
+std::string refusal(const Call& call) {
+    try {
+        call();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "nothing thrown";
+}
+
+TEST(Mix, refuses_what_it_can_not_mix) {
+    const Scene scene = random_scene(11, 3, 1.0);
+    const Binding binding(scene.data());
+    const auto with = [&](const MethodInfo& method, const std::vector<float>& weights) {
+        return refusal([&] { const Deformer deformer(binding, Lbs::info, MixData{method, weights}); });
+    };
+    EXPECT_EQ(with(Dq::info, {0, 1, 0}), "nothing thrown");
+    EXPECT_EQ(with(Dq::info, {0, 1}), "mix: expected a weight for each of the 3 vertices, got 2");
+    EXPECT_EQ(with(Dq::info, {0, std::numeric_limits<float>::quiet_NaN(), 0}),
+              "mix: expected weights from 0 to 1, got NaN at vertex 1");
+    std::string names;
+    for (const MethodInfo& method : kMethods) names += (names.empty() ? "" : ", ") + std::string(method.name);
+    const std::string message = ": expected one of " + names + ", got a method of number 1000";
+    const MethodInfo unknown{1000, "none", "", "", "", Needs::nothing};
+    EXPECT_EQ(with(unknown, {0, 1, 0}), "mix" + message);
+    EXPECT_EQ(refusal([&] { const Deformer deformer(binding, unknown); }),
+              "method" + message);
+}
+
+TEST(Bindings, are_shared_by_deformers_that_differ_in_nothing_from_others) {
+    const Scene scene = random_scene(12, 700, 1.0);
+    const Binding binding(scene.data());
+    EXPECT_EQ(binding.vertex_count(), 700u);
+    EXPECT_EQ(binding.bone_count(), 12u);
+    EXPECT_EQ(binding.influence_count(), scene.bones.size());
+    for (const MethodInfo& method : kMethods) {
+        const auto points = deformed(Deformer(binding, method), scene);
+        const auto expected = deformed(Deformer(scene.data(), method), scene);
+        EXPECT_TRUE(std::ranges::equal(points, expected, same_bits<float>)) << method.name;
+    }
+}
+
+TEST(Bindings, outlive_their_own_name) {
+    const Scene scene = random_scene(13, 100, 1.0);
+    const auto make = [&] {
+        const Binding binding(scene.data());
+        return Deformer(binding, Dq::info);
+    };
+    const Deformer deformer = make();
+    const auto expected = deformed(Deformer(scene.data(), Dq::info), scene);
+    EXPECT_TRUE(std::ranges::equal(deformed(deformer, scene), expected, same_bits<float>));
+}
+
+TEST(Bindings, new_rest_points_are_those_of_one_deformer) {
+    const Scene scene = random_scene(14, 300, 1.0);
+    Scene other = scene;
+    for (Vec3<float>& point : other.rest_points) point = 0.5f * point + Vec3<float>(0, 1, 0);
+    const Binding binding(scene.data());
+    Deformer changed(binding, Dq::info);
+    const Deformer unchanged(binding, Dq::info);
+    const auto before = deformed(unchanged, scene);
+    changed.set_rest_points(other.rest_points);
+    EXPECT_TRUE(std::ranges::equal(deformed(unchanged, scene), before, same_bits<float>));
+    EXPECT_TRUE(std::ranges::equal(deformed(Deformer(binding, Dq::info), scene), before, same_bits<float>));
+    const auto expected = deformed(Deformer(other.data(), Dq::info), other);
+    EXPECT_TRUE(std::ranges::equal(deformed(changed, scene), expected, same_bits<float>));
+}
+
+}  // namespace
+}  // namespace sinew
