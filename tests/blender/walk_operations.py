@@ -142,7 +142,7 @@ class Walker:
         return obj.data.library is None and obj.override_library is None
 
     def has_upstream(self, obj: bpy.types.Object) -> bool:
-        """Whether Sinew may evaluate apart what comes to the Armature modifier: two objects then have the mesh,
+        """Whether Sinew evaluates apart what comes to the Armature modifier: two objects have the mesh then,
         which operators of Blender that apply do not take."""
         keys, modifiers = obj.data.shape_keys, self.modifiers(obj)
         is_first = bool(modifiers) and modifiers[0].type == "ARMATURE"
