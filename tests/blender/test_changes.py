@@ -329,3 +329,17 @@ def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkey
     expected = scenes.final_points(obj)
     evaluate.use_method(obj, "lbs")
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_a_heat_map_of_a_mesh_that_two_objects_have():
+    """Then Sinew deforms after the update, by points that no evaluation has written to the file."""
+    obj, _armature = scenes.make_arm()
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(6)
+    expected = scenes.final_points(other)
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    properties.of(obj).heat = True
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
