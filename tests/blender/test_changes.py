@@ -289,6 +289,25 @@ def test_registered_with_a_driven_file_open():
     assert scenes.worst(shown, scenes.final_points(obj)) <= 1e-6
 
 
+@pytest.mark.parametrize("safe", [False, True])
+def test_keys_of_a_file_that_was_on_another_frame_before_sinew(monkeypatch, safe):
+    monkeypatch.setattr(safe_mode, "_forced", safe)
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    for frame, method in ((1, "lbs"), (8, "dq")):
+        bpy.context.scene.frame_set(frame)
+        properties.of(obj).method = method
+        obj.keyframe_insert("sinew.method", frame=frame)
+    bpy.context.scene.frame_set(9)
+    sinew_addon.unregister()
+    bpy.context.scene.frame_set(3)
+    sinew_addon.register()
+    got = scenes.final_points(obj)
+    bpy.context.scene.frame_set(3)
+    assert properties.of(obj).method == "lbs"
+    assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
 def test_a_driver_that_gives_no_method_is_said_so():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
