@@ -102,7 +102,7 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
         copy.make_local(clear_liboverride=True)
     properties.clear(copy)
     properties.of(copy).helper = True
-    wanted = {m.name for m in stack.in_front(obj) if m.type != "ARMATURE"}
+    wanted = {m.name for m in stack.in_front(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)
     # Follows the object whatever moves that.

@@ -270,3 +270,21 @@ def test_a_simulation_in_front_is_refused_with_a_sentence():
     with pytest.raises(RuntimeError, match="Front in front of Armature is a simulation"):
         bpy.ops.sinew.add()
     assert snapshot.of_file() == before
+
+
+def test_an_armature_modifier_in_front_of_what_is_in_front():
+    """It is none of those in whose place Sinew stands, and deforms what comes to them."""
+    obj, _armature = scenes.make_arm()
+    _other, armature = scenes.make_arm(name="Other")
+    scenes.key_pose(armature, 40.0)
+    scenes.add_sinew(obj, "lbs")
+    obj.modifiers.new("Smooth", "SMOOTH")
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    first = obj.modifiers.new("First", "ARMATURE")
+    first.object = armature
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    got = scenes.shapes(obj, [1, 6, 11])
+    assert [m.type for m in obj.modifiers] == ["ARMATURE", "SMOOTH", "NODES", "ARMATURE"]
+    properties.of(obj).enabled = False
+    expected = scenes.modifier_shapes(obj, [1, 6, 11], preserve_volume=False)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
