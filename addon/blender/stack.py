@@ -48,8 +48,8 @@ def _start(obj: bpy.types.Object) -> int:
         return _index(obj, min(candidates, key=lambda m: not is_on(m), default=None))
     behind_own = _index(obj, sinew_modifier(obj)) + 1
     names = {stand_in.name for stand_in in properties.of(obj).stand_ins}
-    known = (i for i, m in enumerate(modifiers) if m.type == "ARMATURE" and m.name in names)
-    start = next(known, behind_own)
+    known = [i for i, m in enumerate(modifiers) if m.type == "ARMATURE" and m.name in names]
+    start = next(iter(known), behind_own)
     # Renamed, or new: between our own modifier and the first that is known.
     between = modifiers[behind_own:start]
     if between and all(m.type == "ARMATURE" for m in between):
@@ -58,7 +58,8 @@ def _start(obj: bpy.types.Object) -> int:
     ahead = min(start, len(modifiers)) - 1
     if ahead >= 0 and modifiers[ahead] == sinew_modifier(obj):
         ahead -= 1
-    while ahead >= 0 and _deforms(modifiers[ahead]):
+    # Or renamed, where Sinew is behind them: Sinew has switched those off.
+    while ahead >= 0 and (_deforms(modifiers[ahead]) or (not known and modifiers[ahead].type == "ARMATURE")):
         start, ahead = ahead, ahead - 1
     return start
 

@@ -152,3 +152,21 @@ def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
     got = scenes.final_points(obj)
     properties.of(obj).enabled = False
     assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_a_keyed_modifier_is_renamed_while_it_is_off():
+    """Sinew's is behind it then."""
+    obj, _armature = scenes.make_arm()
+    modifier = obj.modifiers["Armature"]
+    for frame, value in ((3, False), (9, True)):
+        modifier.show_viewport = modifier.show_render = value
+        modifier.keyframe_insert("show_viewport", frame=frame)
+        modifier.keyframe_insert("show_render", frame=frame)
+    bpy.context.scene.frame_set(1)
+    expected = scenes.shapes(obj, FRAMES)
+    bpy.context.scene.frame_set(1)
+    scenes.add_sinew(obj, "lbs")
+    modifier.name = "Other"
+    handlers.refresh(bpy.context)
+    assert properties.is_driven(obj)
+    check(obj, expected)
