@@ -264,7 +264,9 @@ def update(
         driven.watched = {obj.session_uid, mesh, keys, _uid(properties.of(obj).front), *driven.armatures}
         if not wanted.uses_builtin:
             hold_pose(obj, driven)
-    is_same = driven is known and driven.source is known_source
+    # A render lists all as new with each frame; to tag the object has Blender (4.2 to 5.2) copy it anew,
+    # without what animation had set.
+    is_same = driven is known and driven.source.equals(known_source)
     if driven.is_left:
         driven.frames = None
     elif driven.plan.state is State.IN_DEPSGRAPH:

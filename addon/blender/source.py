@@ -34,6 +34,15 @@ class Source:
     known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
 
+    def equals(self, other: Source) -> bool:
+        if self is other:
+            return True
+        keys, known = self.shape_keys, other.shape_keys
+        if (keys is None) != (known is None) or not self.equals_but_for_points(other):
+            return False
+        has_same_keys = keys is None or keys.equals(known)
+        return has_same_keys and np.array_equal(self.points, other.points)
+
     def equals_but_for_points(self, other: Source) -> bool:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 

@@ -22,6 +22,14 @@ class ShapeKeys:
     basis: np.ndarray
     moves: Sequence[np.ndarray | None]
 
+    def equals(self, other: ShapeKeys) -> bool:
+        if self.names != other.names or not np.array_equal(self.basis, other.basis):
+            return False
+        return all(
+            (a is None) == (b is None) and (a is None or np.array_equal(a, b))
+            for a, b in zip(self.moves, other.moves, strict=True)
+        )
+
     def mix(self, values: np.ndarray) -> np.ndarray:
         """float32 [vertices, 3] with each key at its value; a muted key's value is 0."""
         points = self.basis.copy()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scenes
 from mathutils import Matrix
+from sinew_addon.blender import properties
 
 SIZE = 96
 
@@ -189,5 +190,29 @@ def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered
     (tmp_path / "sinew").mkdir()
     expected = render_animation(scene, tmp_path / "modifier", (5, 7))
     scenes.add_sinew(obj, "lbs")
+    got = render_animation(scene, tmp_path / "sinew", (5, 7))
+    assert np.abs(got - expected).mean() < 3e-4
+
+
+def test_keys_of_settings_and_of_modifiers_behind_are_rendered(tmp_path):
+    """Blender shows another frame than the one that is rendered."""
+    obj, _armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur=False)
+    flag, cast = obj.modifiers["Armature"], obj.modifiers.new("Cast", "CAST")
+    for frame, value in ((8, False), (9, True)):
+        flag.use_deform_preserve_volume = value
+        flag.keyframe_insert("use_deform_preserve_volume", frame=frame)
+        cast.factor = float(value)
+        cast.keyframe_insert("factor", frame=frame)
+    scene.frame_set(11)
+    (tmp_path / "modifier").mkdir()
+    (tmp_path / "sinew").mkdir()
+    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
+    scenes.add_sinew(obj, "dq")
+    for frame, method in ((8, "lbs"), (9, "dq")):
+        properties.of(obj).method = method
+        obj.keyframe_insert("sinew.method", frame=frame)
+    scene.frame_set(11)
     got = render_animation(scene, tmp_path / "sinew", (5, 7))
     assert np.abs(got - expected).mean() < 3e-4
