@@ -434,6 +434,8 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     new.meshes.add(obj.data.session_uid)
         if new.meshes:
             new.touched |= new.meshes
+            # What Sinew does itself came before them.
+            session.expected -= new.meshes
             _react(depsgraph, new, is_ours)
     _end_of_announced()
 

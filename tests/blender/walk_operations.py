@@ -1683,6 +1683,9 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
         # What was touched before and again in a handler is looked at with the next event.
         w.this_frame()
     else:
+        # So is what was set just now: it touches the mesh, too.
+        w.before_evaluation()
+        bpy.context.view_layer.update()
         bpy.context.scene.frame_set(number)
     if act in handlers:
         handlers.remove(act)
