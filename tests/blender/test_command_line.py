@@ -158,9 +158,8 @@ def test_parameters_are_set_by_name(tmp_path):
 def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):
     path, _expected = arm_file
     options = [option for text in given for option in ("--set", text)]
-    result = run_sinew(
-        "points", path, "--method", "lbs", *options, "--frames", "1", "--out", tmp_path / "o.npz", status=status
-    )
+    arguments = ("points", path, "--method", "lbs", "--frames", "1", "--out", tmp_path / "o.npz")
+    result = run_sinew(*arguments, *options, status=status)
     assert sentence in result.stderr
     assert "Traceback" not in result.stderr
 
