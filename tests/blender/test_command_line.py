@@ -34,6 +34,7 @@ def arm_file(tmp_path):
     return path, expected
 
 
+@pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
     # tests/python/test_documented.py holds that README names them all.
@@ -210,6 +211,7 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
         assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
 
 
+@pytest.mark.once
 def test_bad_input_is_one_sentence(arm_file, tmp_path):
     path, _expected = arm_file
     (tmp_path / "empty.blend").touch()
@@ -382,6 +384,7 @@ def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
     assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
 
 
+@pytest.mark.once
 def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
     path, _expected = keyed_file
     left, right = bpy.data.objects["Left Rig"], bpy.data.objects["Right Rig"]
