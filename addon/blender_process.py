@@ -101,6 +101,7 @@ class BlenderProcess:
         if not self._is_there:
             self._greet()
         self._begin(limits)
+        assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
@@ -143,6 +144,7 @@ class BlenderProcess:
             raise SinewError(answer["refused"])
 
     def _answer(self) -> dict:
+        assert self._process.stdout is not None
         line = self._process.stdout.readline()
         # Before the worker is there, Blender and what it runs at its start print what they like.
         while line and not self._is_there and not line.startswith(GREETINGS):
@@ -192,7 +194,7 @@ class BlenderProcess:
         return self._said().get("doing", "starting")
 
     def _said(self) -> dict:
-        """ "doing", and what else there is to know of it; nothing before its first word."""
+        """Its task as "doing", and how far it is; nothing before its first word."""
         with contextlib.suppress(OSError, ValueError):
             return json.loads((self._folder.path / DOING).read_bytes())
         return {}
@@ -220,7 +222,7 @@ def _command() -> list[str]:
 
 
 def _environment(limits: Limits) -> dict[str, str]:
-    """This one's, with what `limits` says of threads."""
+    """As of this process, with what `limits` says of threads."""
     if not limits.threads:
         return dict(os.environ)
     # Mesa's OpenGL without graphics hardware has threads, too: 0 are faster than 1.

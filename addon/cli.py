@@ -8,6 +8,7 @@ import atexit
 import re
 import sys
 from contextlib import suppress
+from typing import TYPE_CHECKING, Protocol
 
 from .blender import native
 from .core import interrupt
@@ -15,13 +16,24 @@ from .core.errors import SinewError, WrongUse
 from .core.output import sentence as output_sentence
 from .prepare import leave_blender, prepare_blender
 
+if TYPE_CHECKING:
+    from .commands.console import Console
+
 # The batches have Blenders of their own, or ask for this one; a report without Blender has no pictures.
 WITHOUT_BLENDER = ("methods", "check", "report", "reskin", "restore")
 
 _commands: list[object] = []
 
 
-def make_parser() -> tuple[argparse.ArgumentParser, dict[str, object]]:
+class Command(Protocol):
+    """What a module of commands/ has."""
+
+    def add_parser(self, subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser: ...
+
+    def run(self, args: argparse.Namespace, console: Console) -> int: ...
+
+
+def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
     """The parser of the whole command line, and the module of each subcommand."""
     from .commands import (
         bake,
@@ -37,7 +49,7 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, object]]:
         restore,
     )
 
-    modules = {
+    modules: dict[str, Command] = {
         "methods": methods,
         "info": info,
         "check": check,

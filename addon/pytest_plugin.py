@@ -51,14 +51,16 @@ def sinew_render(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[...
         **options: object,
     ) -> None:
         __tracebackhide__ = True
-        file, golden = here / file, here / golden
-        arguments = ["render", file, "--method", method, "--frames", frames, *_as_arguments(options)]
+        pictures = here / golden
+        arguments = ["render", here / file, "--method", method, "--frames", frames, *_as_arguments(options)]
         if request.config.getoption("--sinew-update"):
-            arguments += ["--out", golden]
-        elif not golden.is_dir():
-            pytest.fail(f"{golden}: no golden pictures; make them with pytest --sinew-update", pytrace=False)
+            arguments += ["--out", pictures]
+        elif not pictures.is_dir():
+            pytest.fail(
+                f"{pictures}: no golden pictures; make them with pytest --sinew-update", pytrace=False
+            )
         else:
-            arguments += ["--against", golden, "--out", tmp_path / f"render-{next(calls)}"]
+            arguments += ["--against", pictures, "--out", tmp_path / f"render-{next(calls)}"]
             if tolerance is not None:
                 arguments += ["--tolerance", tolerance]
         # A process of its own: it opens files, and the test may have one open.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""This folder is the package sinew_addon, and each folder in it with an __init__.py is a package below."""
+"""Builds sinew-blender: this folder is the package sinew_addon, each folder with __init__.py one below."""
 
 from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
@@ -8,7 +8,7 @@ from setuptools.command.build_py import build_py
 class Modules(build_py):
     """All but this file, which setuptools knows as the build's only where it is run as a program."""
 
-    def find_package_modules(self, package, package_dir):
+    def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
         return [found for found in super().find_package_modules(package, package_dir) if found[1] != "setup"]
 
 

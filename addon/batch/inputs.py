@@ -35,7 +35,7 @@ def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> l
     pattern, or below what all listed files have in common is kept there.
 
     Raises WrongUse, before anything is done, where an input means no file, a copy would be written over an
-    input, or two would have one name. A file that can not be read is left for its own job to report.
+    input, or two would have one name. A file that can not be read is reported by its own job.
     """
     out = Path(os.path.abspath(out))
     jobs: dict[Path, Job] = {}
@@ -67,7 +67,7 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
         found = _matching(root, path.relative_to(root))
     else:
         return path.parent, [path]
-    # What an earlier run wrote below the folder is not input, nor what one that was killed left behind.
+    # The output of an earlier run is not input, nor is what a killed run did not finish.
     resolved, resolve = out.resolve(), _resolver()
     may_be_below = resolved != root.resolve()
     files = [
@@ -88,16 +88,16 @@ def blend_files_below(folder: Path) -> Iterator[Path]:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """Also in linked folders, but in none that the way there has been through."""
+    """Also in linked folders, but in none that is already one of the folders above."""
     for path, folders, names in os.walk(folder, followlinks=True):
-        above = {os.path.realpath(part) for part in (path, *Path(path).parents)}
+        above = {os.path.realpath(part) for part in (Path(path), *Path(path).parents)}
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
         yield from (Path(path, name) for name in names)
 
 
 def _matching(root: Path, pattern: Path) -> Iterator[Path]:
     """The files below `root` that fit a pattern, as of glob: ** is any folders, and * is nothing hidden. Not
-    by glob itself, which goes round and round where links lead up again."""
+    by glob itself, which does not end where links lead up again."""
     parts = pattern.parts
     if "**" not in parts:
         found = glob.iglob(os.path.join(glob.escape(str(root)), pattern))
@@ -106,30 +106,30 @@ def _matching(root: Path, pattern: Path) -> Iterator[Path]:
 
 
 def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
-    # The places in the pattern that the names so far can have led to.
-    places = {0}
+    # The positions in the pattern that the names so far can have reached.
+    positions = {0}
     for name in names:
         shown = not name.startswith(".")
         after = set()
-        for place in _past_folders(places, parts):
-            if place == len(parts):
+        for position in _past_folders(positions, parts):
+            if position == len(parts):
                 continue
-            if parts[place] == "**":
-                after |= {place} if shown else set()
-            elif fnmatchcase(name, parts[place]) and (shown or parts[place].startswith(".")):
-                after.add(place + 1)
-        places = after
+            if parts[position] == "**":
+                after |= {position} if shown else set()
+            elif fnmatchcase(name, parts[position]) and (shown or parts[position].startswith(".")):
+                after.add(position + 1)
+        positions = after
     # At a pattern's end ** is any file, too.
-    return len(parts) in places or (parts[-1] == "**" and len(parts) - 1 in places)
+    return len(parts) in positions or (parts[-1] == "**" and len(parts) - 1 in positions)
 
 
-def _past_folders(places: set[int], parts: tuple[str, ...]) -> set[int]:
+def _past_folders(positions: set[int], parts: tuple[str, ...]) -> set[int]:
     """With those behind each **, which can be no folder at all."""
-    found = set(places)
-    for place in sorted(places):
-        while place < len(parts) and parts[place] == "**":
-            place += 1
-            found.add(place)
+    found = set(positions)
+    for position in sorted(positions):
+        while position < len(parts) and parts[position] == "**":
+            position += 1
+            found.add(position)
     return found
 
 

@@ -4,37 +4,40 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path, PurePath
+from typing import Any
 
-from ..core.bake import IN_FILE, KINDS, check_frames
 from ..core.errors import WrongUse
-from ..core.frames import parse_frames
-from ..core.scale_rule import SCALE_RULES
+from .job_schema import check_bakes, job_schema
+from .schema import Position, SchemaError, read
 
 
 @dataclass(frozen=True)
 class ObjectRule:
-    """What is said of the objects whose name matches; None where nothing is."""
+    """Settings of the objects whose name matches; None where the file has none."""
 
     match: str
     method: str | None = None
     scale: str | None = None
+    set: tuple[str, ...] | None = None
     bake: tuple[str, ...] | None = None
 
     def as_task(self) -> dict:
         bake = None if self.bake is None else list(self.bake)
-        said = {"method": self.method, "scale": self.scale, "bake": bake}
-        return {"match": self.match} | {key: value for key, value in said.items() if value is not None}
+        parameters = None if self.set is None else list(self.set)
+        given = {"method": self.method, "scale": self.scale, "set": parameters, "bake": bake}
+        return {"match": self.match} | {key: value for key, value in given.items() if value is not None}
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is done to the meshes of a file; None or empty where nothing is said.
+    """What is done to the meshes of a file; None or empty where nothing is set.
 
     include, exclude  patterns of names of objects and of collections
     scale             name of a scale rule
+    set               parameters as NAME=VALUE; later ones win
     bake              kinds of bakes, written beside the copy
     bake_frames       as typed; None: those of the file's scene
     objects           later ones win
@@ -44,6 +47,7 @@ class Settings:
     include: tuple[str, ...] | None = None
     exclude: tuple[str, ...] | None = None
     scale: str | None = None
+    set: tuple[str, ...] = ()
     bake: tuple[str, ...] | None = None
     bake_frames: str | None = None
     objects: tuple[ObjectRule, ...] = ()
@@ -54,6 +58,7 @@ class Settings:
             self.include if other.include is None else other.include,
             self.exclude if other.exclude is None else other.exclude,
             other.scale or self.scale,
+            self.set + other.set,
             self.bake if other.bake is None else other.bake,
             other.bake_frames or self.bake_frames,
             self.objects + other.objects,
@@ -67,9 +72,7 @@ class Settings:
 
     def check_bakes(self) -> None:
         """Raises WrongUse where a bake can not have the frames."""
-        if self.bake_frames is not None:
-            for kind in self.kinds:
-                check_frames(kind, sorted(set(parse_frames(self.bake_frames))))
+        check_bakes(self.kinds, self.bake_frames)
 
     def as_task(self) -> dict:
         """What a task takes along, and the journal keeps."""
@@ -78,6 +81,7 @@ class Settings:
             "include": list(self.include or ()),
             "exclude": list(self.exclude or ()),
             "scale": self.scale,
+            "set": list(self.set),
             "bake": list(self.bake or ()),
             "bake_frames": self.bake_frames,
             "objects": [rule.as_task() for rule in self.objects],
@@ -134,145 +138,36 @@ def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise WrongUse(f"{path}: {error}") from None
-    return _Reader(path, text, methods).job_file(table)
+    try:
+        values = read(table, job_schema(methods)).values
+    except SchemaError as error:
+        raise WrongUse(f"{path}:{_line_of(text, error.position)}: {error.sentence}") from None
+    base = path.resolve().parent
+    return JobFile(
+        inputs=tuple(str(base / name) for name in values.get("inputs", ())),
+        out=str(base / values["out"]) if "out" in values else None,
+        settings=_settings(values),
+        files=tuple(
+            FileRule(entry.values["match"], _settings(entry.values), _line_of(text, entry.position))
+            for entry in values.get("files", ())
+        ),
+    )
 
 
-SETTINGS = ("method", "scale", "include", "exclude", "bake", "bake_frames", "objects")
-
-Place = tuple[str | int, ...]
-"""Where a value stands: keys, and numbers in arrays of tables, from the file's beginning."""
-
-
-@dataclass
-class _Reader:
-    path: Path
-    text: str
-    methods: Collection[str]
-    base: Path = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.base = self.path.resolve().parent
-
-    def job_file(self, table: dict) -> JobFile:
-        self._known_keys(table, (), ("inputs", "out", *SETTINGS, "files"))
-        return JobFile(
-            inputs=tuple(str(self.base / name) for name in self._strings(table, (), "inputs") or ()),
-            out=str(self.base / self._string(table, (), "out")) if "out" in table else None,
-            settings=self._settings(table, ()),
-            files=tuple(self._file_rule(entry, place) for entry, place in self._tables(table, (), "files")),
-        )
-
-    def _file_rule(self, table: dict, place: Place) -> FileRule:
-        self._known_keys(table, place, ("match", *SETTINGS))
-        self._required(table, place, "match")
-        match = self._strings(table, place, "match")
-        if not all(PurePath(pattern).parts for pattern in match):
-            self._fail(
-                (*place, "match"), f"match: expected paths such as hero*.blend, got {table['match']!r}"
-            )
-        return FileRule(match, self._settings(table, place), self._line(place))
-
-    def _settings(self, table: dict, place: Place) -> Settings:
-        settings = Settings(
-            self._method(table, place),
-            self._strings(table, place, "include"),
-            self._strings(table, place, "exclude"),
-            self._one_of(table, place, "scale", [rule.name for rule in SCALE_RULES]),
-            self._bake(table, place),
-            self._bake_frames(table, place),
-            tuple(self._object_rule(entry, at) for entry, at in self._tables(table, place, "objects")),
-        )
-        try:
-            settings.check_bakes()
-        except WrongUse as error:
-            self._fail((*place, "bake_frames"), str(error))
-        return settings
-
-    def _object_rule(self, table: dict, place: Place) -> ObjectRule:
-        self._known_keys(table, place, ("match", "method", "scale", "bake"))
-        self._required(table, place, "match")
-        if len(table) == 1:
-            self._fail(place, "nothing is said of these objects; expected method, scale or bake")
-        return ObjectRule(
-            self._string(table, place, "match"),
-            self._method(table, place),
-            self._one_of(table, place, "scale", [rule.name for rule in SCALE_RULES]),
-            self._bake(table, place),
-        )
-
-    def _bake(self, table: dict, place: Place) -> tuple[str, ...] | None:
-        kinds = self._strings(table, place, "bake")
-        for kind in kinds or ():
-            if kind not in KINDS:
-                self._fail((*place, "bake"), f"bake: expected some of {', '.join(KINDS)}, got {kind!r}")
-        in_file = [kind for kind in kinds or () if kind in IN_FILE]
-        if len(in_file) > 1:
-            self._fail((*place, "bake"), f"bake: an object can have one of {', '.join(in_file)}")
-        return kinds
-
-    def _bake_frames(self, table: dict, place: Place) -> str | None:
-        if "bake_frames" not in table:
-            return None
-        text = self._string(table, place, "bake_frames")
-        try:
-            parse_frames(text)
-        except WrongUse as error:
-            self._fail((*place, "bake_frames"), f"bake_{error}")
-        return text
-
-    def _method(self, table: dict, place: Place) -> str | None:
-        return self._one_of(table, place, "method", self.methods)
-
-    def _one_of(self, table: dict, place: Place, key: str, names: Collection[str]) -> str | None:
-        if key not in table:
-            return None
-        name = self._string(table, place, key)
-        if name not in names:
-            self._fail((*place, key), f"{key}: expected one of {', '.join(names)}, got {name!r}")
-        return name
-
-    def _string(self, table: dict, place: Place, key: str) -> str:
-        value = table[key]
-        if not isinstance(value, str) or not value:
-            self._fail((*place, key), f"{key}: expected text in quotes, got {value!r}")
-        return value
-
-    def _strings(self, table: dict, place: Place, key: str) -> tuple[str, ...] | None:
-        """One string or a list of them."""
-        if key not in table:
-            return None
-        value = table[key]
-        values = value if isinstance(value, list) else [value]
-        if not all(isinstance(v, str) and v for v in values):
-            self._fail((*place, key), f'{key}: expected a list such as ["a*", "b"], got {value!r}')
-        return tuple(values)
-
-    def _tables(self, table: dict, place: Place, key: str) -> list[tuple[dict, Place]]:
-        entries = table.get(key, [])
-        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-            header = ".".join([*(str(p) for p in place if isinstance(p, str)), key])
-            self._fail((*place, key), f"{key}: expected entries that begin with [[{header}]]")
-        return [(entry, (*place, key, number)) for number, entry in enumerate(entries)]
-
-    def _known_keys(self, table: dict, place: Place, known: Sequence[str]) -> None:
-        for key in table:
-            if key not in known:
-                self._fail((*place, key), f"{key}: no such key; expected one of {', '.join(known)}")
-
-    def _required(self, table: dict, place: Place, key: str) -> None:
-        if key not in table:
-            self._fail(place, f"{key} is missing")
-
-    def _fail(self, place: Place, sentence: str) -> None:
-        raise WrongUse(f"{self.path}:{self._line(place)}: {sentence}")
-
-    def _line(self, place: Place) -> int:
-        """The line, from 1, on which the value at `place` begins."""
-        return _line_where(self.text, lambda table: _holds(table, place))
+def _settings(values: Mapping[str, Any]) -> Settings:
+    """Of a table that can have other keys as well. Keys and fields have the same names."""
+    own = {field.name: values[field.name] for field in fields(Settings) if field.name in values}
+    own["objects"] = tuple(ObjectRule(**entry.values) for entry in values.get("objects", ()))
+    return Settings(**own)
 
 
-def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
-    """The line on which the statement begins that first makes `holds` true: of the beginnings of the file
+def _line_of(text: str, position: Position) -> int:
+    """The line, from 1, on which the value at `position` begins."""
+    return _line_where(text, lambda table: _has(table, position))
+
+
+def _line_where(text: str, is_true: Callable[[dict], bool]) -> int:
+    """The line on which the statement begins that first makes `is_true` so: of the beginnings of the file
     that are TOML themselves, the first such ends with it."""
     lines = text.splitlines()
     begin = 0
@@ -281,7 +176,7 @@ def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
             table = tomllib.loads("\n".join(lines[:end]))
         except tomllib.TOMLDecodeError:
             continue
-        if holds(table):
+        if is_true(table):
             break
         begin = end
     while not lines[begin].strip() or lines[begin].lstrip().startswith("#"):
@@ -289,9 +184,9 @@ def _line_where(text: str, holds: Callable[[dict], bool]) -> int:
     return begin + 1
 
 
-def _holds(table: dict, place: Place) -> bool:
-    value: object = table
-    for step in place:
+def _has(table: dict, position: Position) -> bool:
+    value: Any = table
+    for step in position:
         try:
             value = value[step]
         except (KeyError, IndexError, TypeError):

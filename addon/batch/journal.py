@@ -101,7 +101,7 @@ class Journal:
         for name, record in self.latest.items():
             if "unfinished" in record:
                 files = self._files(self.out / name, record)
-                if all(written in (_stamp(left), _stamp(path)) for left, path, written in files):
+                if all(written in (_stamp(unfinished), _stamp(path)) for unfinished, path, written in files):
                     self.finish(self.out / name, record)
 
     def _files(self, target: Path, record: dict) -> list[tuple[Path, Path, list[int] | None]]:
@@ -118,8 +118,8 @@ class Journal:
         for folder in {target.parent for target in targets}:
             # Blender writes beside, too, with an @; bakes have other endings, and caches a folder.
             for pattern in (f".*{MARK}*", f"*{CACHES}/.*{MARK}"):
-                for left in folder.glob(pattern):
-                    left.unlink(missing_ok=True)
+                for leftover in folder.glob(pattern):
+                    leftover.unlink(missing_ok=True)
 
     def _read(self) -> dict[str, dict]:
         self._file.seek(0)

@@ -14,11 +14,12 @@ import logging
 import threading
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from queue import SimpleQueue
+from typing import TYPE_CHECKING
 
 import sinew
 
@@ -26,6 +27,9 @@ from ..blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from ..core.errors import SinewError
 from ..core.opengl import usual_engine
 from .journal import UNFINISHED, content_hash, stamp
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 ATTEMPTS = 2
 CONNECT_LIMIT = 30.0
@@ -41,7 +45,7 @@ def versions() -> dict[str, str]:
 
 
 class _Blenders:
-    """The Blenders of this process, one for each thread that asks, each kept for its next file."""
+    """The Blenders of this process, one for each thread, each kept for its next file."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -130,7 +134,7 @@ def do_task(
     journal.
     """
     source, target = Path(task["source"]), Path(task["target"])
-    facts = {"versions": versions()}
+    facts: dict[str, object] = {"versions": versions()}
     if task["known"] is not None and task["known"] == {**facts, "hash": content_hash(source)}:
         return {"unchanged": True}
     for attempt in range(1, ATTEMPTS + 1):
@@ -141,16 +145,16 @@ def do_task(
             outcome = run({**task, "unfinished": str(unfinished)}, limits)
         except BlenderLost as lost:
             outcome = {"error": f"{source}: {lost}; tried {attempt} times"}
-            for left in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
+            for leftover in (unfinished, unfinished.with_name(f"{unfinished.name}@")):
                 with contextlib.suppress(OSError):
-                    left.unlink()
+                    leftover.unlink()
             continue
         except SinewError as error:
             outcome = {"error": str(error)}
         break
     if "error" in outcome:
         return {**outcome, **facts}
-    beside = [[left, path, stamp(Path(left))] for left, path in outcome.pop("beside", ())]
+    beside = [[written, path, stamp(Path(written))] for written, path in outcome.pop("beside", ())]
     return {
         **outcome,
         **facts,
@@ -164,20 +168,23 @@ def run_here(
     tasks: Sequence[dict],
     run: Callable[[dict, Limits], dict],
     versions: Callable[[], dict[str, str]],
-) -> Iterator[tuple[dict, dict]]:
+) -> Generator[tuple[dict, dict], None, None]:
     """Each task and what became of it, done one after the other in this process."""
     for task in tasks:
         yield task, do_task(task, Limits(), run, versions)
 
 
-def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Iterator[tuple[dict, dict]]:
+def run_on_this_machine(
+    tasks: Sequence[dict], limits: Limits, jobs: int
+) -> Generator[tuple[dict, dict], None, None]:
     """Each task and what became of it, as they are done, by `jobs` Blenders.
 
     Raises SinewError where no Blender can be had. What is not done when the generator is closed, or
     interrupted, is given up.
     """
     versions()
-    waiting, done = deque(tasks), SimpleQueue()
+    waiting = deque(tasks)
+    done: SimpleQueue[tuple[dict, dict]] = SimpleQueue()
 
     def work() -> None:
         # Nothing else is done here, for as long as it takes a Blender waits.
@@ -203,7 +210,7 @@ def run_on_this_machine(tasks: Sequence[dict], limits: Limits, jobs: int) -> Ite
 
 def run_in_dask(
     tasks: Sequence[dict], limits: Limits, scheduler: str, warn: Callable[[str], None]
-) -> Iterator[tuple[dict, dict]]:
+) -> Generator[tuple[dict, dict], None, None]:
     """The same by the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
 
     warn  told in one sentence where the cluster is open to others
@@ -220,7 +227,7 @@ def run_in_dask(
         # Of tls://, with no or half a configuration.
         raise SinewError(f"{scheduler}: {_sentence(error)}; docs/batch.md has how to set up TLS") from None
     except (OSError, ValueError, RuntimeError) as error:
-        raise SinewError(f"{scheduler}: no dask scheduler answers there: {error}") from None
+        raise SinewError(f"{scheduler}: no dask scheduler answers at this address: {error}") from None
     with client:
         _warn_where_open(client.scheduler_info()["address"], warn)
         _check_workers(client, scheduler)
@@ -245,9 +252,9 @@ def _outcome(task: dict, result: Callable[[], dict]) -> dict:
 
 
 def _warn_where_open(address: str, warn: Callable[[str], None]) -> None:
-    """address  where the scheduler itself says that it listens: its machine's own, where it does on all"""
-    scheme, _separator, place = address.rpartition("://")
-    host = place.rpartition(":")[0].strip("[]")
+    """address  as the scheduler reports it; its machine's own where it listens on all"""
+    scheme, _separator, host_and_port = address.rpartition("://")
+    host = host_and_port.rpartition(":")[0].strip("[]")
     if scheme != "tls" and not _is_this_machine(host):
         warn(
             f"{address}: whoever reaches this scheduler can run programs as you, on its workers and here; "
@@ -262,7 +269,7 @@ def _is_this_machine(host: str) -> bool:
         return host == "localhost"
 
 
-def _check_workers(client, scheduler: str) -> None:
+def _check_workers(client: Client, scheduler: str) -> None:
     """Raises SinewError where a worker can not do what this process would."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_LIMIT)
@@ -272,7 +279,7 @@ def _check_workers(client, scheduler: str) -> None:
         found = client.run(versions)
     except Exception as error:
         raise SinewError(
-            f"{scheduler}: a worker can not run Sinew: {_sentence(error)}; install sinew-blender there"
+            f"{scheduler}: a worker can not run Sinew: {_sentence(error)}; install sinew-blender for it"
         ) from None
     blenders = {there["blender"] for there in found.values()}
     if len(blenders) > 1:

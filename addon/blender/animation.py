@@ -5,17 +5,17 @@ from __future__ import annotations
 
 import bpy
 
-from . import actions, pose_driver
+from . import actions, pose_driver, properties
 
 
 def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
-    """Takes keys of Sinew's settings off the object, unless another object plays the same action."""
+    """Takes keys of Sinew's settings off the object, unless another that Sinew is on plays them, too."""
     animation = obj.animation_data
     if animation is None:
         return
     for player in players(animation):
         action = player.action
-        if action is None or action.users > 1:
+        if action is None or (action.users > 1 and _others_need(obj, player)):
             continue
         removed = 0
         for curves in actions.curve_lists(action, actions.slot_of(player)):
@@ -25,7 +25,15 @@ def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
         left = actions.curve_lists(action, actions.slot_of(player))
         if removed and player is animation and not any(len(curves) for curves in left):
             animation.action = None
-            bpy.data.actions.remove(action)
+            if not action.users:
+                bpy.data.actions.remove(action)
+
+
+def _others_need(obj: bpy.types.Object, player: bpy.types.AnimData | bpy.types.NlaStrip) -> bool:
+    """Whether another object that Sinew is on plays the same curves, as a linked duplicate does."""
+    played = (player.action, actions.slot_of(player))
+    others = (o for o in bpy.data.objects if o != obj and o.animation_data and properties.is_driven(o))
+    return any((p.action, actions.slot_of(p)) == played for o in others for p in players(o.animation_data))
 
 
 def remove(obj: bpy.types.Object) -> None:

@@ -33,6 +33,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "") -> ObjectFacts:
         mode="EDIT" if mesh.is_editmode else obj.mode,
         builtin_is_faster=small_meshes.is_left_to_blender(obj),
         has_upstream=front.is_needed(obj),
+        upstream_changes_weights=front.changes_weights(obj),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
         mesh_is_editable=mesh.is_editable,
         is_comparison_copy=properties.is_copy(obj),
@@ -54,25 +55,9 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
         elif obj.mode not in MODES_OF_THE_MODIFIER:
             points.remove(obj)
         return
-    in_depsgraph = wanted.state is State.IN_DEPSGRAPH
-    points.arrange(obj, in_depsgraph)
+    points.arrange(obj, wanted.in_buffer)
     drive.switch(obj, on=True)
-    if in_depsgraph or _needs_pointers(obj):
-        drive.give_back_pointers(obj)
-    else:
-        drive.clear_pointers(obj)
-
-
-def _needs_pointers(obj: bpy.types.Object) -> bool:
-    """Whether tools look for the armatures behind the modifiers, none of which an animation switches on."""
-    if any(animation.is_visibility_animated(obj, modifier) for modifier, _ in drive.stand_ins(obj)):
-        return False
-    return drive.stays_beside(obj) or _bones_are_edited(obj)
-
-
-def _bones_are_edited(obj: bpy.types.Object) -> bool:
-    """Whether Blender renames groups along with bones."""
-    return any(armature.mode == "EDIT" for armature in properties.of(obj).armatures)
+    drive.give_back_pointers(obj)
 
 
 def has_lost_modifier(obj: bpy.types.Object) -> bool:
@@ -93,12 +78,12 @@ def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.nda
     """
     if points.are_in_mesh(obj, rest, shown):
         applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
-        drive.remove(obj)
+        drive.take_off(obj)
         for name in applied:
             obj.modifiers.remove(obj.modifiers[name])
         log.info("%s: its shape is in its mesh now, and Sinew is off it", obj.name)
     else:
-        drive.remove(obj)
+        drive.take_off(obj)
         log.info("%s: its modifier was deleted, and Sinew is off it", obj.name)
 
 

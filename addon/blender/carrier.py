@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An object in no scene whose vertices are the deformed points of another.
 
-It serves where an attribute of the mesh can not: the mesh is linked from another file, or it has other
-vertices than what is deformed.
+It serves where an attribute of the mesh can not: the mesh is linked from another file, others use it, it has
+other vertices than what is deformed, or the points are written after the update. Within Blender's evaluation
+its evaluated copy is written, and it keeps the rest points.
 """
 
 from __future__ import annotations

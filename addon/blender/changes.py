@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
@@ -88,17 +89,29 @@ class Changes:
         self.complete &= other.complete
 
 
-def _touched_meshes(updates: bpy.types.bpy_prop_collection) -> set[int]:
+def names_of_touched_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:
+    """The full name of each mesh of Changes.meshes, from evaluated data alone: the originals may be gone by
+    now, as handlers deleted them."""
+    if not depsgraph.id_type_updated("MESH"):
+        return set()
+    return _touched_meshes(depsgraph.updates, lambda evaluated: evaluated.name_full)
+
+
+def _uid(evaluated: bpy.types.ID) -> int:
+    return evaluated.original.session_uid
+
+
+def _touched_meshes(updates: bpy.types.bpy_prop_collection, identity: Callable = _uid) -> set:
     """Shape keys that an animation sets touch the geometry of their mesh, and nothing else of it; so does
     little that an artist does, and then the keys are not listed (seen on 4.2 and 5.2)."""
     keys, meshes = set(), []
     for update in updates:
         if isinstance(update.id, bpy.types.Key):
-            keys.add(update.id.original.session_uid)
+            keys.add(identity(update.id))
         elif isinstance(update.id, bpy.types.Mesh) and update.is_updated_geometry:
-            meshes.append((update.id.original, update.is_updated_shading or update.is_updated_transform))
+            meshes.append((update.id, update.is_updated_shading or update.is_updated_transform))
     return {
-        mesh.session_uid
+        identity(mesh)
         for mesh, whole in meshes
-        if whole or mesh.shape_keys is None or mesh.shape_keys.session_uid not in keys
+        if whole or mesh.shape_keys is None or identity(mesh.shape_keys) not in keys
     }

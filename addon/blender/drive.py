@@ -128,13 +128,27 @@ def use_one_method(obj: bpy.types.Object, method: str) -> None:
 
 
 def remove(obj: bpy.types.Object) -> None:
+    """As take_off(), for the artist.
+
+    Raises SinewError, and changes nothing, where Sinew would be there again once the file is loaded.
+    """
+    nodes = sinew_modifier(obj)
+    if obj.override_library is not None and nodes is not None and nodes.is_override_data:
+        # A script can remove it from the override; Blender loads it again, and the Armature modifier twice.
+        raise SinewError(
+            f"{obj.name}: Sinew comes with it from its library; switch it off here, or remove it there"
+        )
+    take_off(obj)
+
+
+def take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
     with updates_suspended():
-        _remove(obj)
+        _take_off(obj)
     heat_view.tidy()
 
 
-def _remove(obj: bpy.types.Object) -> None:
+def _take_off(obj: bpy.types.Object) -> None:
     switch(obj, on=False)
     resume_after_save(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
@@ -162,7 +176,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
     if on:
         adopt_pointers(obj)
         _switch_off(obj)
-        keyed = any(animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
+        keyed = _is_visibility_animated(obj)
         shown = [s for s in settings.stand_ins if s.armature is not None]
         viewport, render = (
             any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render")
@@ -252,7 +266,13 @@ def stand_ins(
     obj: bpy.types.Object,
 ) -> list[tuple[bpy.types.ArmatureModifier, properties.SinewStandIn]]:
     """The Armature modifiers that Sinew stands in for, in their order, and what it keeps of each."""
-    return [(modifier, _stand_in(obj, modifier)) for modifier in stack.armature_modifiers(obj)]
+    run, kept = stack.armature_modifiers(obj), properties.of(obj).stand_ins
+    count = len(kept)
+    pairs = [(modifier, _stand_in(obj, modifier)) for modifier in run]
+    if len(kept) != count:
+        # To add one has Blender move those before it in memory.
+        pairs = [(modifier, _stand_in(obj, modifier)) for modifier in run]
+    return pairs
 
 
 def follow_stack(obj: bpy.types.Object) -> None:
@@ -282,11 +302,11 @@ def follow_stack(obj: bpy.types.Object) -> None:
 
 
 def _place_sinew(obj: bpy.types.Object) -> None:
-    """In front of the Armature modifiers in whose place it stands; behind them where they are on beside it,
-    as it moves each vertex to its point whatever came before."""
+    """In front of the Armature modifiers in whose place it stands; behind them where they can be on beside
+    it, as it moves each vertex to its point whatever came before."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if stays_beside(obj):
+    if stays_beside(obj) or _is_visibility_animated(obj):
         if own < last:
             obj.modifiers.move(own, last)
     elif own + 1 != first:
@@ -296,9 +316,12 @@ def _place_sinew(obj: bpy.types.Object) -> None:
 def stays_beside(obj: bpy.types.Object) -> bool:
     """Whether the Armature modifiers stay on in the viewport, in front of Sinew's: tools for weights look
     there for the bones that deform."""
-    return obj.mode in MODES_FOR_WEIGHTS and not any(
-        animation.is_visibility_animated(obj, modifier) for modifier in stack.armature_modifiers(obj)
-    )
+    return obj.mode in MODES_FOR_WEIGHTS and not _is_visibility_animated(obj)
+
+
+def _is_visibility_animated(obj: bpy.types.Object) -> bool:
+    """Whether an animation decides when one of the Armature modifiers is on."""
+    return any(animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:
@@ -314,15 +337,6 @@ def adopt_pointers(obj: bpy.types.Object) -> None:
     for modifier, stand_in in stand_ins(obj):
         if modifier.object not in (None, stand_in.armature):
             stand_in.armature = modifier.object
-
-
-def clear_pointers(obj: bpy.types.Object) -> None:
-    """Clears the Armature modifiers' pointers, which the settings keep: where Sinew deforms after the
-    evaluation, a pointer alone has Blender evaluate the mesh and all behind it twice a frame."""
-    adopt_pointers(obj)
-    for modifier in stack.armature_modifiers(obj):
-        if modifier.object is not None:
-            modifier.object = None
 
 
 def give_back_pointers(obj: bpy.types.Object) -> None:

@@ -18,6 +18,7 @@ from . import (
     armature_io,
     attach,
     drive,
+    front,
     mesh_io,
     points,
     pose_driver,
@@ -44,6 +45,7 @@ class Driven:
     """What is known of a driven object between events; made again whenever it may be out of date.
 
     armatures          the session_uid of each link's armature, 0 for none
+    mix_group          the vertex group whose weights the links have for their mix
     keyed              for each link, whether an animation decides when its modifier is on
     watched            the session_uid of each object that the shape depends on
     frames             what decided the last frame
@@ -69,6 +71,7 @@ class Driven:
     failures, failure  how often it failed there, and what failed last
     is_suspect         the mesh may have changed since it was read: it is looked at with the next event, or
                        when somebody asks
+    is_surprised       so an evaluation found that nobody had been told of
     lock               held while the chain works: a render may ask from a thread of its own
     shapes             how many have been written
     """
@@ -80,6 +83,7 @@ class Driven:
     source: Source
     chain: Chain
     facts: RigFacts
+    mix_group: str = ""
     watched: set[int] = field(default_factory=set)
     frames: list[LinkFrame | None] | None = None
     rest_points: np.ndarray | None = None
@@ -104,6 +108,7 @@ class Driven:
     failures: int = 0
     failure: str = ""
     is_suspect: bool = False
+    is_surprised: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
     milliseconds: float = 0.0
     shapes: int = 0
@@ -248,7 +253,7 @@ def update(
     if driven is not known and known is not None:
         driven.failures, driven.failure, driven.attempts = known.failures, known.failure, known.attempts
         driven.losses = known.losses
-    driven.is_suspect = is_read_later
+    driven.is_suspect, driven.is_surprised = is_read_later, False
     if inspect or not driven.watched:
         driven.plan, driven.needs_apply, driven.name, driven.is_touched = wanted, False, obj.name, True
         driven.left_by = small_meshes.choices(obj) if wanted.state is State.BUILT_IN else []
@@ -264,6 +269,8 @@ def update(
         driven.frames = None
     elif driven.plan.state is State.IN_DEPSGRAPH:
         driven.dirtied_by_frames = False
+        if driven.plan.in_buffer:
+            points.make_room(obj, driven.source.points, anew=wanted != before)
         if driven.declined or not is_same or wanted != before:
             driven.declined, driven.is_touched = "", True
             # Blender evaluates the object once more, and so asks for its points.
@@ -295,6 +302,8 @@ def _looks(obj: bpy.types.Object) -> list:
         obj.show_only_shape_key,
     ]
     looks.append(keys is None or keys.use_relative)
+    if settings.front is not None:
+        looks.append(front.signature(obj))
     looks += [armature.mode for armature in settings.armatures]
     # What an animation sets has no other event.
     looks += sorted(
@@ -317,13 +326,12 @@ def _deform(
 ) -> None:
     """Writes the points of this evaluation for the next one, where they differ from what is there."""
     # Binding is not part of a frame's time: it happens once.
-    started, before = time.perf_counter(), driven.rest_points
+    started = time.perf_counter()
     differs = _shape(obj, driven, depsgraph)
     if differs is None:
         return
     if changes.frame:
-        reshaped = before is not None and driven.rest_points is not before
-        driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
+        driven.dirtied_by_frames = bool(differs) or obj.session_uid in changes.moved
     if differs:
         points.write(obj, driven.chain.points, driven.source.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
@@ -382,21 +390,36 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     settings = evaluated.sinew
     # Evaluated ones, as the driver reads them.
     armatures = [stand_in.armature for stand_in in settings.stand_ins]
-    shown = mesh_io.points_in(mesh, driven.attribute)
-    if driven.mode != evaluated.mode or not driven.is_alone:
+    if driven.mode != evaluated.mode or not (driven.is_alone or driven.plan.in_buffer):
         driven.declined = "its mode, or the users of its mesh, changed"
-    elif len(armatures) != len(driven.chain.links) or None in armatures:
+        return
+    if len(armatures) != len(driven.chain.links) or None in armatures:
         driven.declined = "its Armature modifiers changed"
-    elif shown is None or len(shown) != len(driven.source.points):
+        return
+    shown = _points_to_write(settings, mesh, driven)
+    if shown is None or len(shown) != len(driven.source.points):
         driven.declined = "its mesh changed"
-    else:
-        if not driven.is_announced and driven.first is not None:
-            # Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy,
-            # without the points that were written last.
-            driven.is_suspect |= shown[0].tobytes() != driven.first
-        with driven.lock:
-            _deform_into(shown, evaluated, mesh, driven, armatures)
-            driven.first = shown[0].tobytes()
+        return
+    if not (driven.is_announced or driven.plan.in_buffer) and driven.first is not None:
+        # Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy,
+        # without the points that were written last.
+        driven.is_surprised |= shown[0].tobytes() != driven.first
+        driven.is_suspect |= driven.is_surprised
+    with driven.lock:
+        _deform_into(shown, evaluated, mesh, driven, armatures)
+
+
+def _points_to_write(
+    settings: properties.SinewSettings, mesh: bpy.types.Mesh, driven: Driven
+) -> np.ndarray | None:
+    """The memory of the evaluated mesh, or of the evaluated carrier; None where it is not there."""
+    if not driven.plan.in_buffer:
+        return mesh_io.points_in(mesh, driven.attribute)
+    carrier = settings.carrier
+    # What an evaluated object has as its data, Blender does not always mark as evaluated.
+    if carrier is None or not carrier.is_evaluated:
+        return None
+    return mesh_io.points_in(carrier.data, mesh_io.POSITION)
 
 
 def _deform_into(
@@ -408,7 +431,10 @@ def _deform_into(
 ) -> None:
     started = time.perf_counter()
     frames = _frames(evaluated, evaluated.sinew, armatures, driven, "VIEWPORT")
-    rest_points = source.keyed_points(evaluated, mesh, driven.source)
+    rest_points = source.evaluated_points(evaluated, mesh, driven.source)
+    if rest_points is None:
+        driven.declined = "what modifiers in front make of its mesh changed"
+        return
     if frames is None:
         # The last shape stays.
         last = driven.chain.points
@@ -417,6 +443,9 @@ def _deform_into(
         driven.chain.deform(rest_points, frames, shown)
         driven.frames, driven.rest_points = frames, rest_points
         driven.shapes += 1
+    if driven.plan.in_buffer:
+        points.tell_from(shown, driven.source.points)
+    driven.first = shown[0].tobytes()
     driven.answered, driven.declined, driven.attempts = mesh.as_pointer(), "", 0
     driven.milliseconds = 1000.0 * (time.perf_counter() - started)
 
@@ -501,7 +530,8 @@ def _frames(
             return None
         pose = armature_io.read_pose(armature, link.binding.bones)
         own = properties.method_of_link(method, stand_in.method, is_first=not frames)
-        frames.append(LinkFrame(own, pose, space, scale_rule))
+        mix = settings.mixed_method if own == method else ""
+        frames.append(LinkFrame(own, pose, space, scale_rule, mix))
     return frames
 
 
@@ -531,7 +561,8 @@ def _current(
         pairs = drive.stand_ins(obj)
         armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
         options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]
-        if driven.armatures != armatures or driven.options != options:
+        is_same_mix = driven.mix_group == properties.of(obj).mix.group
+        if driven.armatures != armatures or driven.options != options or not is_same_mix:
             return _bind(obj, depsgraph)
     if bones_changed:
         return _bind(obj, depsgraph, driven)
@@ -554,8 +585,6 @@ def _bones_changed(
             continue
         if armature.data.session_uid in changes.armatures or not known.complete:
             bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
-            if driven.plan.state is State.AFTER_UPDATE:
-                _follow_renamed_bones(obj, known, bones)
             changed |= not bones.equals(known)
     return changed
 
@@ -567,6 +596,7 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
     bones = [_read_bones(stand_in.armature, depsgraph) for _modifier, stand_in in pairs]
     if (
         old is not None
+        and old.mix_group == properties.of(obj).mix.group
         and read.equals_but_for_points(old.source)
         and all(b.equals(link.binding.bones) for b, link in zip(bones, old.chain.links, strict=False))
     ):
@@ -576,9 +606,11 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
         old.source = read
         return old
     options = [ModifierOptions.read(modifier) for modifier, _stand_in in pairs]
+    mix_group = properties.of(obj).mix.group
+    mix_weights = _mix_weights(obj, read, mix_group)
     links = [
         Link(
-            Binding(option.weighting(obj, read.weights, its_bones)),
+            Binding(option.weighting(obj, read.weights, its_bones), mix_weights),
             option.mask_weights(obj, read.weights),
             option.multi,
         )
@@ -587,25 +619,16 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
     facts = survey.describe(obj, pairs[0][1].armature, links[0].binding.weighting, read.points, depsgraph)
     armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
     keyed = [animation.is_visibility_animated(obj, modifier) for modifier, _stand_in in pairs]
-    return Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts)
+    return Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts, mix_group)
+
+
+def _mix_weights(obj: bpy.types.Object, read: Source, name: str) -> np.ndarray | None:
+    """float32 [vertices], 0 to 1; None where there is no such group."""
+    group = obj.vertex_groups.get(name) if name else None
+    return None if group is None else read.weights.of_group(group.index)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:
     if armature is None or armature.mode == "EDIT":
         return Bones.none()
     return armature_io.read_bones(armature.evaluated_get(depsgraph))
-
-
-def _follow_renamed_bones(obj: bpy.types.Object, old: Bones, new: Bones) -> None:
-    """Blender renames the vertex groups of a renamed bone only where a modifier points to the armature;
-    where Sinew has cleared the pointer it is ours to do."""
-    if not np.array_equal(old.rest, new.rest):
-        return
-    renamed = {b: a for b, a in zip(old.names, new.names, strict=True) if b != a}
-    moving = [(group, renamed[group.name]) for group in obj.vertex_groups if group.name in renamed]
-    staying = {group.name for group in obj.vertex_groups} - set(renamed)
-    # Two bones can have swapped names: no group may stand in the way of another.
-    for number, (group, _name) in enumerate(moving):
-        group.name = f"\x01{number}"
-    for group, name in moving:
-        group.name = name if name not in staying else next(b for b, a in renamed.items() if a == name)

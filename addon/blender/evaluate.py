@@ -11,11 +11,12 @@ from types import MappingProxyType
 import bpy
 import numpy as np
 
-from ..core import interrupt
+from ..core import interrupt, parameters
 from ..core.errors import SinewError, WrongUse
+from ..core.parameters import Value
 from ..core.spaces import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
-from . import animation, drive, handlers, mesh_io, properties
+from . import animation, drive, handlers, mesh_io, properties, stage_settings
 from .properties import BLENDER
 
 
@@ -96,23 +97,35 @@ def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewErr
 
 
 def use_methods_for_file(
-    wanted: Sequence[tuple[bpy.types.Object, str]], scales: Mapping[bpy.types.Object, str | None]
+    wanted: Sequence[tuple[bpy.types.Object, str]],
+    scales: Mapping[bpy.types.Object, str | None],
+    values: Mapping[bpy.types.Object, Mapping[str, Value]],
 ) -> list[SinewError | None]:
     """The same for a file that was opened to be saved so (see handlers.changing_for_file), and with the names
-    of their scale rules; None leaves an object its own."""
-    return _use_methods(wanted, handlers.changing_for_file, scales)
+    of their scale rules, where None leaves an object its own, and their parameters."""
+    return _use_methods(wanted, handlers.changing_for_file, scales, values)
+
+
+def set_parameters(values: Mapping[str, Value]) -> None:
+    """From now on every mesh on which a method is put has these, as of core.parameters.parse()."""
+    _values_of_all.clear()
+    _values_of_all.update(values)
+
+
+_values_of_all: dict[str, Value] = {}
 
 
 def _use_methods(
     wanted: Sequence[tuple[bpy.types.Object, str]],
     changing: Callable[[bpy.types.Context], AbstractContextManager[None]],
     scales: Mapping[bpy.types.Object, str | None] = MappingProxyType({}),
+    values: Mapping[bpy.types.Object, Mapping[str, Value]] = MappingProxyType({}),
 ) -> list[SinewError | None]:
     errors: list[SinewError | None] = []
     with changing(bpy.context):
         for obj, method in wanted:
             try:
-                _choose(obj, method)
+                _choose(obj, method, values.get(obj, _values_of_all))
                 if scales.get(obj) is not None:
                     # As of the method: what is asked for wins over keys in the file.
                     animation.remove_keys(obj, "sinew.scale_rule")
@@ -126,17 +139,32 @@ def _use_methods(
     return errors
 
 
-def _choose(obj: bpy.types.Object, method: str) -> None:
+def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> None:
     if method == BLENDER:
         if properties.is_driven(obj):
             properties.of(obj).enabled = False
         return
+    _check_groups(values)
     drive.add(obj, method)
     # What is asked for wins over keys in the file.
     animation.remove_keys(obj, "sinew.method")
     drive.use_one_method(obj, method)
+    for name, value in values.items():
+        owner, _dot, own_name = name.partition(".")
+        animation.remove_keys(obj, f"sinew.{name}")
+        setattr(getattr(properties.of(obj), owner), own_name, stage_settings.as_stored(value))
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
+
+
+def _check_groups(values: Mapping[str, Value]) -> None:
+    """Raises SinewError for a vertex group that no mesh of the file has; those without it may be beside others."""
+    known = parameters.named()
+    for name, value in values.items():
+        if known[name].kind == "vertex_group" and value:
+            meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+            if not any(value in mesh.vertex_groups for mesh in meshes):
+                raise SinewError(f"{name}: no mesh has a vertex group {value!r}")
 
 
 def use_method_on(meshes: Iterable[bpy.types.Object], method: str) -> None:

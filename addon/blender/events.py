@@ -11,6 +11,8 @@ import bpy
 IMPORTS_ARE_TOLD = hasattr(bpy.app.handlers, "blend_import_post")
 
 
+_OURS = __package__.rpartition(".")[0]
+
 # At these others can change meshes while Sinew works.
 _TELLING = (
     "depsgraph_update_pre",
@@ -24,12 +26,19 @@ _TELLING = (
 
 def others_listen() -> bool:
     """Whether Blender calls others than Sinew while Sinew changes settings or the file is saved."""
-    ours = __package__.rpartition(".")[0]
-    return any(
-        not getattr(function, "__module__", "").startswith(ours)
-        for event in _TELLING
-        for function in getattr(bpy.app.handlers, event)
-    )
+    return any(not _is_ours(function) for event in _TELLING for function in getattr(bpy.app.handlers, event))
+
+
+def others_follow(event: str, function: Callable) -> bool:
+    """Whether Blender calls others than Sinew after one of its functions."""
+    functions = getattr(bpy.app.handlers, event)
+    if function not in functions:
+        return False
+    return any(not _is_ours(each) for each in functions[functions.index(function) + 1 :])
+
+
+def _is_ours(function: Callable) -> bool:
+    return (getattr(function, "__module__", None) or "").startswith(_OURS)
 
 
 def hear(event: str, function: Callable) -> None:
@@ -37,6 +46,11 @@ def hear(event: str, function: Callable) -> None:
     functions = getattr(bpy.app.handlers, event)
     if function not in functions:
         functions.append(function)
+
+
+def is_last(event: str, function: Callable) -> bool:
+    functions = getattr(bpy.app.handlers, event)
+    return bool(functions) and functions[-1] is function
 
 
 def ignore(event: str, function: Callable) -> None:

@@ -24,8 +24,12 @@ SIMULATIONS = {
     "EXPLODE",
 }
 
-# These can change weights from one frame to the next.
+# These can change weights from one frame to the next, or which vertices there are without changing how many.
 WEIGHT_CHANGERS = {
+    "BOOLEAN",
+    "DECIMATE",
+    "REMESH",
+    "WELD",
     "VERTEX_WEIGHT_EDIT",
     "VERTEX_WEIGHT_MIX",
     "VERTEX_WEIGHT_PROXIMITY",
@@ -43,6 +47,12 @@ def is_needed(obj: bpy.types.Object) -> bool:
 
 def check(obj: bpy.types.Object) -> None:
     """Raises SinewError where what stands in front can not be evaluated apart."""
+    first = stack.armature_modifier(obj)
+    if first is not None and first.use_multi_modifier and stack.parent_deforms(obj):
+        raise SinewError(
+            f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
+            "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
+        )
     for modifier in stack.changes_in_front(obj):
         if modifier.type in SIMULATIONS:
             raise SinewError(
@@ -57,13 +67,13 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     if not is_needed(obj):
         remove(obj)
         return None
-    signature = _signature(obj)
-    if settings.front is None or settings.front.data != obj.data or settings.front_signature != signature:
-        check(obj)
+    check(obj)
+    wanted = signature(obj)
+    if settings.front is None or settings.front.data != obj.data or settings.front_signature != wanted:
         # Before the old one goes: at its address, Blender would take the new one for evaluated already.
         made = _make(obj)
         remove(obj)
-        settings.front, settings.front_signature = made, signature
+        settings.front, settings.front_signature = made, wanted
         made.name = f"{obj.name} Sinew front"
     return settings.front
 
@@ -113,7 +123,7 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
         copy.animation_data_clear()
 
 
-def _signature(obj: bpy.types.Object) -> str:
+def signature(obj: bpy.types.Object) -> str:
     """Differs where the copy would: by the settings of what stands in front, and the pinned shape key."""
     pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
     animation = obj.animation_data

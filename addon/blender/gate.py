@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps Blender from evaluating a mesh twice where a change of frame itself makes it dirty.
 
-On a change of frame Blender evaluates, calls Sinew, and evaluates again what Sinew wrote. A mesh that moves,
-or whose shape keys do, comes up in the first round too, with the points of the last frame: all for nothing,
-and a simulation behind would run on the wrong shape. So its modifiers are suspended until the points are
-there.
+Where Sinew deforms after the update, Blender evaluates on a change of frame, calls Sinew, and evaluates again
+what Sinew wrote. The first round has the points of the last frame: all for nothing, and a simulation behind
+would run on the wrong shape. So the mesh's modifiers are suspended until the points are there.
 """
 
 from __future__ import annotations
@@ -40,7 +39,10 @@ class Gate:
     def __init__(self) -> None:
         self._suspended: list[_Suspended] = []
 
-    def suspend(self, obj: bpy.types.Object) -> None:
+    def suspend(self, obj: bpy.types.Object, is_render: bool) -> None:
+        """is_render: not for a view, whose animation Blender writes to the originals, too."""
+        if is_render and _is_animated(obj.data):
+            return
         for modifier in obj.modifiers:
             if (
                 stack.is_on(modifier)
@@ -58,3 +60,14 @@ class Gate:
             # Its object may be gone.
             with contextlib.suppress(ReferenceError):
                 each.restore()
+
+
+# What a copy keeps, or Sinew works out itself.
+_STAYING = ("location", "rotation_", "scale", "delta_", "sinew.")
+
+
+def _is_animated(mesh: bpy.types.Mesh) -> bool:
+    """Whether animation sets anything of an object that has the mesh. To set one of its modifiers has Blender
+    (4.2 to 5.2) copy all of them anew, with what the originals have: in a render that of another frame."""
+    users = (obj for obj in bpy.data.objects if obj.data == mesh)
+    return any(not path.startswith(_STAYING) for obj in users for path in animation.animated_paths(obj))

@@ -12,10 +12,10 @@ from . import properties
 
 def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
     """Those of the mesh object's groups `names` that something uses: a modifier (the Armature modifier's mask
-    too), a shape key, a constraint to the group, or a bone of another of the object's armatures."""
+    too), a shape key, Sinew's mix, a constraint to the group, or a bone of another of the object's armatures."""
     left = set(names)
     found: set[str] = set()
-    for uses in (_in_modifiers, _in_shape_keys, _bones_of_all_armatures, _in_constraints):
+    for uses in (_in_modifiers, _in_shape_keys, _in_mix, _bones_of_all_armatures, _in_constraints):
         if not left:
             break
         now = left.intersection(uses(obj))
@@ -52,6 +52,11 @@ def _texts(of: bpy.types.bpy_struct, depth: int = 3) -> Iterator[str]:
 def _in_shape_keys(obj: bpy.types.Object) -> Iterator[str]:
     keys = obj.data.shape_keys
     yield from (key.vertex_group for key in keys.key_blocks) if keys is not None else ()
+
+
+def _in_mix(obj: bpy.types.Object) -> Iterator[str]:
+    if properties.is_driven(obj):
+        yield properties.of(obj).mix.group
 
 
 def _bones_of_all_armatures(obj: bpy.types.Object) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -13,13 +13,13 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
 from . import attach, drive, driven, events, note, overrides, points, properties, redraw, stack
-from .changes import Changes
+from .changes import Changes, names_of_touched_meshes
 from .driven import Driven
 from .gate import Gate
 from .heat import heat_map, heat_view, measures
 from .in_evaluation import Answers
 from .plan import Plan, State
-from .updates import is_rendering_in_window, turn, updates_suspended
+from .updates import is_main_thread, is_rendering_in_window, turn, updates_suspended
 
 log = logging.getLogger("sinew")
 
@@ -41,6 +41,8 @@ class Session:
     was_on: set[int] = field(default_factory=set)  # the objects that Sinew deformed before the file is saved
     is_saving: bool = False  # Blender writes the file: nothing may change
     is_late: bool = False  # something waits for the end of a render
+    is_rendering: bool = False
+    seen: set[str] | None = None  # meshes touched before others were called after Sinew
     all_left: bool = False  # to Blender, and nothing but what they are told of can change that
 
     @property
@@ -55,6 +57,7 @@ class Session:
         self.depsgraph = 0
         self.waiting = set()
         self.missed = None
+        self.seen = None
         self.expected = set()
         self.driven.clear()
         self.known = []
@@ -158,15 +161,16 @@ def prepare_for_save() -> None:
     session.gate.restore()
     objects = [obj for obj in bpy.data.objects if properties.is_driven(obj) and obj.is_editable]
     session.was_on = set()
-    for obj in objects:
-        try:
-            if drive.prepare_for_save(obj):
-                session.was_on.add(obj.session_uid)
-            overrides.keep(obj)
-        except Exception as error:
-            # The others are in the same file.
-            log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
-    note.write([obj for obj in objects if properties.of(obj).is_saved])
+    with updates_suspended():
+        for obj in objects:
+            try:
+                if drive.prepare_for_save(obj):
+                    session.was_on.add(obj.session_uid)
+                overrides.keep(obj)
+            except Exception as error:
+                # The others are in the same file.
+                log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
+        note.write([obj for obj in objects if properties.of(obj).is_saved])
 
 
 def resume_after_save(context: bpy.types.Context) -> None:
@@ -391,8 +395,61 @@ def _ignore_frames() -> None:
         events.ignore("frame_change_pre", before_frame_change)
 
 
+def _hear_after_others(event: str, function: Callable) -> None:
+    """Before an event: has Blender call `_LAST` after all others where some come behind `function`. Two of
+    them, as Blender leaves out the one behind a function that takes itself off."""
+    if session.seen is not None or events.is_last(event, function):
+        return
+    are_there = events.is_last(event, _LAST[-1])
+    are_needed = bool(session.objects) and events.others_follow(event, function)
+    if are_there == are_needed:
+        return
+    for each in _LAST:
+        events.ignore(event, each)
+        if are_needed:
+            events.hear(event, each)
+
+
+def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
+    """At the end of Sinew's own reaction to an event."""
+    are_called = events.is_last(event, _LAST[-1])
+    session.seen = names_of_touched_meshes(depsgraph) if are_called else None
+
+
+@persistent
+def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
+    of updates at once. A mesh that was there before they were called may have changed once more."""
+    seen, session.seen = session.seen, None
+    names = names_of_touched_meshes(depsgraph) if seen is not None else set()
+    if not names:
+        return
+    new = Changes(complete=True)
+    with turn() as is_ours:
+        for obj, state in session.known:
+            with contextlib.suppress(ReferenceError):
+                if obj.data.name_full in names & seen:
+                    state.is_suspect = True
+                elif obj.data.name_full in names:
+                    new.meshes.add(obj.data.session_uid)
+        if new.meshes:
+            new.touched |= new.meshes
+            _react(depsgraph, new, is_ours)
+    _end_of_announced()
+
+
+@persistent
+def after_others_again(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    after_others(scene, depsgraph)
+
+
 @persistent
 def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    _hear_after_others("depsgraph_update_post", on_depsgraph_update)
+    _forget_answers()
+
+
+def _forget_answers() -> None:
     for obj, state in session.known:
         state.answered, state.is_announced, state.is_touched = 0, True, False
         try:
@@ -403,15 +460,16 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 
 
 @persistent
-def before_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    before_update(scene, depsgraph)
+def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    _hear_after_others("frame_change_post", on_frame_change)
+    _forget_answers()
     if not any(state.dirtied_by_frames for state in session.driven.values()) or is_rendering_in_window():
         return
     with turn() as is_ours, contextlib.suppress(ReferenceError):
         for obj in session.objects or () if is_ours and not session.is_saving else ():
             state = state_of(obj)
             if state is not None and state.dirtied_by_frames:
-                session.gate.suspend(obj)
+                session.gate.suspend(obj, session.is_rendering)
 
 
 @persistent
@@ -421,11 +479,18 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
         return
     with turn() as is_ours:
         session.gate.restore()
-        if session.idle or _are_all_answered(depsgraph):
-            _end_of_announced()
-            return
-        _react(depsgraph, _read_changes(depsgraph, frame=True), is_ours)
+        if not (session.idle or _are_all_answered(depsgraph)):
+            _react(depsgraph, _read_changes(depsgraph, frame=True), is_ours)
     _end_of_announced()
+    _note_seen("frame_change_post", depsgraph)
+
+
+def _look_at_surprises() -> float:
+    """What another add-on's handler changed behind Sinew's, Blender evaluates without telling anybody: in a
+    window it is seen to a moment later."""
+    if any(state.is_surprised for _obj, state in session.known):
+        refresh(bpy.context)
+    return 0.25
 
 
 def _end_of_announced() -> None:
@@ -445,12 +510,16 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
         if is_ours:
             _ignore_frames()
     _end_of_announced()
+    _note_seen("depsgraph_update_post", depsgraph)
 
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, is_ours: bool) -> None:
     """To an evaluation. What Sinew itself causes, and what Blender evaluates while it saves, is only noted:
-    it may have listed what others changed, too."""
-    if not is_ours or session.is_saving:
+    it may have listed what others changed, too. So is what the window shows while it renders: points that are
+    written after the update are those of the render's frame then."""
+    waits_for_render = is_rendering_in_window() and is_main_thread()
+    session.is_late |= waits_for_render
+    if not is_ours or session.is_saving or waits_for_render:
         if session.missed is None:
             session.missed = changes
         else:
@@ -549,9 +618,15 @@ def end_export() -> None:
 
 
 @persistent
+def on_render_start(*_args: object) -> None:
+    session.is_rendering = True
+
+
+@persistent
 def on_render_end(*_args: object) -> None:
     """In the render's thread, where it has one: what waited for its end is for the main one."""
     with turn():
+        session.is_rendering = False
         session.gate.restore()
     if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
         bpy.app.timers.register(_after_render, first_interval=0.05)
@@ -567,6 +642,7 @@ def _after_render() -> float | None:
     return None
 
 
+_LAST = (after_others, after_others_again)
 _FRAME_HANDLERS = {"frame_change_pre": before_frame_change, "frame_change_post": on_frame_change}
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
@@ -580,6 +656,7 @@ _HANDLERS = {
     "save_pre": on_save,
     "save_post": on_saved,
     "save_post_fail": on_saved,
+    "render_init": on_render_start,
     "render_complete": on_render_end,
     "render_cancel": on_render_end,
 }
@@ -596,6 +673,8 @@ def register() -> None:
     properties.listeners.heat_changed = _heat_changed
     measures.Listener.changed = refresh
     events.hear_all(_HANDLERS)
+    if not bpy.app.background:
+        bpy.app.timers.register(_look_at_surprises, first_interval=1.0, persistent=True)
 
 
 def adopt_open_file() -> None:
@@ -608,4 +687,9 @@ def adopt_open_file() -> None:
 
 def unregister() -> None:
     session.forget()
+    if bpy.app.timers.is_registered(_look_at_surprises):
+        bpy.app.timers.unregister(_look_at_surprises)
     events.ignore_all({**_HANDLERS, **_FRAME_HANDLERS})
+    for event in ("frame_change_post", "depsgraph_update_post"):
+        for function in _LAST:
+            events.ignore(event, function)

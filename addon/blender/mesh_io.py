@@ -150,10 +150,10 @@ def points_in(evaluated_mesh: bpy.types.Mesh, name: str) -> np.ndarray | None:
     """The memory of the evaluated mesh's point attribute `name`, float32 [vertices, 3], which Blender then
     does not share with another mesh. Valid until the mesh is evaluated again or changed.
 
-    None for a mesh that is not evaluated, without vertices, or without such an attribute of vectors, and
-    where the memory is not in one piece.
+    None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not in
+    one piece.
     """
-    attribute = evaluated_mesh.attributes.get(name) if evaluated_mesh.is_evaluated else None
+    attribute = evaluated_mesh.attributes.get(name)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
         return None
     values = attribute.data

@@ -9,7 +9,7 @@ import bpy
 # A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
 # where the group finds the points.
 MARK = "sinew_node_group"
-ATTRIBUTE, CARRIER = 10, 8
+ATTRIBUTE, CARRIER = 10, 11
 # An input that no node reads; pose_driver has its driver there.
 POSE = "Pose"
 # An input that is off in saved files: without Sinew the group then says what is missing.
@@ -19,7 +19,7 @@ MISSING = (
     "Armature modifier shows the nearest shape that Blender has."
 )
 
-
+POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points")
 PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
 
 
@@ -123,7 +123,7 @@ def _make_for_attribute() -> bpy.types.NodeTree:
         ATTRIBUTE,
         {
             "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
-            POSE: ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points"),
+            POSE: POSE_SOCKET,
             PRESENT: PRESENT_SOCKET,
         },
     )
@@ -160,6 +160,7 @@ def _make_for_carrier() -> bpy.types.NodeTree:
                 "NodeSocketObject",
                 "Object that has the modifiers in front, to be evaluated with this one",
             ),
+            POSE: POSE_SOCKET,
             PRESENT: PRESENT_SOCKET,
         },
     )

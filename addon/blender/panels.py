@@ -70,9 +70,20 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     if len(settings.armatures) > 1 or any(s.method != properties.SAME_METHOD for s in settings.stand_ins):
         for stand_in in list(settings.stand_ins)[1:]:
             layout.prop(stand_in, "method", text=stand_in.name)
+    _draw_mix(layout, context, obj)
     layout.prop(settings, "scale_rule")
     if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
         layout.prop(settings, "leave_small")
+
+
+def _draw_mix(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    mix = properties.of(obj).mix
+    layout.prop(mix, "method", text="Mix")
+    if mix.method == properties.OFF:
+        return
+    layout.prop_search(mix, "group", obj, "vertex_groups", text="By")
+    if not mix.group:
+        draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
 
 
 def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

@@ -21,10 +21,13 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class Plan:
-    """reason: one clause for the panel; empty for the rule and for what the user chose."""
+    """reason     one clause for the panel; empty for the rule and for what the user chose
+    in_buffer  the points are held by an object of their own, not by an attribute of the mesh
+    """
 
     state: State
     reason: str = ""
+    in_buffer: bool = False
 
     @property
     def uses_builtin(self) -> bool:
@@ -38,6 +41,7 @@ class ObjectFacts:
     is_linked            it belongs to another file, without a library override
     builtin_is_faster    its Armature modifiers have the same shape in less time
     has_upstream         modifiers, absolute shape keys or a parent change the mesh ahead of Sinew
+    upstream_changes_weights  and can change its weights from frame to frame
     mesh_is_shared       other objects use the mesh
     mesh_is_editable     attributes can be added to the mesh: it is not linked
     is_comparison_copy   a copy that a comparison shows
@@ -52,6 +56,7 @@ class ObjectFacts:
     mode: str = "OBJECT"
     builtin_is_faster: bool = False
     has_upstream: bool = False
+    upstream_changes_weights: bool = False
     mesh_is_shared: bool = False
     mesh_is_editable: bool = True
     is_comparison_copy: bool = False
@@ -76,7 +81,10 @@ def plan(facts: ObjectFacts) -> Plan:
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
         return Plan(State.BUILT_IN, reason)
     reason = _why_not_in_depsgraph(facts)
-    return Plan(State.AFTER_UPDATE, reason) if reason else Plan(State.IN_DEPSGRAPH)
+    if reason:
+        return Plan(State.AFTER_UPDATE, reason, in_buffer=True)
+    has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
+    return Plan(State.IN_DEPSGRAPH, in_buffer=facts.has_upstream or not has_own_mesh)
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
@@ -85,9 +93,7 @@ def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
         (facts.safe_mode, "Safe mode"),
         (bool(facts.failure), f"Within Blender's evaluation it failed: {facts.failure}"),
         (facts.is_comparison_copy, "A copy for comparison"),
-        (not facts.mesh_is_editable, "The mesh is linked from another file"),
-        (facts.mesh_is_shared, "Other objects use the same mesh"),
-        (facts.has_upstream, "Modifiers in front of the Armature modifier change the mesh"),
+        (facts.upstream_changes_weights, "Modifiers in front of the Armature modifier change weights"),
         (facts.has_heat_map, "It shows a heat map"),
         (facts.visibility_is_keyed, "The visibility of its Armature modifier is animated"),
         (facts.views_differ, "Its Armature modifier is on in the viewport or in renders alone"),

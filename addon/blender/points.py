@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the deformed points of a driven object are held, for Sinew's modifier to read: in an attribute of the
-evaluated mesh, where Sinew deforms within Blender's evaluation, else in a carrier. In the mesh itself is
-nothing but a place for them, so that no frame of Sinew's touches a mesh."""
+mesh, or in a carrier where the mesh is not the object's own or not what is deformed. Within Blender's
+evaluation they are written to the evaluated attribute or carrier, so no frame of Sinew's touches a mesh."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from .heat import heat_nodes
 ATTRIBUTE = "sinew_points"
 
 
-def arrange(obj: bpy.types.Object, in_depsgraph: bool) -> None:
-    """Makes what holds the points of a driven object, and tells Sinew's modifier of it.
+def arrange(obj: bpy.types.Object, in_buffer: bool) -> None:
+    """Makes what holds the points of a driven object, a carrier or an attribute, and tells Sinew's modifier
+    of it.
 
     Raises SinewError where what stands in front can not be evaluated apart.
     """
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
-    if in_depsgraph:
-        front.remove(obj)
-        carrier.remove(obj)
-        _ensure_attribute(obj)
-        kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
-    else:
+    if in_buffer:
         made = front.ensure(obj)
         if settings.attribute:
             remove_attributes(obj)
             settings.attribute = ""
-            # It is on an input that a carrier's modifier does not have.
-            pose_driver.remove(obj)
         kind, inputs = node_group.CARRIER, {"Points": carrier.ensure(obj), "Front": made}
+    else:
+        front.remove(obj)
+        carrier.remove(obj)
+        _ensure_attribute(obj)
+        kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
     group = heat_nodes.get_or_make() if settings.heat else node_group.get_or_make(kind)
     if nodes.node_group != group:
+        # It can be on an input that another group does not have.
+        pose_driver.remove(obj)
         nodes.node_group = group
         node_group.remove_unused()
     node_group.set_inputs(nodes, {**inputs, node_group.PRESENT: True})
@@ -57,6 +58,18 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
     rest  the points as the mesh comes with them
     """
     carrier.write(properties.of(obj).carrier, _told_from(points, rest))
+
+
+def make_room(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
+    """Gives the carrier the rest points, for an evaluation to move: where their number differs, or anew."""
+    if anew or not are_written(obj, len(rest)):
+        write(obj, rest, rest)
+
+
+def tell_from(shown: np.ndarray, rest: np.ndarray) -> None:
+    """_told_from() in place."""
+    if np.array_equal(shown[:1], rest[:1]) and np.array_equal(shown, rest):
+        shown[:] = _told_from(shown, rest)
 
 
 def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
@@ -94,9 +107,9 @@ def are_in_mesh(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarra
     if settings.carrier is None:
         is_gone = bool(settings.attribute) and settings.attribute not in obj.data.attributes
         return is_gone and (shown is None or np.array_equal(shown, own))
-    if rest is None or np.array_equal(rest, own):
+    if rest is None or shown is None or rest.shape != own.shape or np.array_equal(rest, own):
         return False
-    return np.array_equal(mesh_io.read_points(settings.carrier.data), own)
+    return np.array_equal(_told_from(shown, rest), own)
 
 
 def _told_from(points: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ the last two variables ask Sinew for the points (in_evaluation). So a frame is e
 modifier (seen on 4.2 to 5.2, viewport and render). A variable that reads a property is no script: it is also
 read where files may not run any.
 
-On a property of the object, which makes nothing dirty, it only keeps the poses evaluated: for points that can
-not be written there. Its value means nothing.
+On a property of the object, which makes nothing dirty, it only keeps the poses evaluated: for points that are
+written after the update. Its value is always 0.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ PATH = "sinew.pose"
 # What the last two variables read.
 ASK_FOR_OBJECT, ASK_FOR_MESH = "sinew.asked", "sinew_asked"
 PLACE = "matrix_world[0][0]"
+# Blender reads an object's size no sooner than its modifiers are evaluated (seen on 4.2 to 5.2).
+SIZE = "dimensions[0]"
 _PREFIX = "sinew_"
 
 
@@ -53,7 +55,7 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
 
     poses   each an armature and the path of a property that is read no sooner than its bones are posed.
             Blender evaluates these bones, their parents and their constraints' targets, and no others.
-    asking  it asks Sinew for the points; requires that they are held in an attribute
+    asking  it asks Sinew for the points, once the carrier and what stands in front are evaluated
     """
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
@@ -62,6 +64,8 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         armatures = dict.fromkeys(armature for armature, _path in poses)
         # By a property, as Blender reads the transforms of the driver's own object without waiting for them.
         variables += [_Variable(each, PLACE) for each in (*armatures, obj)]
+        helpers = (properties.of(obj).front, properties.of(obj).carrier)
+        variables += [_Variable(helper, SIZE) for helper in helpers if helper is not None]
         if obj.data.shape_keys is not None:
             variables.append(_Variable(obj.data.shape_keys, "eval_time"))
         variables += [_Variable(obj, ASK_FOR_OBJECT), _Variable(obj.data, ASK_FOR_MESH)]
@@ -72,7 +76,10 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         if curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)
-    driver = obj.driver_add(path).driver
+    curve = obj.driver_add(path)
+    # Whatever the variables are, the value is 0: so no frame changes the input.
+    curve.modifiers.new("GENERATOR").coefficients = (0.0, 0.0)
+    driver = curve.driver
     driver.type = "SUM"
     # Else it is what the property was just now, and differs from one time to the next.
     driver.expression = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import sinew
 from mathutils import Euler, Quaternion
 
 from ..core.inbetween import Poses
@@ -96,12 +97,10 @@ def _quaternions(rotations: np.ndarray, mode: str) -> np.ndarray:
         return np.array(
             [Euler(angles, mode).to_quaternion() for angles in rotations[:, :3]], dtype=np.float64
         )
+    rotations = rotations.astype(np.float64)
     if mode == "QUATERNION":
-        return _unit(rotations.astype(np.float64), otherwise=(1.0, 0.0, 0.0, 0.0))
-    axes = _unit(rotations[:, 1:].astype(np.float64), otherwise=(0.0, 0.0, 0.0))
-    half = 0.5 * rotations[:, :1].astype(np.float64)
-    is_turn = axes.any(axis=1, keepdims=True)
-    return np.concatenate([np.where(is_turn, np.cos(half), 1.0), np.sin(half) * axes], axis=1)
+        return sinew.quat_vec.normalized(_pairs(rotations))[:, :4]
+    return sinew.quat_vec.from_axis_angle(rotations[:, 1:], rotations[:, 0])[:, :4]
 
 
 def _rotations(quaternions: np.ndarray, mode: str, near: np.ndarray) -> np.ndarray:
@@ -114,14 +113,19 @@ def _rotations(quaternions: np.ndarray, mode: str, near: np.ndarray) -> np.ndarr
         )
     if mode == "QUATERNION":
         return np.where((quaternions * near).sum(axis=1, keepdims=True) < 0.0, -quaternions, quaternions)
-    away = (quaternions[:, 1:] * near[:, 1:]).sum(axis=1, keepdims=True) < 0.0
-    quaternions = np.where(away, -quaternions, quaternions)
-    sines = np.linalg.norm(quaternions[:, 1:], axis=1)
-    turns = 2.0 * np.arctan2(sines, quaternions[:, 0])
-    rounds = np.round((near[:, 0] - turns) / (2.0 * np.pi))
-    # No turn has any axis: it keeps the one that it has.
-    axes = np.where(sines[:, None] > 0.0, quaternions[:, 1:], near[:, 1:])
-    return np.column_stack([turns + 2.0 * np.pi * rounds, _unit(axes, otherwise=(0.0, 1.0, 0.0))])
+    screw = sinew.quat_vec.to_screw(_pairs(quaternions))
+    # Both directions of an axis are written as well: the one near the axis that is set.
+    signs = np.where((screw.axis * near[:, 1:]).sum(axis=1) < 0.0, -1.0, 1.0)
+    angles = signs * screw.angle
+    rounds = np.round((near[:, 0] - angles) / (2.0 * np.pi))
+    # The identity has any axis: it keeps the one that is set.
+    axes = np.where(screw.angle[:, None] > 0.0, signs[:, None] * screw.axis, near[:, 1:])
+    return np.column_stack([angles + 2.0 * np.pi * rounds, _unit(axes, otherwise=(0.0, 1.0, 0.0))])
+
+
+def _pairs(quaternions: np.ndarray) -> np.ndarray:
+    """As sinew.quat_vec has them, [n, 7], without translation."""
+    return np.pad(quaternions, ((0, 0), (0, 3)))
 
 
 def _unit(vectors: np.ndarray, otherwise: tuple[float, ...]) -> np.ndarray:

@@ -12,6 +12,8 @@ import sinew
 
 from ..core import inbetween
 from ..core.scale_rule import SCALE_RULES
+from . import stage_settings
+from .stage_settings import OFF
 
 METHODS = {method.name: method for method in sinew.methods()}
 # The choice beside Sinew's methods: the Armature modifier as it stands in the file.
@@ -37,7 +39,7 @@ class Listeners:
 listeners = Listeners()
 
 
-def _method_changed(settings: SinewSettings | SinewStandIn, context: bpy.types.Context) -> None:
+def _method_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     if listeners.method_changed is not None:
         listeners.method_changed(settings.id_data, context)
 
@@ -107,6 +109,9 @@ class SinewStandIn(bpy.types.PropertyGroup):
         update=_method_changed,
         override=OVERRIDABLE,
     )
+
+
+STAGE_GROUPS = stage_settings.groups(_method_changed)
 
 
 class SinewSettings(bpy.types.PropertyGroup):
@@ -194,6 +199,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
+    mix: bpy.props.PointerProperty(type=STAGE_GROUPS["mix"])
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )
@@ -201,6 +207,11 @@ class SinewSettings(bpy.types.PropertyGroup):
         get=_object_asked, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
     )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @property
+    def mixed_method(self) -> str:
+        """The method that the mix has for its second; empty where it is off."""
+        return "" if self.mix.method == OFF else self.mix.method
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -241,12 +252,18 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
             getattr(target, name).clear()
             for item in getattr(source, name):
                 copy(item, getattr(target, name).add())
+        elif prop.type == "POINTER" and isinstance(getattr(source, name), bpy.types.PropertyGroup):
+            if source.is_property_set(name):
+                copy(getattr(source, name), getattr(target, name))
         elif not prop.is_readonly and source.is_property_set(name):
+            value = getattr(source, name)
+            # By key: assigning to the property itself calls the listeners.
             if prop.type == "ENUM":
-                # As a number: assigning the name calls the listeners.
-                target[name] = next(i.value for i in prop.enum_items if i.identifier == getattr(source, name))
+                target[name] = next(i.value for i in prop.enum_items if i.identifier == value)
+            elif prop.type == "BOOLEAN":
+                target[name] = value
             else:
-                setattr(target, name, getattr(source, name))
+                setattr(target, name, value)
 
 
 def store(group: bpy.types.PropertyGroup, name: str, value: bool) -> None:
@@ -280,7 +297,7 @@ class SinewActionHold(bpy.types.PropertyGroup):
             self.muted = text
 
 
-CLASSES = (SinewStandIn, SinewSettings, SinewActionHold)
+CLASSES = (SinewStandIn, *STAGE_GROUPS.values(), SinewSettings, SinewActionHold)
 
 # A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
 ASKED_OF_MESH = bpy.props.FloatProperty(

@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..core import parameters
 from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.names import fits
@@ -106,8 +107,13 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
             if not obj.is_editable:
                 left_out.append(f"{obj.name} is linked from another file; restore that one")
                 continue
-            meshes.append({"object": obj.name, "method": properties.of(obj).method, "warnings": []})
-            drive.remove(obj)
+            method = properties.of(obj).method
+            try:
+                drive.remove(obj)
+            except SinewError as error:
+                left_out.append(str(error))
+                continue
+            meshes.append({"object": obj.name, "method": method, "warnings": []})
         handlers.session.forget()
     if not meshes:
         reason = left_out.pop() if left_out else "no mesh is deformed by Sinew"
@@ -124,9 +130,10 @@ def _drive(
     before = [(_described(obj), properties.is_driven(obj)) for obj in objects]
     wanted = [(obj, _said_of(obj, settings, "method")) for obj in objects]
     scales = {obj: _said_of(obj, settings, "scale") for obj in objects}
+    values = {obj: _parameters_of(obj, settings) for obj in objects}
     driven, left_out = [], []
     for (obj, method), (way, was_driven), error in zip(
-        wanted, before, evaluate.use_methods_for_file(wanted, scales), strict=True
+        wanted, before, evaluate.use_methods_for_file(wanted, scales, values), strict=True
     ):
         if error is not None:
             left_out.append(str(error))
@@ -179,6 +186,12 @@ def _said_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
     rules = settings["objects"]
     said = [rule[key] for rule in rules if key in rule and fits(obj.name, rule["match"])]
     return said[-1] if said else settings[key]
+
+
+def _parameters_of(obj: bpy.types.Object, settings: dict) -> dict[str, parameters.Value]:
+    """Those for all, and those of each rule for the object; later ones win."""
+    rules = [rule["set"] for rule in settings["objects"] if "set" in rule and fits(obj.name, rule["match"])]
+    return parameters.parse(text for texts in (settings["set"], *rules) for text in texts)
 
 
 def _described(obj: bpy.types.Object) -> str:

@@ -26,6 +26,7 @@ def is_left_to_blender(obj: bpy.types.Object) -> bool:
         and settings.leave_small
         and len(obj.data.vertices) < VERTICES.get(settings.method, 0)
         and settings.scale_rule == BLENDER_4.name
+        and not settings.mixed_method
         # Its colours need the points.
         and not settings.heat
         and _blend_alike(obj)
@@ -39,7 +40,7 @@ def choices(obj: bpy.types.Object) -> list[str]:
     settings = properties.of(obj)
     modifiers = [obj.modifiers.get(stand_in.name) for stand_in in settings.stand_ins]
     methods = [drive.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
-    return [settings.method, settings.scale_rule, *methods]
+    return [settings.method, settings.mixed_method, settings.scale_rule, *methods]
 
 
 def _blend_alike(obj: bpy.types.Object) -> bool:

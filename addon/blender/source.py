@@ -108,15 +108,30 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
     Requires is_ready.
     """
     if properties.of(obj).front is not None:
-        points = mesh_io.read_points(front.evaluated_mesh(obj, depsgraph))
-        if not np.array_equal(points, source.points):
-            source.points = points
-        return source.points
-    return keyed_points(obj.evaluated_get(depsgraph), obj.data.evaluated_get(depsgraph), source)
+        return _upstream_points(front.evaluated_mesh(obj, depsgraph), source)
+    return _keyed_points(obj.evaluated_get(depsgraph), obj.data.evaluated_get(depsgraph), source)
 
 
-def keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
-    """The same for a source that is the mesh itself; from evaluated data alone."""
+def evaluated_points(
+    evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source
+) -> np.ndarray | None:
+    """The same from evaluated data alone; None where there are others than those read."""
+    if not source.from_front:
+        return _keyed_points(evaluated, evaluated_mesh, source)
+    upstream = evaluated.sinew.front
+    if upstream is None or not upstream.is_evaluated or len(upstream.data.vertices) != len(source.points):
+        return None
+    return _upstream_points(upstream.data, source)
+
+
+def _upstream_points(mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
+    points = mesh_io.read_points(mesh)
+    if not np.array_equal(points, source.points):
+        source.points = points
+    return source.points
+
+
+def _keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
     if source.shape_keys is None:
         return source.points
     values = mesh_io.read_key_values(evaluated_mesh.shape_keys)

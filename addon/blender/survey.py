@@ -30,7 +30,17 @@ def describe(
     boneless = weighting.bones.without_one([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    return facts.with_warnings(differences(obj))
+    return facts.with_warnings([*differences(obj), *_missing_mix_group(obj)])
+
+
+def _missing_mix_group(obj: bpy.types.Object) -> list[str]:
+    if not properties.is_driven(obj):
+        return []
+    settings = properties.of(obj)
+    if not settings.mixed_method or settings.mix.group in obj.vertex_groups:
+        return []
+    name = f"no vertex group {settings.mix.group}" if settings.mix.group else "no vertex group is chosen"
+    return [f"{name} for the mix: nothing is mixed"]
 
 
 def describe_undriven(obj: bpy.types.Object) -> RigFacts:

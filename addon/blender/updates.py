@@ -34,6 +34,10 @@ def is_rendering_in_window() -> bool:
     return not bpy.app.background and bpy.app.is_job_running("RENDER")
 
 
+def is_main_thread() -> bool:
+    return threading.get_ident() == threading.main_thread().ident
+
+
 class _Turn:
     """A class, as a generator's context takes longer than what most frames ask of it."""
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..batch.inputs import Job, plan_jobs
 from ..core import interrupt
@@ -15,8 +16,12 @@ from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.output import folder_to_write
+from .arguments import add_set
 from .console import Console
 from .outcome import Outcome
+
+if TYPE_CHECKING:
+    from ..blender.bake.bake import Started
 
 HELP = """\
 Writes what Sinew makes of every armature-deformed mesh as data that plays without it. Inputs are never
@@ -48,6 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace what is there already")
+    add_set(parser)
     return parser
 
 
@@ -107,6 +113,7 @@ def _bake(
     outcome.left_out += [
         f"{obj.name} is not in the scene {scene.name}" for obj in elsewhere if obj not in meshes
     ]
+    evaluate.set_parameters(args.set)
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
     # What is hidden is baked as well, and hidden in the copy.
     with evaluate.shown(meshes):
@@ -119,9 +126,8 @@ def _bake(
             started = bake.start(taken, args.to, chosen, target, args.overwrite)
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
-        is_export = args.to in EXPORTS
         # An exporter takes all frames in one call, that nothing stops, and can crash where a disk is full.
-        shares = bake_apart.sample(started) if is_export else started.sample()
+        shares = started.sample() if isinstance(started, bake.Bake) else bake_apart.sample(started)
         with (
             _whole_or_nothing(started, source),
             console.bar(what, len(chosen)) as show,
@@ -133,15 +139,15 @@ def _bake(
             show(1.0)
     with _whole_or_nothing(started, source):
         started.place()
-        if is_export:
-            started.publish()
-        else:
+        if isinstance(started, bake.Bake):
             files.save_copy(source, target, started.publish)
+        else:
+            started.publish()
     outcome.meshes, outcome.frames = len(taken), len(chosen)
 
 
 @contextmanager
-def _whole_or_nothing(started, source: Path) -> Iterator[None]:
+def _whole_or_nothing(started: Started, source: Path) -> Iterator[None]:
     try:
         yield
     except BaseException as error:

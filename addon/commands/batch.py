@@ -9,7 +9,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +24,7 @@ from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
 from ..core.output import folder_to_write, writing
 from .arguments import count, seconds
-from .console import Console
+from .console import BatchProgress, Console
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Action:
     done      what a file is afterwards, as in "3 of 4 files re-skinned"
     settings  those given on the command line
     job       path of a job file
-    methods   those that may be asked for; none where no method is needed
+    methods   those that can be chosen; none where no method is needed
     """
 
     command: str
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, console: Console, action: Action) -> int:
-    """Exit status: 0 all went well, 1 something failed or was left as it was."""
+    """Exit status: 0 all went well, 1 something failed or was not changed."""
     job_file = read_job_file(Path(action.job), action.methods) if action.job else JobFile()
     inputs = args.inputs or job_file.inputs
     out = args.out or (job_file.out and folder_to_write(job_file.out))
@@ -182,7 +182,7 @@ class _Workers:
             verbose=console.verbose,
         )
 
-    def run(self, tasks: list[dict]) -> Iterator[tuple[dict, dict]]:
+    def run(self, tasks: list[dict]) -> Generator[tuple[dict, dict], None, None]:
         if not tasks or self._inside_blender:
             from .. import worker
             from ..prepare import prepare_blender
@@ -262,8 +262,10 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
             f"{job.target}: is there already; use --overwrite to replace it, or --resume to go on"
         )
     same = ("command", "source", "settings")
-    stands = args.resume and is_ours and "error" not in record and journal.holds_all(job.target, record)
-    if stands and tells_all(record) and all(record.get(k) == task[k] for k in same):
+    if record is None or not args.resume or not is_ours or "error" in record:
+        return None
+    stands = journal.holds_all(job.target, record) and tells_all(record)
+    if stands and all(record.get(k) == task[k] for k in same):
         return {"hash": record["hash"], "versions": record["versions"]}
     return None
 
@@ -276,8 +278,8 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
         return {**before, "unchanged": True}
     record = {key: task[key] for key in ("command", "source", "settings")} | outcome
     record["beside"] = [
-        [journal.name_of(Path(left)), journal.name_of(Path(path)), written]
-        for left, path, written in outcome.get("beside", ())
+        [journal.name_of(Path(unfinished)), journal.name_of(Path(path)), written]
+        for unfinished, path, written in outcome.get("beside", ())
     ]
     if "error" in record:
         _record_failure(journal, target, record, before)
@@ -302,7 +304,7 @@ def _record_failure(journal: Journal, target: Path, record: dict, before: dict) 
     journal.record(target, record)
 
 
-def _tell(console: Console, progress, task: dict, result: dict) -> None:
+def _tell(console: Console, progress: BatchProgress, task: dict, result: dict) -> None:
     failed = "error" in result or bool(result["left_out"])
     meshes = 0 if "error" in result else len(result["meshes"])
     if "error" in result:

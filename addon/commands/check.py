@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -78,8 +78,8 @@ def _files_of(given: Path) -> list[Path]:
     return found
 
 
-def _checked(paths: list[Path], limits: Limits) -> Iterator[tuple[Path, dict]]:
-    """Each file and what was found, by a Blender of its own that is started anew where it is lost. Raises
+def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], None, None]:
+    """Each file and what was found, by a Blender of its own that is started again where it is lost. Raises
     SinewError where none can be had."""
     blender = None
     try:
@@ -114,7 +114,7 @@ def _report(path: Path, outcome: dict, answer: Answer | None) -> dict:
 
 
 def _missing(answer: Answer) -> list[str]:
-    """What keeps the Blender that was asked from doing as Sinew does here."""
+    """Why the other Blender can not do what Sinew does in this one."""
     there = f"{answer.program} (Blender {answer.blender})"
     if answer.problem is not None:
         return [f"needs Sinew, which {there} does not have: {answer.problem}; install and enable it there"]

@@ -11,12 +11,14 @@ from ..core.comparison import Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
+from ..core.metrics import Summary
 from ..core.names import as_file_name
 from ..core.output import file_to_write, folder_to_write, write_text
 from ..core.page import page
 from ..core.scratch import scratch_folder
 from ..core.sheet import require_pillow
 from . import sheet
+from .arguments import add_set
 from .console import Console
 
 if TYPE_CHECKING:
@@ -74,6 +76,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--out", required=True, type=_folder_or_sheet, metavar="DIR", help="a folder, or SHEET.png"
     )
+    add_set(parser)
     return parser
 
 
@@ -88,6 +91,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     evaluate.check_methods([*methods, args.reference])
+    evaluate.set_parameters(args.set)
     if args.size is not None:
         render.check_size(args.size)
     if args.out.suffix.lower() in sheet.PICTURES:
@@ -190,8 +194,10 @@ def _measure(
     from ..blender.pages import measure
 
     batches = measure.batches(subject, frames, len(methods) + 1)
-    summaries, times, own = ({method: [] for method in methods} for _ in range(3))
-    rest = None
+    summaries: dict[str, list[Summary]] = {method: [] for method in methods}
+    times: dict[str, list[float]] = {method: [] for method in methods}
+    own: dict[str, list[float]] = {method: [] for method in methods}
+    rest: RestFacts | None = None
     for batch in console.progress(batches, len(batches), f"Measuring {path.name}"):
         measured = measure.measure(subject, methods, args.reference, batch)
         if rest is None:
@@ -200,6 +206,7 @@ def _measure(
             summaries[method] += measured.summaries[method]
             times[method] += measured.times[method]
             own[method] += measured.own[method]
+    assert rest is not None, "there is at least one frame"
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],

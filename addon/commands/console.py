@@ -8,10 +8,14 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TextIO, TypeVar
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from ..core import interrupt
 from ..core.errors import SinewError
+
+if TYPE_CHECKING:
+    from rich.console import Console as RichConsole
+    from rich.progress import Progress, TaskID
 
 Item = TypeVar("Item")
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
@@ -26,12 +30,11 @@ class Console:
         self.verbose = verbose
         self._has_bar = False
         self._close_bar: Callable[[], None] | None = None
-        try:
-            import rich.console
-        except ImportError:
-            self._rich = None
-        else:
-            self._rich = rich.console.Console(file=err, highlight=False)
+        self._rich: RichConsole | None = None
+        with suppress(ImportError):
+            from rich.console import Console as RichConsole
+
+            self._rich = RichConsole(file=err, highlight=False)
 
     def say(self, text: str) -> None:
         """A result, on standard output. Raises SinewError where nobody takes it, as on a full disk."""
@@ -40,7 +43,7 @@ class Console:
 
     def note(self, text: str) -> None:
         """A word about the work, on standard error."""
-        if self._has_bar:
+        if self._has_bar and self._rich is not None:
             # Above the bar, which would otherwise be written into.
             self._rich.print(_shown(text), markup=False, soft_wrap=True)
         else:
@@ -102,7 +105,7 @@ class Console:
         try:
             yield
         except OSError as error:
-            # What is left of it would be tried again, with a traceback, at the end of the process.
+            # The rest of it would be tried again, with a traceback, at the end of the process.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
             raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
 
@@ -145,7 +148,13 @@ def _shown(text: str) -> str:
 class BatchProgress:
     """Counts of a batch at work."""
 
-    def __init__(self, console: Console, total: int, bar=None, bar_task=None) -> None:
+    def __init__(
+        self,
+        console: Console,
+        total: int,
+        bar: Progress | None = None,
+        bar_task: TaskID | None = None,
+    ) -> None:
         self.done = self.meshes = self.failed = 0
         self._console, self._total, self._bar, self._bar_task = console, total, bar, bar_task
 
@@ -154,7 +163,7 @@ class BatchProgress:
         self.done += 1
         self.meshes += meshes
         self.failed += failed
-        if self._bar is not None:
+        if self._bar is not None and self._bar_task is not None:
             self._bar.update(self._bar_task, completed=self.done, meshes=self.meshes, failed=self.failed)
         elif line is not None:
             self._console.note(f"[{self.done}/{self._total}] {line}")

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew methods`: the table of methods."""
+"""`sinew methods`: the methods and the stages that may follow them."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 
 import sinew
 
@@ -18,19 +19,43 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    methods = sinew.methods()
+    methods, stages = sinew.methods(), sinew.stages()
     if args.json:
-        rows = [
-            {"name": m.name, "label": m.label, "description": m.description, "needs": list(m.needs)}
-            for m in methods
-        ]
+        rows = {
+            "methods": [_facts(method) | {"needs": list(method.needs)} for method in methods],
+            "stages": [_facts(stage) for stage in stages],
+        }
         console.say(json.dumps(rows, indent=2))
     else:
         console.table(
             ("method", "label", "when to use it", "needs"),
             [(m.name, m.label, m.description, _needs(m)) for m in methods],
         )
+        console.table(
+            ("stage", "parameters", "what it does"),
+            [(s.name, ", ".join(_parameters(s)), s.description) for s in stages],
+        )
     return 0
+
+
+def _facts(row: sinew.Method | sinew.Stage) -> dict:
+    """Of a method or a stage; its parameters by the names that --set takes."""
+    facts = {"name": row.name, "label": row.label, "description": row.description, "source": row.source}
+    return facts | {"parameters": _parameters(row)}
+
+
+def _parameters(row: sinew.Method | sinew.Stage) -> dict[str, dict]:
+    names = ("label", "description", "unit", "kind", "default")
+    found = {}
+    for each in row.parameters:
+        facts: dict = {name: getattr(each, name) for name in names}
+        if each.choices:
+            facts["choices"] = list(each.choices)
+        # JSON has no infinity.
+        bounds = {"min": each.min, "max": each.max}
+        facts |= {name: value for name, value in bounds.items() if value is not None and math.isfinite(value)}
+        found[f"{row.name}.{each.id}"] = facts
+    return found
 
 
 def _needs(method: sinew.Method) -> str:

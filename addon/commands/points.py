@@ -15,6 +15,7 @@ from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, write_whole
+from .arguments import add_set
 from .console import Console
 
 
@@ -35,16 +36,18 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
     )
+    add_set(parser)
     return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     import bpy
 
-    from ..blender import evaluate, files
+    from ..blender import evaluate, files, properties
 
     frames = parse_frames(args.frames)
     evaluate.check_methods([args.method])
+    evaluate.set_parameters(args.set)
     files.open_file(args.file)
     try:
         meshes = evaluate.deformed_meshes(bpy.context.scene, args.object)
@@ -72,7 +75,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
         evaluate.set_frame(bpy.context.scene, frame)
         for obj in taken:
-            if args.method != evaluate.BLENDER and not obj.sinew.enabled:
+            if args.method != properties.BLENDER and not obj.sinew.enabled:
                 raise SinewError(f"{args.file}: frame {frame}: {obj.sinew.error}")
             points[keys[obj]].append(evaluate.final_points(obj))
     arrays = {name: _stack(name, per_frame, frames) for name, per_frame in points.items()}

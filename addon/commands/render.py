@@ -17,6 +17,7 @@ from ..core.golden import (
     picture_name,
 )
 from ..core.output import folder_to_write, remove, write_text
+from .arguments import add_set
 from .console import Console
 
 # In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
@@ -58,6 +59,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the pictures"
     )
+    add_set(parser)
     return parser
 
 
@@ -71,11 +73,14 @@ def run(args: argparse.Namespace, console: Console) -> int:
         if args.against.resolve() == args.out.resolve():
             raise WrongUse(f"{args.out}: would replace the golden pictures; choose another --out")
         golden = RenderSettings.read(args.against)
-    method = args.method or (golden and golden.method)
-    frames = parse_frames(args.frames) if args.frames is not None else golden and golden.frames
+    method = args.method or (golden.method if golden is not None else None)
+    frames = golden.frames if golden is not None else None
+    if args.frames is not None:
+        frames = parse_frames(args.frames)
     if method is None or frames is None:
         raise WrongUse("render: --method and --frames are needed where there is no --against")
     evaluate.check_methods([method])
+    evaluate.set_parameters(args.set)
     if golden is not None:
         _check_fits(args, golden, frames)
     _check_free(args.out, frames)
@@ -129,6 +134,7 @@ def _draw(
     if left_out:
         raise SinewError(f"{args.file}: {left_out[0]}")
     evaluate.use_method_on(meshes, method)
+    studio: render.OwnLook | render.Studio
     if args.own_look:
         studio = render.OwnLook(scene, args.file)
         engine, views = scene.render.engine, []
@@ -145,7 +151,11 @@ def _draw(
     write_text(args.out / SETTINGS, settings.to_json())
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
         evaluate.set_frame(scene, frame)
-        studio.picture(views[index] if views else None, args.out / picture_name(frame))
+        path = args.out / picture_name(frame)
+        if isinstance(studio, render.OwnLook):
+            studio.picture(path)
+        else:
+            studio.picture(views[index], path)
 
 
 def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> int:

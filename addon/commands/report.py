@@ -79,10 +79,11 @@ def run(args: argparse.Namespace, console: Console) -> int:
         figures=figures,
         answers=answers.answers(measurements, figures),
     )
-    for part in (*content.tables, *content.figures):
-        if part.missing is not None:
-            kind = "Table" if part in content.tables else "Figure"
-            console.note(f"{kind} {part.number}: {part.missing}")
+    missing = [(f"Table {table.number}", table.missing) for table in content.tables]
+    missing += [(f"Figure {figure.number}", figure.missing) for figure in content.figures]
+    for name, reason in missing:
+        if reason is not None:
+            console.note(f"{name}: {reason}")
     for path in page.write(content, args.out):
         console.say(str(path))
     return 0

@@ -8,9 +8,13 @@ import argparse
 import sinew
 
 from ..batch.job_file import Settings
+from ..batch.job_schema import job_schema
+from ..batch.schema import rows
 from ..core.errors import WrongUse
 from ..core.frames import parse_frames
+from ..core.parameters import as_texts
 from . import batch
+from .arguments import add_set
 from .console import Console
 
 
@@ -24,6 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     batch.add_arguments(parser)
     parser.add_argument("--method", help="a method of `sinew methods`; needed unless the job file has one")
     parser.add_argument("--job", metavar="FILE.toml", help="settings for files and objects (docs/batch.md)")
+    parser.add_argument("--job-help", action=_JobHelp, nargs=0, help="show the keys of a job file and exit")
     parser.add_argument(
         "--frames",
         default="auto",
@@ -33,14 +38,28 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--no-pictures", dest="pictures", action="store_false", help="a report without pictures, much faster"
     )
+    add_set(parser)
     return parser
+
+
+class _JobHelp(argparse.Action):
+    """Prints the keys of a job file and exits, as --help does."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_others: object) -> None:
+        for name, headers, wanted, meaning in rows(job_schema(_methods())):
+            print(f"{name}  ({headers})\n    {meaning}\n    takes {wanted}")
+        parser.exit()
+
+
+def _methods() -> list[str]:
+    return [method.name for method in sinew.methods()]
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     if args.frames not in ("auto", "none"):
         parse_frames(args.frames)
-    methods = [method.name for method in sinew.methods()]
+    methods = _methods()
     if args.method is not None and args.method not in methods:
         raise WrongUse(f"method: expected one of {', '.join(methods)}, got {args.method!r}")
-    given = Settings(method=args.method)
+    given = Settings(method=args.method, set=tuple(as_texts(args.set)))
     return batch.run(args, console, batch.Action("reskin", "re-skinned", given, args.job, methods))

@@ -45,11 +45,11 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     rest = subject.gauge.rest.volume
     volumes = {method: subject.gauge.measure(points).shape.volume for method, points in shapes.items()}
     views = [("Whole", evaluate.whole_views(meshes, methods, [frame])[0])]
-    place = place_of_difference(list(shapes.values()))
-    if place is not None:
-        places = np.stack([points[place] for points in shapes.values()])
-        character = subject.character_of(place, shapes[methods[0]])
-        views.append(("Where the methods differ most", close_view(character, places)))
+    vertex = place_of_difference(list(shapes.values()))
+    if vertex is not None:
+        positions = np.stack([points[vertex] for points in shapes.values()])
+        character = subject.character_of(vertex, shapes[methods[0]])
+        views.append(("Where the methods differ most", close_view(character, positions)))
 
     studio = render.Studio(scene, meshes, render.chosen_engine(args.engine), args.size or 640)
     columns = []

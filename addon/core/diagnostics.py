@@ -10,8 +10,8 @@ from itertools import permutations
 import numpy as np
 
 from .influences import SMALLEST_WEIGHT_SUM, GroupWeights, Influences
-from .quaternions import dots
 from .rig import Weighting
+from .vectors import dots
 
 # Below this sum of weights what was painted by accident decides where a vertex goes.
 SMALL_WEIGHT_SUM = 0.01
@@ -163,7 +163,9 @@ class PoseCheck:
         self._vertices = np.repeat(np.arange(len(influences.counts)), influences.counts)
         self._shows = self._weighs_enough()
         self._last: tuple[np.ndarray, np.ndarray] | None = None
-        self._seen = {name: (np.zeros(len(influences.counts), dtype=bool), []) for name in _OF_POSES}
+        self._seen: dict[str, tuple[np.ndarray, list[float]]] = {
+            name: (np.zeros(len(influences.counts), dtype=bool), []) for name in _OF_POSES
+        }
 
     def look(self, rotations: np.ndarray, frame: float) -> None:
         """One pose of an action, in the order of time.

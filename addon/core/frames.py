@@ -21,7 +21,8 @@ def parse_frames(text: str) -> list[float]:
             # The first character can be a sign, so a range's dash is looked for behind it.
             dash = part.find("-", 1)
             if dash > 0:
-                first, last = int(part[:dash]), int(part[dash + 1 :])
+                first: float = int(part[:dash])
+                last: float = int(part[dash + 1 :])
             else:
                 first = last = float(part)
         except ValueError:
@@ -31,7 +32,7 @@ def parse_frames(text: str) -> list[float]:
         if not FIRST_FRAME <= first <= last <= LAST_FRAME:
             raise WrongUse(f"frames: expected {FIRST_FRAME} to {LAST_FRAME}, got {part!r}")
         if isinstance(first, int):
-            frames.extend(range(first, last + 1))
+            frames.extend(range(first, int(last) + 1))
         else:
             frames.append(int(first) if first.is_integer() else first)
     return frames

@@ -88,7 +88,7 @@ class Inbetweens(NamedTuple):
     is_defined: np.ndarray
 
 
-def straight(a: Poses, b: Poses, progress: np.ndarray, method: str) -> Inbetweens:
+def straight(a: Poses, b: Poses, progress: np.ndarray, method: interpolate.Method) -> Inbetweens:
     """Each bone from `a` to `b`, [bones], as far as `progress` [bones] says: 0 is a, 1 is b."""
     between = interpolate.between(
         _in_layout_of(method, a.rigid), _in_layout_of(method, b.rigid), progress, method
@@ -96,7 +96,7 @@ def straight(a: Poses, b: Poses, progress: np.ndarray, method: str) -> Inbetween
     return _inbetweens(between, a.scale + progress[:, None] * (b.scale - a.scale), method)
 
 
-def on_spline(keys: Poses, times: np.ndarray, at: float, method: str) -> Inbetweens:
+def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Method) -> Inbetweens:
     """Each bone on the Catmull-Rom spline through its keys, blend form.
 
     keys  [4, bones]: two before `at` and two after; at an end of the keys one of them twice

@@ -14,14 +14,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .influences import Influences
-from .quaternions import cross, dots, rotated, rotations_of
 from .rig import Bones
+from .rotations import rotated, rotations_of
 from .surface import Surface
+from .vectors import cross, dots
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class Gauge:
     def __init__(self, surface: Surface, influences: Influences) -> None:
         """influences  of every vertex of the surface, over the bones of FrameOfRig's arrays"""
         self.surface = surface
-        self.rest: Shape | None = None
+        self._rest: Shape | None = None
         self._hold = Hold(surface, influences)
         self._pose: Pose | None = None
 
@@ -172,9 +173,16 @@ class Gauge:
         """What the shapes measured from now on are measured against."""
         # Unless shape keys move it, or the object moves, it is that of the last frame.
         same = self._pose is not None and frame.rest is self._pose.frame.rest
-        if not same and (self.rest is None or not np.array_equal(frame.rest.T, self.rest.points)):
-            self.rest = Shape(self.surface, frame.rest)
-        self._pose = Pose(self._hold, self.rest, frame)
+        rest = self._rest
+        if rest is None or not (same or np.array_equal(frame.rest.T, rest.points)):
+            rest = Shape(self.surface, frame.rest)
+        self._rest, self._pose = rest, Pose(self._hold, rest, frame)
+
+    @property
+    def rest(self) -> Shape:
+        """The rest shape of the frame set last."""
+        assert self._rest is not None, "set_frame() comes first"
+        return self._rest
 
     def measure(
         self, points: np.ndarray, other: np.ndarray | Callable[[], np.ndarray] | None = None
@@ -184,6 +192,7 @@ class Gauge:
 
         What is asked of the result is worked out then.
         """
+        assert self._pose is not None, "set_frame() comes first"
         return Measured(self._pose, Shape(self.surface, points), other)
 
 
@@ -233,7 +242,11 @@ class Hold:
         one = np.float32(1.0)
         total = first + np.where(dots(first, second) < 0.0, -one, one) * second
         total += np.where(dots(first, third) < 0.0, -one, one) * third
-        return rotated(total, normals.astype(np.float32))
+        with np.errstate(over="ignore"):
+            normals = normals.astype(np.float32)
+        # A face with a point that is no number has no normal.
+        normals[~np.isfinite(normals)] = 0.0
+        return rotated(total, normals)
 
 
 class Pose:
@@ -347,7 +360,8 @@ class Measured:
         return self._ENTRIES[name](self)
 
     def summary(self) -> Summary:
-        return Summary(**{field.name: self.entry(field.name) for field in fields(Summary)})
+        entries: dict[str, Any] = {field.name: self.entry(field.name) for field in fields(Summary)}
+        return Summary(**entries)
 
     _ENTRIES: ClassVar[dict[str, Callable[[Measured], float]]] = {
         "distance_max": lambda m: float(m.distance.max(initial=0.0)),
@@ -378,8 +392,8 @@ class Measured:
             return self.bulge
         if name == "stretch":
             return self._most_changed_edges()
-        around = [_sums(surface, values) for values in self._per_triangle(name)]
-        return np.divide(*around, out=np.full(len(around[0]), float(name == "area")), where=around[1] > 0.0)
+        parts, wholes = (_sums(surface, values) for values in self._per_triangle(name))
+        return np.divide(parts, wholes, out=np.full(len(parts), float(name == "area")), where=wholes > 0.0)
 
     def _per_triangle(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """What the vertices' shares are made of: parts and wholes, [triangles]."""
@@ -454,6 +468,7 @@ def _change(value: float, at_rest: float) -> float:
 
 def _sums(surface: Surface, values: np.ndarray) -> np.ndarray:
     """float64 [vertices]: `values` of triangles, summed at each of their corners."""
-    return sum(
+    at_corners = [
         np.bincount(corner, weights=values, minlength=surface.vertex_count) for corner in surface.corners
-    )
+    ]
+    return np.sum(at_corners, axis=0)

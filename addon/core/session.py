@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ class Frame:
     bones_from_model  float64 [4, 4], takes the mesh's object space to armature space
     rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
+    mix               name of the method that the binding's mix weights mix in; empty for none
     """
 
     method: str
@@ -33,16 +34,22 @@ class Frame:
     bones_from_model: np.ndarray
     rest_points: np.ndarray
     scale_rule: str = BLENDER_4.name
+    mix: str = ""
 
 
 class Binding:
-    """A mesh bound to bones. Deforms when a frame differs from the last."""
+    """A mesh bound to bones. Deforms when a frame differs from the last.
 
-    def __init__(self, weighting: Weighting) -> None:
+    mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for none of it
+    """
+
+    def __init__(self, weighting: Weighting, mix_weights: np.ndarray | None = None) -> None:
         self.weighting = weighting
+        self.mix_weights = mix_weights
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # For each purpose the deformer and the rest points that it has.
+        # For each purpose the packed mesh, and the deformer, each with the rest points that it has.
+        self._packed: dict[str, tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
@@ -64,7 +71,7 @@ class Binding:
     @property
     def points(self) -> np.ndarray:
         """The shape of the last frame, float32 [vertices, 3], object space."""
-        if self._is_elsewhere:
+        if self._is_elsewhere and self._last is not None:
             self._shape(self._last, self._points)
             self._is_elsewhere = False
         return self._points
@@ -85,9 +92,26 @@ class Binding:
         return True
 
     def _shape(self, frame: Frame, out: np.ndarray) -> None:
-        rest_points, bones, rest_inverses = frame.rest_points, frame.pose, self._rest_from_armature
         if self._spread_anew(frame):
             self._bound.clear()
+            self._packed.clear()
+        weights = self.mix_weights
+        if weights is None or frame.mix == frame.method:
+            frame = replace(frame, mix="")
+        is_linear = {frame.method == LINEAR, frame.mix == LINEAR}
+        if weights is not None and frame.mix and frame.scale_rule != BLENDER_4.name and len(is_linear) == 2:
+            # Under these rules linear blending takes other bones than the rest.
+            self._shape_alike(replace(frame, mix=""), out, "motion")
+            second = np.empty_like(out)
+            self._shape_alike(replace(frame, method=frame.mix, mix=""), second, "second motion")
+            out += weights[:, None] * (second - out)
+        else:
+            self._shape_alike(frame, out, "motion")
+
+    def _shape_alike(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
+        """By methods that take the same bones."""
+        rest_points, bones = frame.rest_points, frame.pose
+        rest_inverses: np.ndarray | None = self._rest_from_armature
         if frame.scale_rule != BLENDER_4.name:
             motions = frame.pose.astype(np.float64) @ self._rest_from_armature
             split = sinew.affine.split_scale(motions, self.bones.rest_axes.astype(np.float64))
@@ -96,14 +120,14 @@ class Binding:
             elif frame.method != LINEAR and split.has_scale.any():
                 rest_points = np.empty_like(self._points)
                 scale = split.scale.astype(np.float32)
-                self._deform("scale", LINEAR, frame, frame.rest_points, scale, None, rest_points)
+                linear = replace(frame, method=LINEAR, mix="")
+                self._deform("scale", linear, frame.rest_points, scale, None, rest_points)
                 bones, rest_inverses = split.rigid.astype(np.float32), None
-        self._deform("motion", frame.method, frame, rest_points, bones, rest_inverses, out)
+        self._deform(purpose, frame, rest_points, bones, rest_inverses, out)
 
     def _deform(
         self,
         purpose: str,
-        method: str,
         frame: Frame,
         rest_points: np.ndarray,
         bones: np.ndarray,
@@ -112,9 +136,13 @@ class Binding:
     ) -> None:
         """Deforms `rest_points` with the deformer bound for `purpose`, bound anew where it must be."""
         deformer, points = self._bound.get(purpose, (None, None))
-        if deformer is None or deformer.method != method:
-            deformer = self._bind(frame, rest_points, method)
-        elif points is not rest_points:
+        if deformer is None or (deformer.method, deformer.mixed_method or "") != (frame.method, frame.mix):
+            if purpose not in self._packed:
+                self._packed[purpose] = (self._pack(frame, rest_points), rest_points)
+            packed, points = self._packed[purpose]
+            mix = (frame.mix, self.mix_weights) if frame.mix and self.mix_weights is not None else None
+            deformer = sinew.Deformer(packed, frame.method, mix=mix)
+        if points is not rest_points:
             deformer.set_rest_points(rest_points)
         self._bound[purpose] = (deformer, rest_points)
         same_space = is_same_space(frame.bones_from_model)
@@ -134,24 +162,23 @@ class Binding:
             frame.bones_from_model, last.bones_from_model
         )
 
-    def _bind(self, frame: Frame, rest_points: np.ndarray, method: str) -> sinew.Deformer:
+    def _pack(self, frame: Frame, rest_points: np.ndarray) -> sinew.Binding:
         points = frame.rest_points
         if self.weighting.depends_on_points:
             points = transformed(points, frame.bones_from_model)
         influences = self.weighting.influences_over_joints(points)
-        return sinew.Deformer(
+        return sinew.Binding(
             rest_points,
             influences.offsets,
             influences.bones,
             influences.weights,
-            method,
             rest_bones=self.bones.rest_axes,
         )
 
 
 def _same(a: Frame, b: Frame) -> bool:
     return (
-        a.method == b.method
+        (a.method, a.mix) == (b.method, b.mix)
         and a.scale_rule == b.scale_rule
         and _equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
@@ -180,6 +207,7 @@ class LinkFrame:
     pose: np.ndarray
     bones_from_model: np.ndarray
     scale_rule: str = BLENDER_4.name
+    mix: str = ""
 
 
 class Chain:
@@ -240,7 +268,7 @@ class Chain:
             start = starts.get(number, result)
             is_end = link.binding is self._end
             changed |= link.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule),
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule, frame.mix),
                 out if is_end else None,
             )
             if link.mask is not None:

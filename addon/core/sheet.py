@@ -6,9 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .errors import SinewError
 from .output import write_whole
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw
 
 BACKGROUND = (38, 40, 44)
 TEXT = (232, 232, 232)
@@ -71,7 +75,7 @@ def _even(size: int) -> int:
     return size + size % 2
 
 
-def _fitted(draw, text: str, font, width: int) -> str:
+def _fitted(draw: ImageDraw.ImageDraw, text: str, font: Any, width: int) -> str:
     """`text`, cut with an ellipsis where it is wider than `width` pixels."""
     if draw.textlength(text, font=font) <= width:
         return text

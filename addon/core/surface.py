@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .quaternions import cross
+from .vectors import cross
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,11 @@ def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
         bone.roll = rng.uniform(-np.pi, np.pi)
         bone.parent, bone.use_connect = parent, connected
     bpy.ops.object.mode_set(mode="OBJECT")
-    bones = armature.data.bones
+    set_bone_options(seed, features, armature.data.bones)
+    return armature
+
+
+def set_bone_options(seed: int, features: set[str], bones: bpy.types.bpy_prop_collection) -> None:
     if has(seed, "inherit scale", features):
         rng = numbers(seed, "inherit scale")
         modes = ("FULL", "FIX_SHEAR", "ALIGNED", "AVERAGE", "NONE")
@@ -132,6 +136,10 @@ def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
                 bone.bbone_curveinx, bone.bbone_curveoutz = rng.uniform(-0.3, 0.3, 2)
                 if rng.random() < 0.4:
                     bone.bbone_mapping_mode = "CURVED"
+    set_envelopes(seed, features, bones)
+
+
+def set_envelopes(seed: int, features: set[str], bones: bpy.types.bpy_prop_collection) -> None:
     if has(seed, "envelopes", features) or has(seed, "envelope multiply", features):
         rng = numbers(seed, "envelopes")
         for bone in bones:
@@ -141,7 +149,6 @@ def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
         rng = numbers(seed, "envelope multiply")
         for bone in bones:
             bone.use_envelope_multiply = bool(rng.random() < 0.4)
-    return armature
 
 
 def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.types.Object:
@@ -160,33 +167,41 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
         for group in weights.permutation(len(groups))[: int(weights.integers(1, 7))]:
             groups[group].add([vertex], float(weights.uniform(0.05, 1.0)), "REPLACE")
     if messy:
-        rng = numbers(seed, "messy weights")
-        for vertex in range(count):
-            fate, group = rng.random(), groups[int(rng.integers(len(groups)))]
-            if fate < 0.1:
-                for each in groups:
-                    each.remove([vertex])
-            elif fate < 0.2:
-                group.add([vertex], 0.0, "REPLACE")
-            elif fate < 0.3:
-                group.add([vertex], float(10 ** rng.uniform(-6, -2)), "REPLACE")
+        make_weights_messy(numbers(seed, "messy weights"), count, groups)
     if has(seed, "shape keys", features):
-        rng = numbers(seed, "shape keys")
-        obj.shape_key_add(name="Basis")
-        for index in range(int(rng.integers(1, 4))):
-            key = obj.shape_key_add(name=f"key {index}")
-            moved = scenes.rest_points(obj) + rng.normal(0, 0.1, (count, 3)).astype(np.float32)
-            key.data.foreach_set("co", moved.ravel())
-            key.slider_min, key.slider_max = -1.0, 2.0
-            key.value, key.mute = rng.uniform(-0.5, 1.2), bool(rng.random() < 0.2)
-            if rng.random() < 0.3:
-                key.vertex_group = groups[0].name
-            if index and rng.random() < 0.3:
-                key.relative_key = obj.data.shape_keys.key_blocks[1]
-        if has(seed, "absolute keys", features, share=0.2):
-            obj.data.shape_keys.use_relative = False
-            obj.data.shape_keys.eval_time = rng.uniform(0.0, 30.0)
+        add_shape_keys(seed, features, obj)
     return obj
+
+
+def make_weights_messy(rng: np.random.Generator, count: int, groups: list[bpy.types.VertexGroup]) -> None:
+    for vertex in range(count):
+        fate, group = rng.random(), groups[int(rng.integers(len(groups)))]
+        if fate < 0.1:
+            for each in groups:
+                each.remove([vertex])
+        elif fate < 0.2:
+            group.add([vertex], 0.0, "REPLACE")
+        elif fate < 0.3:
+            group.add([vertex], float(10 ** rng.uniform(-6, -2)), "REPLACE")
+
+
+def add_shape_keys(seed: int, features: set[str], obj: bpy.types.Object) -> None:
+    rng = numbers(seed, "shape keys")
+    obj.shape_key_add(name="Basis")
+    for index in range(int(rng.integers(1, 4))):
+        key = obj.shape_key_add(name=f"key {index}")
+        points = scenes.rest_points(obj)
+        moved = points + rng.normal(0, 0.1, points.shape).astype(np.float32)
+        key.data.foreach_set("co", moved.ravel())
+        key.slider_min, key.slider_max = -1.0, 2.0
+        key.value, key.mute = rng.uniform(-0.5, 1.2), bool(rng.random() < 0.2)
+        if rng.random() < 0.3:
+            key.vertex_group = obj.vertex_groups[0].name
+        if index and rng.random() < 0.3:
+            key.relative_key = obj.data.shape_keys.key_blocks[1]
+    if has(seed, "absolute keys", features, share=0.2):
+        obj.data.shape_keys.use_relative = False
+        obj.data.shape_keys.eval_time = rng.uniform(0.0, 30.0)
 
 
 def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types.Object]:

@@ -15,6 +15,7 @@ import program
 import pytest
 import scenes
 import sinew
+import test_mix
 from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.blender import files, properties
@@ -48,8 +49,9 @@ def test_wrong_use_has_status_2():
 
 
 def test_methods_is_the_table():
-    rows = json.loads(run_sinew("methods", "--json").stdout)
-    assert [row["name"] for row in rows] == METHODS
+    printed = json.loads(run_sinew("methods", "--json").stdout)
+    assert [row["name"] for row in printed["methods"]] == METHODS
+    assert "mix.group" in printed["stages"][0]["parameters"]
     text = run_sinew("methods").stdout
     for method in sinew.methods():
         assert method.label in text
@@ -119,6 +121,48 @@ def test_points(arm_file, tmp_path):
     run_sinew("points", path, "--method", "lbs", "--frames", "1,3-5,6.5", "--object", "Arm", "--out", out)
     with np.load(out) as points:
         assert points["frames"].tolist() == [1, 3, 4, 5, 6.5]
+
+
+def test_parameters_are_set_by_name(tmp_path):
+    """As two Armature modifiers mix, in points, copies, bakes and pages."""
+    obj, _armature = scenes.make_arm()
+    test_mix.paint(obj)
+    other, _rig = scenes.make_arm(name="Plain")
+    expected = test_mix.by_two_modifiers(obj)
+    plain = scenes.modifier_shapes(other, test_mix.FRAMES, preserve_volume=False)
+    path, out = tmp_path / "arm.blend", tmp_path / "points.npz"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    mix = ("--method", "lbs", "--set", "mix=dq", "--set", f"mix.group={test_mix.GROUP}")
+    frames = ",".join(map(str, test_mix.FRAMES))
+    run_sinew("points", path, *mix, "--frames", frames, "--out", out)
+    with np.load(out) as points:
+        assert scenes.worst(points["Arm"], expected) <= 1e-5
+        # Without the group there is nothing to mix.
+        assert scenes.worst(points["Plain"], plain) <= 1e-5
+    run_sinew("reskin", path, *mix, "--frames", "none", "--out", tmp_path / "out")
+    files.open_file(tmp_path / "out" / "arm.blend")
+    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
+    run_sinew("bake", path, *mix, "--to", "shape-keys", "--frames", frames, "--out", tmp_path / "baked")
+    files.open_file(tmp_path / "baked" / "arm.blend")
+    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
+
+
+@pytest.mark.parametrize(
+    ("given", "status", "sentence"),
+    [
+        (("mix=dq", "mix.group=none such"), 1, "no mesh has a vertex group 'none such'"),
+        (("mix=bulge",), 2, "mix: expected one of off, lbs"),
+        (("strength=1",), 2, "expected one of mix, mix.method, mix.group"),
+    ],
+)
+def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):
+    path, _expected = arm_file
+    options = [option for text in given for option in ("--set", text)]
+    result = run_sinew(
+        "points", path, "--method", "lbs", *options, "--frames", "1", "--out", tmp_path / "o.npz", status=status
+    )
+    assert sentence in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 def test_reskin_writes_copies_that_use_the_method(arm_file, tmp_path):

@@ -67,7 +67,7 @@ def package() -> Path:
 
 @pytest.fixture
 def bare_site(tmp_path) -> Path:
-    """This Python's packages without anything of Sinew."""
+    """The packages of this Python without anything of Sinew."""
     bare = tmp_path / "site"
     bare.mkdir()
     for entry in Path(sysconfig.get_paths()["purelib"]).iterdir():

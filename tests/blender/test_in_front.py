@@ -9,6 +9,7 @@ import pytest
 import scenes
 import snapshot
 from sinew_addon.blender import drive, properties
+from sinew_addon.core.errors import SinewError
 from test_against_armature_modifier import assert_equal_to_modifier
 
 FRAMES = [1, 4, 8, 11]
@@ -38,6 +39,24 @@ def test_modifiers_in_front(kind, options):
     obj = arm_with(kind, **options)
     assert_equal_to_modifier(obj, FRAMES)
     assert properties.of(obj).front is not None
+
+
+def test_a_multi_modifier_behind_a_deforming_parent_is_refused():
+    """It starts from the mesh as it was before the parent's part, which Sinew never sees."""
+    obj, armature = scenes.make_arm()
+    obj.parent, obj.parent_type = armature, "ARMATURE"
+    obj.modifiers["Armature"].use_multi_modifier = True
+    with pytest.raises(SinewError, match="Multi Modifier, and its parent deforms it"):
+        drive.add(obj, "dq")
+    obj.modifiers["Armature"].use_multi_modifier = False
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(4)
+    assert not properties.of(obj).error
+    obj.modifiers["Armature"].use_multi_modifier = True
+    bpy.context.scene.frame_set(5)
+    bpy.context.view_layer.update()
+    assert "its parent deforms it" in properties.of(obj).error
+    assert obj.modifiers["Armature"].show_viewport
 
 
 def test_mirrored_groups_take_the_other_side():

@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import drive, properties
+from sinew_addon.blender import drive, properties, stack
+from sinew_addon.core.errors import SinewError
 
 FRAMES = [1, 4, 11]
 
@@ -77,11 +78,38 @@ def test_linked_meshes(tmp_path, override, driven, front):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     assert properties.is_driven(character())
     assert_shapes(expected)
-    drive.remove(character())
+    if driven and override:
+        with pytest.raises(SinewError, match="from its library"):
+            drive.remove(character())
+        properties.of(character()).enabled = False
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+        assert not properties.of(character()).enabled
+        assert len(drive.stand_ins(character())) == 1
+    else:
+        drive.remove(character())
     obj = character()
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     assert obj.modifiers["Armature"].object is not None
     assert_shapes(expected)
+    if driven and override:
+        return
     # A hierarchy of overrides takes in what the library's own character has of Sinew.
     local = [o for o in bpy.data.objects if o.library is None and o.override_library is None]
     assert not any(properties.is_helper(o) for o in local)
+
+
+def test_an_override_is_saved_as_a_blender_without_sinew_needs_it(tmp_path):
+    """With settings that tell Sinew when an artist sets them."""
+    save_library(tmp_path, driven=True, front=False)
+    link(tmp_path, override=True)
+    obj = character()
+    properties.of(obj).leave_small = False
+    assert stack.sinew_modifier(obj).show_viewport
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"), copy=True)
+    assert stack.sinew_modifier(obj).show_viewport
+    with bpy.data.libraries.load(str(tmp_path / "shot.blend"), link=True) as (_source, target):
+        target.objects = [obj.name]
+    saved = target.objects[0]
+    assert saved.library.name == "shot.blend"
+    assert [(m.type, m.show_viewport) for m in saved.modifiers] == [("NODES", False), ("ARMATURE", True)]

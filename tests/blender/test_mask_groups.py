@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import pytest
 import scenes
-from sinew_addon.blender import handlers, survey
+from sinew_addon.blender import handlers, properties, survey
 from sinew_addon.blender.diagnostics import diagnose
 from sinew_addon.blender.pages import measure
 
@@ -51,6 +51,11 @@ def dynamic_paint(obj, armature):
     bpy.context.view_layer.objects.active = obj
     bpy.ops.dpaint.type_toggle(type="CANVAS")
     made.canvas_settings.canvas_surfaces[0].output_name_a = GROUP
+
+
+def sinews_mix(obj, armature):
+    scenes.add_sinew(obj)
+    properties.of(obj).mix.group = GROUP
 
 
 def shape_key(obj, armature):

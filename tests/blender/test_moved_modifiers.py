@@ -123,3 +123,14 @@ def test_something_moved_between(moved, place):
     expected = scenes.shapes(obj, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert expected.shape == before.shape
+
+
+def test_what_is_kept_of_many_modifiers_is_of_each():
+    """Blender moves all in memory as more are added."""
+    obj, armature = scenes.make_arm()
+    for number in range(20):
+        obj.modifiers.new(f"More {number}", "ARMATURE").object = armature
+    pairs = drive.stand_ins(obj)
+    there = properties.of(obj).stand_ins
+    assert [kept.as_pointer() for _modifier, kept in pairs] == [kept.as_pointer() for kept in there]
+    assert [kept.name for kept in there] == names(obj)

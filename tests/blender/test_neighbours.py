@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import drive, driven, handlers, properties, safe_mode, stack
+from sinew_addon.blender import animation, drive, driven, handlers, properties, safe_mode, stack
 from sinew_addon.blender.plan import State
 from sinew_addon.blender.updates import turn, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
@@ -91,6 +91,35 @@ def test_an_edit_after_a_setting_and_before_a_frame_is_seen(arm, setting, edit):
     settings.enabled = False
     expected = scenes.modifier_shapes(arm, [10], setting != "method")[0]
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
+@pytest.mark.parametrize("once", [False, True], ids=["always", "once"])
+@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
+def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit, once):
+    """Blender evaluates it without telling anybody, and leaves out who comes behind one that goes away."""
+
+    def act() -> None:
+        if once:
+            take_off()
+        edit(arm)
+
+    take_off = neighbour("frame_change_post", act)
+    bpy.context.scene.frame_set(9)
+    take_off()
+    got = scenes.final_points(arm)
+    properties.of(arm).enabled = False
+    expected = scenes.modifier_shapes(arm, [9], True)[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
+@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
+def test_an_edit_in_a_handler_of_what_was_edited_is_seen_with_the_next_event(arm, neighbour, edit):
+    take_off = neighbour("depsgraph_update_post", lambda: edit(arm) if arm.pass_index else None)
+    arm.pass_index = 1
+    arm.data.update()
+    bpy.context.view_layer.update()
+    take_off()
+    assert_equals_modifier(arm)
 
 
 @pytest.mark.parametrize("keyed", [False, True])
@@ -228,7 +257,7 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
 
 
 @pytest.mark.parametrize("what", ["rename", "delete", "add", "delete object", "throw"])
-def test_suspended_modifiers_come_back_whatever_a_neighbour_does(neighbour, what):
+def test_suspended_modifiers_come_back_whatever_a_neighbour_does(monkeypatch, neighbour, what):
     obj, armature = scenes.make_arm()
     for name in ("Behind", "Further"):
         obj.modifiers.new(name, "CAST").factor = 0.1
@@ -236,7 +265,7 @@ def test_suspended_modifiers_come_back_whatever_a_neighbour_does(neighbour, what
     armature.keyframe_insert("location", frame=1)
     armature.location.x = 3.0
     armature.keyframe_insert("location", frame=11)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Twin", obj.data))
+    monkeypatch.setattr(safe_mode, "is_on", lambda: True)
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj, "dq")
     scenes.shapes(obj, [2, 3, 4])
@@ -395,3 +424,20 @@ def test_a_parent_that_deforms_becomes_another(route):
     obj.parent = rig
     bpy.context.view_layer.update()
     assert_equals_modifier(obj, preserve_volume=False)
+
+
+def test_keys_that_two_objects_share_go_with_the_last(route):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    obj.keyframe_insert("sinew.method", frame=4)
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    handlers.refresh(bpy.context)
+    assert other.animation_data.action == obj.animation_data.action
+    drive.remove(obj)
+    assert "sinew.method" in animation.animated_paths(other)
+    drive.remove(other)
+    bpy.context.scene.frame_set(5)
+    for each in (obj, other):
+        assert not animation.animated_paths(each)
+        assert not each.is_property_set("sinew")

@@ -166,3 +166,28 @@ def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
     scenes.add_sinew(obj, "lbs")
     got = render_animation(scene, tmp_path / "sinew", (5, 7))
     assert np.abs(got - expected).mean() < 3e-4
+
+
+def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered(tmp_path):
+    """Sinew suspends modifiers between Blender's two rounds: Blender copies the objects anew for it."""
+    obj, armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur=False)
+    moving_parent(obj, armature)
+    other = obj.copy()
+    other.location.y += 1.0
+    scene.collection.objects.link(other)
+    behind = obj.modifiers.new("Cast", "CAST")
+    flags = other.modifiers["Armature"]
+    for frame, value in ((1, 0.0), (4, 1.0)):
+        behind.factor = value
+        behind.keyframe_insert("factor", frame=frame)
+        flags.show_render = value > 0.5
+        flags.keyframe_insert("show_render", frame=frame)
+    scene.frame_set(1)
+    (tmp_path / "modifier").mkdir()
+    (tmp_path / "sinew").mkdir()
+    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
+    scenes.add_sinew(obj, "lbs")
+    got = render_animation(scene, tmp_path / "sinew", (5, 7))
+    assert np.abs(got - expected).mean() < 3e-4

@@ -71,6 +71,26 @@ def full_scene(folder: Path) -> Path:
     track.strips.new("strip", 1, layered.animation_data.action)
     layered.animation_data.action = None
 
+    add_what_takes_helpers()
+    add_what_is_shown_elsewhere(obj)
+
+    # Posed by hand, beside its keys: nobody may go to a frame before saving.
+    armature.pose.bones[0].rotation_quaternion = (math.cos(0.2), 0.0, math.sin(0.2), 0.0)
+    bpy.context.scene.frame_current = 4
+    path = save(folder / "full.blend")
+    library = folder / "library" / "props.blend"
+    library.parent.mkdir()
+    shutil.copy(path, library)
+    with bpy.data.libraries.load(str(library), link=True, relative=True) as (_, to):
+        to.materials, to.objects = ["Material"], ["Bare"]
+    mesh.materials.append(to.materials[0])
+    hero = to.objects[0]
+    bpy.context.scene.collection.objects.link(hero)
+    hero.override_create(remap_local_usages=True).name = "Override"
+    return save(path)
+
+
+def add_what_takes_helpers() -> None:
     # What Sinew needs helpers for: a modifier in front, chained modifiers, the parent's own deformation.
     mirrored, _ = scenes.make_arm(sides=6, rings=9, name="Mirrored")
     mirrored.modifiers.new("Mirror", "MIRROR").use_axis = (False, False, True)
@@ -83,6 +103,8 @@ def full_scene(folder: Path) -> Path:
     child.modifiers.clear()
     child.parent, child.parent_type = parent, "ARMATURE"
 
+
+def add_what_is_shown_elsewhere(obj: bpy.types.Object) -> None:
     # Two objects of one mesh; one that only renders; one that no armature deforms.
     twin = obj.copy()
     twin.name = "Twin"
@@ -104,21 +126,6 @@ def full_scene(folder: Path) -> Path:
     excluded, _ = scenes.make_arm(sides=6, rings=9, name="Excluded")
     bpy.context.scene.collection.objects.unlink(excluded)
     hidden.objects.link(excluded)
-
-    # Posed by hand, beside its keys: nobody may go to a frame before saving.
-    armature.pose.bones[0].rotation_quaternion = (math.cos(0.2), 0.0, math.sin(0.2), 0.0)
-    bpy.context.scene.frame_current = 4
-    path = save(folder / "full.blend")
-    library = folder / "library" / "props.blend"
-    library.parent.mkdir()
-    shutil.copy(path, library)
-    with bpy.data.libraries.load(str(library), link=True, relative=True) as (_, to):
-        to.materials, to.objects = ["Material"], ["Bare"]
-    mesh.materials.append(to.materials[0])
-    hero = to.objects[0]
-    bpy.context.scene.collection.objects.link(hero)
-    hero.override_create(remap_local_usages=True).name = "Override"
-    return save(path)
 
 
 def test_everything_comes_back(tmp_path):

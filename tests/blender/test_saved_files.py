@@ -211,9 +211,35 @@ def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
         assert small.modifiers["Armature"].object == armature
 
 
-def test_in_memory_the_modifiers_keep_their_armatures():
+def _put_in_front(obj: bpy.types.Object, kind: str) -> None:
+    obj.modifiers.new("Front", kind)
+    obj.modifiers.move(1, 0)
+
+
+def _key_visibility(obj: bpy.types.Object) -> None:
+    for frame, shown in ((1, True), (20, False)):
+        obj.modifiers["Armature"].show_viewport = shown
+        obj.modifiers["Armature"].keyframe_insert("show_viewport", frame=frame)
+
+
+@pytest.mark.parametrize(
+    "set_up",
+    [
+        None,
+        lambda obj: _put_in_front(obj, "SOLIDIFY"),
+        lambda obj: _put_in_front(obj, "VERTEX_WEIGHT_EDIT"),
+        lambda obj: bpy.data.objects.new("Twin", obj.data),
+        _key_visibility,
+    ],
+    ids=["plain", "in front", "weights in front", "shared mesh", "keyed"],
+)
+@pytest.mark.parametrize("is_safe", [False, True])
+def test_in_memory_the_modifiers_keep_their_armatures(monkeypatch, set_up, is_safe):
     """Of what Blender writes without a word: autosaves, quit.blend, undo steps."""
     obj, armature = scenes.make_arm()
+    if set_up is not None:
+        set_up(obj)
+    monkeypatch.setattr(safe_mode, "is_on", lambda: is_safe)
     scenes.add_sinew(obj, "dq")
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)

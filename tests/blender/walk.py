@@ -282,15 +282,37 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
 
 def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) -> Fault | None:
     """What differs between the two sides after a step."""
+    fault = compare_words(at, ours, theirs)
+    if fault is not None or "shapes" not in ours:
+        return fault
+    fault = compare_files(at, ours, theirs)
+    if fault is not None:
+        return fault
+    outcome.unanswered += ours["unanswered"]
+    skipped = {*ours["skipped"], *theirs["skipped"]}
+    return (
+        compare_shapes(outcome, at, ours, theirs, skipped)
+        or compare_renders(outcome, at, ours, theirs, skipped)
+        or compare_copies(outcome, at, ours, theirs, skipped, blender)
+    )
+
+
+def exception_of(problems: list[str], at: int) -> Fault:
+    """Named by the exception raised last, without what differs from run to run."""
+    text = "\n".join(problems)
+    raised = re.findall(r"^(\w+(?:Error|Exception|Warning)\b.*)$", text, re.MULTILINE) or [
+        text.splitlines()[-1]
+    ]
+    kind = re.sub(r"[\"'].*|\d+", "…", raised[-1])[:60]
+    where = re.findall(r'File "[^"]*/(\w+\.py)", line (\d+)', text)
+    place = f" at {where[-1][0]}:{where[-1][1]}" if where else ""
+    return Fault(f"exception: {kind}", f"{raised[-1]}{place}\n{text}", at)
+
+
+def compare_words(at: int, ours: dict, theirs: dict) -> Fault | None:
+    """What the step raised, returned and said, and what it left behind."""
     if ours["problems"]:
-        text = "\n".join(ours["problems"])
-        raised = re.findall(r"^(\w+(?:Error|Exception|Warning)\b.*)$", text, re.MULTILINE) or [
-            text.splitlines()[-1]
-        ]
-        kind = re.sub(r"[\"'].*|\d+", "…", raised[-1])[:60]
-        where = re.findall(r'File "[^"]*/(\w+\.py)", line (\d+)', text)
-        place = f" at {where[-1][0]}:{where[-1][1]}" if where else ""
-        return Fault(f"exception: {kind}", f"{raised[-1]}{place}\n{text}", at)
+        return exception_of(ours["problems"], at)
     if ours.get("outcome") != theirs.get("outcome"):
         return Fault(
             "operation",
@@ -303,18 +325,23 @@ def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) 
             return Fault("error", f"{name}: {error}", at)
     if ours.get("left over"):
         return Fault("left over", ", ".join(ours["left over"]), at)
-    if "shapes" not in ours:
-        return None
+    return None
+
+
+def compare_files(at: int, ours: dict, theirs: dict) -> Fault | None:
+    """What the open files hold."""
     if theirs["wrong"]:
         return Fault("settings", "; ".join(theirs["wrong"]), at)
     different = differing(ours["state"], theirs["state"])
     if different:
         return Fault("state", "; ".join(different), at)
-    skipped = {*ours["skipped"], *theirs["skipped"]}
     if ours["shapes"].keys() != theirs["shapes"].keys():
         only = ours["shapes"].keys() ^ theirs["shapes"].keys()
         return Fault("visibility", f"shown on one side only: {', '.join(sorted(only))}", at)
-    outcome.unanswered += ours["unanswered"]
+    return None
+
+
+def compare_shapes(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str]) -> Fault | None:
     for name, (points, matrix) in ours["shapes"].items():
         other_points, other_matrix = theirs["shapes"][name]
         if not np.allclose(matrix, other_matrix, atol=1e-5):
@@ -325,6 +352,10 @@ def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) 
                 return fault
         elif not np.isfinite(points).all():
             return Fault("shape", f"{name} has points that are not finite", at)
+    return None
+
+
+def compare_renders(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str]) -> Fault | None:
     for name, points in ours.get("rendered", {}).items():
         if name.partition(" in the render")[0] in skipped:
             continue
@@ -334,19 +365,27 @@ def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) 
         fault = differ(outcome, at, name, points, other)
         if fault is not None:
             return Fault("render", fault.text, at)
-    if ours.get("copies") and outcome.copies_follow:
-        wanted = [key for key in ours["copies"] if key[0] not in skipped or key[0] in theirs["shapes"]]
-        blender.send(what="shapes by", copies=wanted)
-        for key, other in blender.receive().items():
-            points = ours["copies"][key]
-            if key[0] in skipped and key[0] in ours["skipped"]:
-                continue
-            if points.shape == other.shape and len(points):
-                # Shown beside the original.
-                points = points - (points - other).mean(axis=0)
-            fault = differ(outcome, at, f"the copy of {key[0]} by {key[1]}", points, other)
-            if fault is not None:
-                return Fault("comparison", fault.text, at)
+    return None
+
+
+def compare_copies(
+    outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str], blender: Side
+) -> Fault | None:
+    """Copies of the comparison in the viewport, each beside the Armature modifier's shape for its method."""
+    if not ours.get("copies") or not outcome.copies_follow:
+        return None
+    wanted = [key for key in ours["copies"] if key[0] not in skipped or key[0] in theirs["shapes"]]
+    blender.send(what="shapes by", copies=wanted)
+    for key, other in blender.receive().items():
+        points = ours["copies"][key]
+        if key[0] in skipped and key[0] in ours["skipped"]:
+            continue
+        if points.shape == other.shape and len(points):
+            # Shown beside the original.
+            points = points - (points - other).mean(axis=0)
+        fault = differ(outcome, at, f"the copy of {key[0]} by {key[1]}", points, other)
+        if fault is not None:
+            return Fault("comparison", fault.text, at)
     return None
 
 

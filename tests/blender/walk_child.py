@@ -69,6 +69,7 @@ class Child:
 
     def start(self, _request: dict) -> dict:
         self.claims, self.wrong = {}, []
+        self.side.set_safe(False)
         self.operations.start(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
         # Those of a file that a walk before has left broken.
@@ -259,7 +260,9 @@ class Child:
                 found[f"object {obj.name_full}"] = self.object_state(obj)
         for obj in self.walker.objects("ARMATURE"):
             if obj.library is None and obj.users_collection:
-                found[f"armature {obj.name_full}"] = [bone.name for bone in obj.data.bones]
+                # Those of edit mode are known to others when Blender next needs them.
+                bones = [] if obj.data.is_editmode else [bone.name for bone in obj.data.bones]
+                found[f"armature {obj.name_full}"] = bones
         return found
 
     def object_state(self, obj) -> dict[str, object]:
@@ -280,11 +283,16 @@ class Child:
             found["weights"] = zlib.crc32(
                 repr([(g.group, round(g.weight, 6)) for v in obj.data.vertices for g in v.groups]).encode()
             )
+        keyed = {c.data_path for c in self.sides.curves_of(obj)}
         if not side.is_on(obj) and obj.mode == "OBJECT":
             found["armature modifiers"] = [
                 {
                     "name": m.name,
-                    "on": (m.show_viewport, m.show_render),
+                    # Keyed ones are as Blender has evaluated them last, which it does not while hidden.
+                    "on": [
+                        getattr(m, name) if m.path_from_id(name) not in keyed else "keyed"
+                        for name in ("show_viewport", "show_render")
+                    ],
                     "object": m.object.name_full if m.object is not None else "",
                     "volume": side.preserve_volume(m),
                     "options": (m.use_multi_modifier, m.vertex_group, m.invert_vertex_group),

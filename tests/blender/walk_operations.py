@@ -158,7 +158,9 @@ class Walker:
         bpy.context.scene.frame_set(bpy.context.scene.frame_current)
 
     def edit_mode(self) -> None:
-        """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2)."""
+        """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2). What was
+        changed before has its own: whether Blender makes one for it depends on what else is in the file."""
+        self.push_undo()
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.ed.undo_push(message="edit mode")
 
@@ -301,7 +303,7 @@ def add(w: Walker, r: random.Random) -> str | None:
 
 @operation(2)
 def remove(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
     if obj is None:
         return None
     w.object_mode()
@@ -315,7 +317,11 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
     w.side.end_comparison()
     # What the current view layer does not have, too.
     for obj in [o for o in w.objects("MESH") if w.side.is_driven(o) and o.library is None]:
-        w.side.remove(obj)
+        # What comes from a library with Sinew has it again when the file is loaded.
+        if obj.override_library is None:
+            w.side.remove(obj)
+        else:
+            w.side.set_enabled(obj, False)
     return "Sinew off all"
 
 
@@ -417,7 +423,8 @@ def restart(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.3)
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    # Blender's own button does not take what comes from a library off an override.
+    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
     if obj is None or not w.side.is_on(obj):
         return None
     w.side.delete_part(obj, "modifier")
@@ -488,6 +495,14 @@ def play(w: Walker, r: random.Random) -> str | None:
     return f"frames {first} to {first + 2}"
 
 
+@operation(1)
+def scrub(w: Walker, r: random.Random) -> str | None:
+    frames = [r.randint(*FRAMES) for _step in range(5)]
+    for number in frames:
+        bpy.context.scene.frame_set(number)
+    return f"frames {', '.join(map(str, frames))}"
+
+
 @operation(0.7)
 def current_frame(w: Walker, r: random.Random) -> str | None:
     number = r.randint(*FRAMES)
@@ -554,6 +569,22 @@ def clear_animation(w: Walker, r: random.Random) -> str | None:
     else:
         remove_curves(obj, "")
     return f"clear the keys of {obj.name}"
+
+
+@operation(0.4)
+def push_action(w: Walker, r: random.Random) -> str | None:
+    """Into a strip, as for layers of animation."""
+    rig = w.armature(r)
+    animation = rig.animation_data if rig is not None else None
+    if animation is None or animation.action is None or rig.override_library is not None:
+        return None
+    action, slot = animation.action, getattr(animation, "action_slot", None)
+    strip = animation.nla_tracks.new().strips.new(w.new_name("strip"), 1, action)
+    if slot is not None:
+        strip.action_slot = slot
+    animation.action = None
+    w.this_frame()
+    return f"the action of {rig.name} in a strip"
 
 
 @operation(0.7)
@@ -624,6 +655,21 @@ def parent(w: Walker, r: random.Random) -> str | None:
     return f"parent {obj.name} to {rig.name}, {kind}"
 
 
+@operation(1)
+def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
+    """The command gives a mesh an Armature modifier where none of its own points to the armature, as those do
+    not that Sinew has cleared."""
+    obj, rig = w.mesh(r, lambda o: not w.side.is_driven(o)), w.armature(r)
+    is_plain = obj is not None and obj.override_library is None and obj.parent_type != "ARMATURE"
+    if not is_plain or rig is None or len(w.modifiers(obj)) > 5 or not w.select(obj, rig):
+        return None
+    before = len(armature_modifiers(obj))
+    bpy.ops.object.parent_set(type="ARMATURE")
+    for modifier in armature_modifiers(obj)[before:]:
+        w.side.set_preserve_volume(modifier, False)
+    return f"parent {obj.name} to {rig.name} with Armature Deform"
+
+
 # --- Weights
 
 
@@ -653,6 +699,7 @@ def paint_weights(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
     if obj is None or not obj.vertex_groups or not w.select(obj):
         return None
+    w.push_undo()
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     # As a window does: tools ask for the armature behind the modifiers, which Sinew gives back meanwhile.
     w.before_evaluation()
@@ -752,6 +799,7 @@ def sculpt_mode(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
     if obj is None or not w.select(obj):
         return None
+    w.push_undo()
     bpy.ops.object.mode_set(mode="SCULPT")
     if r.random() < 0.5:
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -1007,6 +1055,18 @@ def armature_options(w: Walker, r: random.Random) -> str | None:
     return f"{what} of {modifier.name} of {obj.name}"
 
 
+@operation(0.7)
+def key_modifier(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.override_library is None and not w.shares_action(o))
+    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type in ("CAST", "SMOOTH")]) if obj else None
+    if modifier is None:
+        return None
+    frames = sorted(r.sample(range(1, 12), 2))
+    key(obj, modifier.path_from_id("factor"), [(frames[0], r.random()), (frames[1], r.random())])
+    w.this_frame()
+    return f"key the factor of {modifier.name} of {obj.name} at {frames}"
+
+
 @operation(1)
 def another_armature(w: Walker, r: random.Random) -> str | None:
     obj, rig = w.skinned(r), w.armature(r)
@@ -1137,6 +1197,29 @@ def key_shape_key(w: Walker, r: random.Random) -> str | None:
     return f"key {block.name} of {obj.name}"
 
 
+@operation(0.7)
+def drive_shape_key(w: Walker, r: random.Random) -> str | None:
+    """By a bone, as correctives are; or no longer."""
+    obj, rig = w.mesh(r, lambda o: bool(_keys(o)) and o.data.library is None), w.armature(r)
+    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    if obj is None or bone is None:
+        return None
+    block = w.one(r, _keys(obj))
+    animation = obj.data.shape_keys.animation_data
+    path = block.path_from_id("value")
+    if animation is not None and any(d.data_path == path for d in animation.drivers):
+        block.driver_remove("value")
+        return f"no driver on {block.name} of {obj.name}"
+    driver = block.driver_add("value").driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.type = "TRANSFORMS"
+    target = variable.targets[0]
+    target.id, target.bone_target = rig, bone.name
+    target.transform_type, target.transform_space = "ROT_X", "LOCAL_SPACE"
+    return f"{block.name} of {obj.name} follows {bone.name} of {rig.name}"
+
+
 @operation(1)
 def delete_shape_key(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: bool(_keys(o)) and o.mode == "OBJECT" and o.data.library is None)
@@ -1203,7 +1286,12 @@ def delete_object(w: Walker, r: random.Random) -> str | None:
 @operation(0.2)
 def delete_armature(w: Walker, r: random.Random) -> str | None:
     rig, by_script = w.armature(r), r.random() < 0.4
-    return _delete(w, rig, by_script) if len(w.armatures()) > 1 else None
+    if len(w.armatures()) < 2 or w.compared:
+        # A comparison's copies keep it in the file.
+        return None
+    # So does what Sinew is on, where the command does not take it out of the file by itself.
+    by_script |= any(w.side.is_driven(obj) for obj in w.objects("MESH"))
+    return _delete(w, rig, by_script)
 
 
 @operation(1.5)
@@ -1494,6 +1582,55 @@ def render(w: Walker, r: random.Random) -> str | None:
     return "render"
 
 
+def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: list[int]) -> None:
+    """What another add-on does to an object, and to the modifier of that name."""
+    if what == "add":
+        obj.modifiers.new(new, "CAST")
+    elif what == "weights" and obj.vertex_groups:
+        obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
+    elif what == "move":
+        obj.location.z += 0.1
+    elif what == "name":
+        obj.name = new
+    elif what == "rename":
+        obj.modifiers[modifier].name = new
+    elif what == "toggle":
+        obj.modifiers[modifier].show_viewport = not obj.modifiers[modifier].show_viewport
+    elif what == "delete":
+        obj.modifiers.remove(obj.modifiers[modifier])
+
+
+@operation(0.7)
+def export(w: Walker, r: random.Random) -> str | None:
+    """What another program gets."""
+    obj = w.mesh(r)
+    if obj is None or not w.select(obj):
+        return None
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    path = w.folder / "walk.obj"
+    bpy.ops.wm.obj_export(
+        filepath=str(path),
+        export_selected_objects=True,
+        export_materials=False,
+        export_uv=False,
+        export_normals=False,
+        forward_axis="Y",
+        up_axis="Z",
+    )
+    lines = (line.split()[1:4] for line in path.read_text().splitlines() if line.startswith("v "))
+    points = np.array(list(lines), dtype=np.float32).reshape(-1, 3)
+    w.rendered = {f"{obj.name_full} in the render, exported": points}
+    return f"export {obj.name}"
+
+
+@operation(0.3)
+def safe_mode(w: Walker, r: random.Random) -> str | None:
+    on = r.random() < 0.5
+    w.side.set_safe(on)
+    return f"safe mode {'on' if on else 'off'}"
+
+
 @operation(1)
 def neighbour(w: Walker, r: random.Random) -> str | None:
     """Another add-on's handler, once, at a change of frame."""
@@ -1518,26 +1655,15 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
 
     def act(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
         handlers.remove(act)
-        obj = bpy.data.objects[name]
-        if what == "add":
-            obj.modifiers.new(new, "CAST")
-        elif what == "weights" and obj.vertex_groups:
-            obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
-        elif what == "move":
-            obj.location.z += 0.1
-        elif what == "name":
-            obj.name = new
-        elif what == "rename":
-            obj.modifiers[modifier_name].name = new
-        elif what == "toggle":
-            obj.modifiers[modifier_name].show_viewport = not obj.modifiers[modifier_name].show_viewport
-        elif what == "delete":
-            obj.modifiers.remove(obj.modifiers[modifier_name])
+        meddle(bpy.data.objects[name], what, modifier_name, new, vertices)
 
     handlers.append(act)
     if when == "depsgraph_update_post":
         obj.update_tag()
+        w.before_evaluation()
         bpy.context.view_layer.update()
+        # What was touched before and again in a handler is looked at with the next event.
+        w.this_frame()
     else:
         bpy.context.scene.frame_set(number)
     if act in handlers:

@@ -129,15 +129,29 @@ class BlenderSide:
         self._set(obj, QV, method == "qv")
 
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
+        if on and not self.is_on(obj):
+            self._use_keyed_flags(obj)
         self._set(obj, ON, on)
 
     def rebind(self, obj: bpy.types.Object) -> None:
-        self._set(obj, ON, True)
+        self.set_enabled(obj, True)
+
+    def _use_keyed_flags(self, obj: bpy.types.Object) -> None:
+        """While it was off, they were the artist's own; Blender sets keyed ones with the next frame."""
+        scene = bpy.context.scene
+        values = {c.data_path: c.evaluate(scene.frame_current_final) for c in curves_of(obj)}
+        for modifier in armature_modifiers(obj):
+            value = values.get(modifier.path_from_id("use_deform_preserve_volume"))
+            if value is not None:
+                modifier.use_deform_preserve_volume = value >= 0.5
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         """One that changes no shape."""
 
     def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
+        pass
+
+    def set_safe(self, on: bool) -> None:
         pass
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
@@ -203,6 +217,9 @@ class BlenderSide:
             for modifier in armature_modifiers(obj):
                 replaced = on and modifier.name in run
                 wanted = self.method(obj) == "dq" if replaced else modifier.show_expanded
+                if obj.override_library is not None:
+                    # Blender's undo gives an override its flag back, and evaluates it as before.
+                    obj.update_tag()
                 if modifier.use_deform_preserve_volume != wanted:
                     modifier.use_deform_preserve_volume = wanted
         return wrong
@@ -259,6 +276,7 @@ class SinewSide:
         logger.propagate = False
         logger.handlers[:] = [self.records]
         sinew_addon.register()
+        self._is_safe = safe
         routes.force(routes.UPDATE if safe else routes.EVALUATION)
         from sinew_addon.blender import small_meshes
 
@@ -335,6 +353,12 @@ class SinewSide:
         if on:
             bpy.context.scene.sinew_measures.quantity = quantity
         obj.sinew.heat = on
+
+    def set_safe(self, on: bool) -> None:
+        from sinew_addon.blender import handlers, safe_mode
+
+        safe_mode.set_forced(on or self._is_safe)
+        handlers.refresh(bpy.context)
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         numbers = {m.name: m.number for m in self._properties.METHODS.values()}
@@ -421,10 +445,11 @@ class SinewSide:
 
     def left_over(self) -> list[str]:
         """What is left of Sinew in a file where it drives nothing."""
-        found = [f"object {o.name}" for o in bpy.data.objects if o.library is None and self.is_ours(o)]
-        found += [
-            f"settings of {o.name}" for o in bpy.data.objects if o.is_property_set("sinew") and not o.library
-        ]
+        # Without a user it is not saved, and was that of an object that was deleted.
+        objects = [o for o in bpy.data.objects if o.library is None and o.users]
+        used = {o.data for o in objects}
+        found = [f"object {o.name}" for o in objects if self.is_ours(o)]
+        found += [f"settings of {o.name}" for o in objects if o.is_property_set("sinew")]
         for obj in bpy.data.objects:
             if obj.library is not None:
                 continue
@@ -432,10 +457,10 @@ class SinewSide:
             drivers = obj.animation_data.drivers if obj.animation_data is not None else ()
             found += [f"driver {d.data_path} of {obj.name}" for d in drivers]
         for mesh in bpy.data.meshes:
-            # Without a user it is not saved, and was that of an object that was deleted.
-            names = mesh.attributes.keys() if mesh.library is None and mesh.users else ()
+            names = mesh.attributes.keys() if mesh.library is None and mesh in used else ()
             found += [f"attribute {name} of {mesh.name}" for name in names if "sinew" in name.lower()]
         for kind in ("meshes", "node_groups", "materials", "collections", "actions", "texts"):
-            items = (i for i in getattr(bpy.data, kind) if i.library is None)
+            items = (i for i in getattr(bpy.data, kind) if i.library is None and i.users)
+            items = (i for i in items if kind != "meshes" or i in used)
             found += [f"{kind}: {item.name}" for item in items if "sinew" in item.name.lower()]
         return found

@@ -189,9 +189,12 @@ def make_base() -> None:
     window_scene.make_character("Hero", LARGE, (-1.5, 0.0, 0.0))
     window_scene.make_character("Small", SMALL, (-1.5, 2.0, 0.0))
     front = window_scene.make_character("Front", LARGE, (-1.5, -2.0, 0.0))
-    # It changes nothing, but Sinew can not know, and deforms such a mesh after Blender's evaluation.
+    # They change nothing, but Sinew can not know: what can change weights it deforms after the evaluation.
     front.modifiers.new("Cast", "CAST").factor = 0.0
     front.modifiers.move(1, 0)
+    late = window_scene.make_character("Late", LARGE, (-1.5, -4.0, 0.0))
+    late.modifiers.new("Weights", "VERTEX_WEIGHT_EDIT")
+    late.modifiers.move(1, 0)
     bpy.context.window.scene = second = bpy.data.scenes.new(SECOND)
     window_scene.make_character("Guest", LARGE, (0.0, 0.0, 0.0))
     bpy.context.window.scene = scene
@@ -210,20 +213,21 @@ def make_base() -> None:
 
 
 def fresh(run: Run) -> Steps:
-    """The file as before Sinew; then Hero and Front have dq, which their own Armature modifiers would not
-    give, and Small has what it had."""
+    """The file as before Sinew; then Hero, Front and Late have dq, which their own Armature modifiers would
+    not give, and Small has what it had."""
     # A copy, which steps may save.
     shutil.copy(FOLDER / "base.blend", FOLDER / "open.blend")
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "open.blend"))
     yield from wait()
-    run.wanted = {"Hero": "", "Small": "", "Front": "", "Guest": ""}
+    run.wanted = {"Hero": "", "Small": "", "Front": "", "Late": "", "Guest": ""}
     run.check_shapes("before Sinew")
     click("sinew.add", "Hero")
     hero().sinew.method = "dq"
     click("sinew.add", "Small")
-    click("sinew.add", "Front")
-    bpy.data.objects["Front"].sinew.method = "dq"
-    run.wanted = {"Hero": "dq", "Small": "lbs", "Front": "dq", "Guest": ""}
+    for name in ("Front", "Late"):
+        click("sinew.add", name)
+        bpy.data.objects[name].sinew.method = "dq"
+    run.wanted = {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq", "Guest": ""}
     choose("Hero")
     yield from wait()
     window.choose_tab()

@@ -78,7 +78,7 @@ class ComparingEngine(bpy.types.RenderEngine):
     take turns with the window, so that the two threads would never meet."""
 
     bl_idname, bl_label = "SINEW_COMPARING", "Comparing"
-    seen: list[tuple[int, float]] = []
+    seen: list[tuple[int, str, float]] = []
     wanted: dict[str, str] = {}
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -89,7 +89,7 @@ class ComparingEngine(bpy.types.RenderEngine):
             original = obj.original
             expected = blender_points(original, bpy.data.objects[f"{name} Rig"], method or "lbs", depsgraph)
             off = worst(shown_points(original, depsgraph), expected)
-            self.seen.append((depsgraph.scene.frame_current, off))
+            self.seen.append((depsgraph.scene.frame_current, name, off))
         result = self.begin_result(
             0, 0, depsgraph.scene.render.resolution_x, depsgraph.scene.render.resolution_y
         )
@@ -115,8 +115,8 @@ def _is_rendering() -> bool:
 
 def _check_rendered(run: Run, frames: int) -> None:
     seen = ComparingEngine.seen
-    run.check(len({frame for frame, _off in seen}) == frames, f"{len(seen)} of {frames} frames were rendered")
-    wrong = [(frame, round(off, 4)) for frame, off in seen if off > window_scene.TOLERANCE]
+    run.check(len({frame for frame, _name, _off in seen}) == frames, f"{len(seen)} of {frames} frames were rendered")
+    wrong = [(frame, name, round(off, 4)) for frame, name, off in seen if off > window_scene.TOLERANCE]
     run.check(not wrong, f"rendered frames are off: {wrong[:6]}, {len(wrong)} of {len(seen)}")
 
 
@@ -124,7 +124,7 @@ def _check_rendered(run: Run, frames: int) -> None:
 def render_locked(run: Run) -> Steps:
     bpy.utils.register_class(ComparingEngine)
     bpy.context.preferences.view.render_display_type = "NONE"
-    _start_render(run, True, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq"})
+    _start_render(run, True, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
     yield from until(lambda: not _is_rendering(), "the end of the render")
     yield from wait()
     _check_rendered(run, 20)
@@ -135,7 +135,7 @@ def render_locked(run: Run) -> Steps:
 @step("renders")
 def render_unlocked(run: Run) -> Steps:
     """Without a hand on the panel: safe mode is taken for it."""
-    _start_render(run, False, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq"})
+    _start_render(run, False, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
     yield from until(lambda: not _is_rendering(), "the end of the render")
     yield from wait()
     _check_rendered(run, 20)
@@ -166,7 +166,7 @@ def click_during_unlocked_renders(run: Run) -> Steps:
         _start_render(run, False, 60, {})
         while _is_rendering():
             yield
-            name = chance.choice(("Hero", "Small", "Front"))
+            name = chance.choice(("Hero", "Small", "Front", "Late"))
             obj = bpy.data.objects[name]
             action = chance.randrange(7)
             try:
@@ -185,7 +185,7 @@ def click_during_unlocked_renders(run: Run) -> Steps:
                 pass
         yield from wait()
     # As an artist would look whether all is well.
-    for name in ("Hero", "Small", "Front"):
+    for name in ("Hero", "Small", "Front", "Late"):
         with contextlib.suppress(RuntimeError):
             click("sinew.add", name)
         obj = bpy.data.objects[name]
@@ -265,7 +265,7 @@ def node_groups_removed(run: Run) -> Steps:
             bpy.data.node_groups.remove(group)
 
     # The others have lost theirs as well, and say so.
-    del run.wanted["Small"], run.wanted["Front"]
+    del run.wanted["Small"], run.wanted["Front"], run.wanted["Late"]
     for ahead in (True, False):
         where = "ahead of Sinew" if ahead else "behind Sinew"
         with Hostile(remove, ahead=ahead):
@@ -362,6 +362,25 @@ def suspended_modifiers_renamed_and_deleted(run: Run) -> Steps:
     for modifier in hero().modifiers:
         if modifier.name.startswith(("Behind", "Cast")):
             run.check(modifier.show_viewport and modifier.show_render, f"{modifier.name} stays off")
+    yield from fresh(run)
+
+
+@step("hostile")
+def weights_changed_behind_sinew(run: Run) -> Steps:
+    """Of what a handler changes Blender tells nobody."""
+    changed = []
+
+    def change() -> None:
+        if not changed:
+            changed.append(True)
+            hero().vertex_groups[0].add(range(3000), 1.0, "REPLACE")
+
+    with Hostile(change, "depsgraph_update_post", ahead=False):
+        window_scene.pose(rig(), 40.0)
+        yield from until(lambda: changed, "a change of weights")
+        yield from wait(20)
+    run.check_shapes("after the change")
+    yield from run.check_frames()
     yield from fresh(run)
 
 

@@ -11,39 +11,44 @@ from window_hand import FOLDER, SCENE, SECOND, Run, Steps, choose, click, hero, 
 from window_scene import pose
 
 
+def method(name: str) -> Callable[[], None]:
+    def change() -> None:
+        hero().sinew.method = name
+        push(f"Method {name}")
+
+    return change
+
+
+def turn_off() -> None:
+    hero().sinew.enabled = False
+    push("Off")
+
+
+def turn_on() -> None:
+    hero().sinew.enabled = True
+    push("On")
+
+
+def bend() -> None:
+    pose(rig(), 35.0)
+    push("Bent")
+
+
+def reweigh() -> None:
+    hero().vertex_groups["bone.1"].add(list(range(4000, 8000)), 0.3, "REPLACE")
+    push("Weights")
+
+
+def shift() -> None:
+    for vertex in hero().data.vertices[:5000]:
+        vertex.co.z += 0.1
+    hero().data.update_tag()
+    push("Vertices")
+
+
 @step("undo")
 def undo_and_redo_by_keys(run: Run) -> Steps:
     """Ten steps of all kinds, then ctrl+Z to the beginning and ctrl+shift+Z to the end, twice."""
-
-    def method(name: str) -> Callable[[], None]:
-        def change() -> None:
-            hero().sinew.method = name
-            push(f"Method {name}")
-
-        return change
-
-    def turn_off() -> None:
-        hero().sinew.enabled = False
-        push("Off")
-
-    def turn_on() -> None:
-        hero().sinew.enabled = True
-        push("On")
-
-    def bend() -> None:
-        pose(rig(), 35.0)
-        push("Bent")
-
-    def reweigh() -> None:
-        hero().vertex_groups["bone.1"].add(list(range(4000, 8000)), 0.3, "REPLACE")
-        push("Weights")
-
-    def shift() -> None:
-        for vertex in hero().data.vertices[:5000]:
-            vertex.co.z += 0.1
-        hero().data.update_tag()
-        push("Vertices")
-
     actions = [
         (method("lbs"), "lbs"),
         (bend, "lbs"),

@@ -73,7 +73,7 @@ def _package(name: str) -> str:
 
 def test_methods():
     rows = json.loads(sinew("methods", "--json").stdout)
-    assert {"lbs", "qv", "dq"} <= {row["name"] for row in rows}
+    assert {"lbs", "qv", "dq"} <= {row["name"] for row in rows["methods"]}
 
 
 def test_info():

@@ -4,12 +4,15 @@
 import glob
 import json
 import os
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from sinew_addon.batch.inputs import plan_jobs
-from sinew_addon.batch.job_file import Settings, read_job_file
+from sinew_addon.batch.job_file import ObjectRule, Settings, read_job_file
+from sinew_addon.batch.job_schema import job_schema, markdown
 from sinew_addon.batch.journal import NAME, Journal, stamp
+from sinew_addon.batch.schema import rows
 from sinew_addon.core.errors import SinewError, WrongUse
 from sinew_addon.core.names import fits
 
@@ -179,7 +182,7 @@ def test_settings_of_files(tmp_path):
     assert job.inputs == (str(tmp_path / "chars"),)
     assert job.out == str(tmp_path / "done")
     plain = job.settings_of(Path("/x/a.blend"), Settings())
-    none = {"scale": None, "bake": [], "bake_frames": None}
+    none = {"scale": None, "set": [], "bake": [], "bake_frames": None}
     face = {"match": "Face", "method": "dq"}
     assert plain.as_task() == none | {
         "method": "lbs", "include": [], "exclude": ["Proxy*"], "objects": [face]
@@ -282,7 +285,7 @@ def test_bakes_and_scale_of_files_and_objects(tmp_path):
         ('"1-48"', '"1-"', 3, "bake_frames: expected frames such as"),
         ('"1-48"', '"1,5"', 3, "usd: Blender exports every frame"),
         ('"1-48"', '"-3-5"', 3, "usd: Blender exports no frames before 0"),
-        ("bake = []\n", "", 5, "nothing is said of these objects"),
+        ("bake = []\n", "", 5, "these objects have no settings"),
         ('bake = "shape-keys"', "bake = 3", 16, "bake: expected a list"),
         ('"4.0"', "4.0", 17, "scale: expected text in quotes, got 4.0"),
     ],
@@ -293,6 +296,17 @@ def test_errors_of_bakes_have_a_line(tmp_path, old, new, line, sentence):
         read(tmp_path, BAKES.replace(old, new))
 
 
+def test_parameters_of_files_and_objects(tmp_path):
+    """The command line's win over the file's, and a rule's over both."""
+    text = 'method = "lbs"\nset = ["mix=dq", "mix.group=Arms"]\n[[objects]]\nmatch = "Head"\nset = "mix=off"\n'
+    job = read(tmp_path, text)
+    task = job.settings_of(Path("/x/a.blend"), Settings(set=("mix.group=Legs",))).as_task()
+    assert task["set"] == ["mix=dq", "mix.group=Arms", "mix.group=Legs"]
+    assert task["objects"] == [{"match": "Head", "set": ["mix=off"]}]
+    with pytest.raises(WrongUse, match=r"job\.toml:2: set: mix: expected one of off, lbs, .*, got 'none'"):
+        read(tmp_path, text.replace("mix=dq", "mix=none"))
+
+
 def test_errors_of_the_format_have_a_line(tmp_path):
     with pytest.raises(WrongUse, match=r"line 4, column 10"):
         read(tmp_path, JOB.replace('method = "lbs"\nexclude', "method = lbs\nexclude"))
@@ -301,6 +315,18 @@ def test_errors_of_the_format_have_a_line(tmp_path):
         read_job_file(tmp_path / "job.toml", METHODS)
     with pytest.raises(WrongUse, match="can not be read"):
         read_job_file(tmp_path / "none.toml", METHODS)
+
+
+def test_every_key_of_a_job_file_is_documented():
+    batch = (Path(__file__).resolve().parents[2] / "docs" / "batch.md").read_text(encoding="utf-8")
+    assert markdown() in batch
+
+
+def test_the_schema_and_the_settings_have_the_same_keys():
+    """A key that is read and then dropped would be accepted and do nothing."""
+    known = {name for name, *_others in rows(job_schema(METHODS))}
+    assert known == {field.name for field in fields(Settings)} | {"inputs", "out", "files", "match"}
+    assert {field.name for field in fields(ObjectRule)} == {"match", "method", "scale", "set", "bake"}
 
 
 def saved(folder, name="a.blend"):

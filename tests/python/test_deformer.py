@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The deformer: its methods against float64 reference code, its threads, what it refuses."""
+
 import os
 import subprocess
 import sys

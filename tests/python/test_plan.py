@@ -31,9 +31,10 @@ TABLE = [
     ({"safe_mode": True}, State.AFTER_UPDATE, "Safe mode"),
     ({"failure": "ValueError: no"}, State.AFTER_UPDATE, "ValueError: no"),
     ({"is_comparison_copy": True, "mesh_is_shared": True}, State.AFTER_UPDATE, "copy for comparison"),
-    ({"mesh_is_editable": False}, State.AFTER_UPDATE, "linked"),
-    ({"mesh_is_shared": True}, State.AFTER_UPDATE, "Other objects"),
-    ({"has_upstream": True}, State.AFTER_UPDATE, "in front"),
+    ({"mesh_is_editable": False}, State.IN_DEPSGRAPH, ""),
+    ({"mesh_is_shared": True}, State.IN_DEPSGRAPH, ""),
+    ({"has_upstream": True}, State.IN_DEPSGRAPH, ""),
+    ({"has_upstream": True, "upstream_changes_weights": True}, State.AFTER_UPDATE, "change weights"),
     ({"has_heat_map": True}, State.AFTER_UPDATE, "heat map"),
     ({"visibility_is_keyed": True}, State.AFTER_UPDATE, "animated"),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
@@ -46,6 +47,17 @@ def test_the_table(facts, state, reason):
     assert found.state is state
     assert reason in found.reason
     assert bool(found.reason) == bool(reason)
+
+
+@pytest.mark.parametrize("fact", [{"mesh_is_editable": False}, {"mesh_is_shared": True}, {"has_upstream": True}])
+def test_points_of_a_mesh_that_is_not_its_own_are_in_a_buffer(fact):
+    assert plan(ObjectFacts(**fact)).in_buffer
+    assert not plan(ObjectFacts()).in_buffer
+
+
+@pytest.mark.parametrize("facts", [facts for facts, state, _reason in TABLE if state is State.AFTER_UPDATE])
+def test_what_is_written_after_the_update_is_in_a_buffer(facts):
+    assert plan(ObjectFacts(**facts)).in_buffer
 
 
 def test_every_fact_matters():

@@ -147,7 +147,7 @@ def test_figures_3_4_and_3_5_show_what_the_report_says():
 def test_plots_name_every_method():
     for picture in (*paths.figure_3_4().pictures, *paths.figure_3_5().pictures):
         for method in sinew.interpolate.METHODS:
-            if "turned" in picture.caption and method == "matrix_linear":
+            if "rotated" in picture.caption and method == "matrix_linear":
                 continue
             assert f">{method}<" in picture.content, (picture.caption, method)
 

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Skeletons: transforms relative to the root, interpolation and splines of whole hierarchies."""
+
 import numpy as np
 import pytest
 import sinew

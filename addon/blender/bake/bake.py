@@ -8,7 +8,7 @@ what was written.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
 import bpy
@@ -165,7 +165,7 @@ class Bake:
     def what(self) -> str:
         return ", ".join(one.obj.name for one in self.bakes)
 
-    def sample(self) -> Iterator[float]:
+    def sample(self) -> Generator[float, None, None]:
         """Goes through the frames; how much is done, 0 to 1, after each."""
         scene = bpy.context.scene
         before = scene.frame_float
@@ -242,7 +242,7 @@ def _take_off(obj: bpy.types.Object) -> None:
     # A parent that deforms would do so on top of the bake.
     properties.of(obj).parent_type = ""
     run = [modifier.name for modifier in stack.armature_modifiers(obj)]
-    drive.remove(obj)
+    drive.take_off(obj)
     for name in run:
         modifier = obj.modifiers[name]
         modifier.show_viewport = modifier.show_render = False

@@ -7,7 +7,7 @@ It opens a copy of the open file, saved beside what is written, and does there w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from . import bake, bake_export
 Export = bake_export.SceneExport | bake_export.MorphExport
 
 
-def sample(started: Export) -> Iterator[float]:
+def sample(started: Export) -> Generator[float, None, None]:
     """In the place of started.sample(): how much is done, 0 to 1, several times a second. Closed or failing,
     it ends the second Blender and leaves nothing behind."""
     images = [image for image in bpy.data.images if image.source != "VIEWER" and image.users]

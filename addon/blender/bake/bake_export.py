@@ -7,7 +7,7 @@ Like bake.Bake they go in steps: sample(), place(), publish(), discard().
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
@@ -118,7 +118,7 @@ class SceneExport(_Export):
         self.textures = usd_textures.Textures(meshes if kind == "usd" else (), path, overwrite)
         self.unfinished = _prepare(meshes, frames, path)
 
-    def sample(self) -> Iterator[float]:
+    def sample(self) -> Generator[float, None, None]:
         scene = bpy.context.scene
         before = scene.frame_float, scene.frame_start, scene.frame_end
         try:
@@ -160,7 +160,7 @@ class MorphExport(_Export):
         self.samples: dict[bpy.types.Object, list[np.ndarray]] = {obj: [] for obj in meshes}
         self.spaces: dict[bpy.types.Object, Matrix] = {}
 
-    def sample(self) -> Iterator[float]:
+    def sample(self) -> Generator[float, None, None]:
         scene = bpy.context.scene
         before = scene.frame_float
         try:

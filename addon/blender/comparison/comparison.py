@@ -215,7 +215,7 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
     for name in ("Points", "Front") if nodes is not None else ():
         if isinstance(node_group.get_input(nodes, name), bpy.types.Object):
             node_group.set_inputs(nodes, {name: None})
-    drive.remove(copy)
+    drive.take_off(copy)
 
 
 def _use_own_actions(copy: bpy.types.Object) -> None:

@@ -15,8 +15,8 @@ from bpy.app.handlers import persistent
 from ...core.diagnostics import Finding, PoseCheck, check_weights
 from ...core.errors import SinewError
 from ...core.influences import GroupWeights
-from ...core.quaternions import rotations_of
 from ...core.rig import Bones, Weighting
+from ...core.rotations import rotations_of
 from .. import armature_io, drive, evaluate, events, group_uses, handlers, mesh_io, stepped
 from ..pages import measure
 

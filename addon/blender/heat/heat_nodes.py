@@ -18,7 +18,7 @@ NAME = "Sinew Heat"
 # The attribute of a carrier that holds each vertex's colour.
 COLOURS = "sinew_colours"
 MARK = "sinew_heat"
-_KIND = 9
+_KIND = 12
 
 
 def get_or_make() -> bpy.types.NodeTree:

@@ -112,7 +112,7 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         mesh = obj.data if properties.of(obj).front is None else front.evaluated_mesh(obj, depsgraph)
         if mesh is None or driven.frames is None or len(mesh.vertices) != len(driven.rest_points):
             return None
-        links = [Link(Binding(link.binding.weighting), link.mask, link.multi) for link in driven.chain.links]
+        links = [Link(Binding(link.binding.weighting, link.binding.mix_weights), link.mask, link.multi) for link in driven.chain.links]
         parts.append(Part(obj, driven, driven.source, mesh_io.read_surface(mesh), Chain(links)))
     if not parts:
         return None
@@ -169,7 +169,7 @@ class _Other:
         frames: list[LinkFrame | None] = []
         for number, frame in enumerate(driven.frames):
             if frame is not None:
-                frame = replace(frame, method=methods[number] if methods else other)
+                frame = replace(frame, method=methods[number] if methods else other, mix="")
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)

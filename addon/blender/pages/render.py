@@ -35,7 +35,10 @@ def check_size(size: int) -> None:
 
 
 def chosen_engine(wanted: str) -> str:
-    """ "workbench" or "cycles", wanted by name or "auto". Raises SinewError where it can not render here."""
+    """The engine, "workbench" or "cycles", wanted by name or "auto".
+
+    Raises SinewError where it can not render here.
+    """
     if wanted == "cycles":
         return wanted
     engine = usual_engine(bpy.app.binary_path)
@@ -157,7 +160,7 @@ class OwnLook:
         self._scene = scene
         _prepare_png(scene)
 
-    def picture(self, _view: None, path: Path) -> None:
+    def picture(self, path: Path) -> None:
         """Renders to the PNG `path`."""
         _render(self._scene, path)
 

@@ -120,12 +120,12 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
         sentences.append(
             f"What it buys: a joint twisted by 170 degrees keeps {kept:.0%} of its radius, {thin:.0%} with "
             f"matrices; and pairs, which keep it too, move a bent joint by {drift:.1f} widths of the limb, "
-            "as they turn about the origin."
+            "as they rotate about the origin."
         )
     apart = _fact(figures, "3.7", "apart")
     if apart is not None and apart < 1e-5:
         sentences.append(
-            "In a hierarchy whose joints only turn, pairs interpolate as dual quaternions do: there they "
+            "In a hierarchy whose joints only rotate, pairs interpolate as dual quaternions do: they "
             "are enough."
         )
     return Answer(question, " ".join(sentences))
@@ -199,7 +199,7 @@ def dlb_bound() -> Fact:
 
 
 def chain_drift(links: int = 6, degrees: float = 90.0) -> float:
-    """How far apart DLB and ScLERP have the tip of a chain, each joint turned by `degrees` between two keys,
+    """How far apart DLB and ScLERP have the tip of a chain, each joint rotated by `degrees` between two keys,
     at most, as a part of its length."""
     link = np.array([1.0, 0.0, 0.0])
     axis = np.array([0.0, 1.0, 0.0])
@@ -226,7 +226,7 @@ def _chains() -> Answer:
     return Answer(
         f"In long chains the error of DLB against ScLERP may add up (chapter 4). {bound.says[:-1]} (section "
         "3.5.2)",
-        f"{bound.ours} Where each joint turns by 90 degrees between two keys, the tip of a chain of 6 links "
-        f"is up to {short:.1%} of its length off, of 24 links {long:.1%}: "
+        f"{bound.ours} Where each joint rotates by 90 degrees between two keys, the tip of a chain of 6 "
+        f"links is up to {short:.1%} of its length off, of 24 links {long:.1%}: "
         + ("it does add up." if long > 1.5 * short else "it does not add up."),
     )

@@ -25,7 +25,7 @@ LINK = 0.25
 TITLES = {
     "3.9": "Mesh used for skinning, with linear weighting",
     "3.10": "Comparison of blending methods A: a bent joint",
-    "3.11": "Comparison of blending methods B: a joint turned about the axis of the cylinder",
+    "3.11": "Comparison of blending methods B: a joint rotated about the axis of the cylinder",
 }
 _POSES = "The report does not print its poses; these are those of Sinew's own file."
 
@@ -66,7 +66,8 @@ class Chain:
                 name = "quat_vec" if module is sinew.quat_vec else "dual_quat"
                 relative = getattr(sinew.affine, f"to_{name}")(relative)
             keys.append(relative)
-        relative, _is_defined = skeleton.interpolate(*keys, t, method)
+        first, second = keys
+        relative, _is_defined = skeleton.interpolate(first, second, t, method)
         pose = skeleton.root_relative(relative)
         if module is not sinew.affine:
             pose = module.to_affine(pose)
@@ -115,12 +116,12 @@ def hierarchy_figures(
             fact = Fact(
                 "Pairs and dual quaternions are near identical, and rigid.",
                 f"Link volumes change by at most {rigid:.0e} of themselves; the two are at most "
-                f"{apart / length:.0e} of the chain's length apart, as joints that only turn have one centre "
-                "for both.",
+                f"{apart / length:.0e} of the chain's length apart, as joints that only rotate have one "
+                "centre for both.",
                 rigid < 1e-5 and apart < 1e-5 * length,
                 {**values, "largest change of volume": rigid, "apart": apart / length},
             )
-        notes = (_POSES + " Five joints turn from -45 to 45 degrees; each vertex follows one bone.",)
+        notes = (_POSES + " Five joints rotate from -45 to 45 degrees; each vertex follows one bone.",)
         result.append(Figure(number, title, tuple(pictures[method]), (fact,), notes))
     return tuple(result)
 
@@ -184,7 +185,7 @@ def figure_3_10(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         ),
     )
     return Figure(
-        "3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " The joint turns by 120 degrees.",)
+        "3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " The joint rotates by 120 degrees.",)
     )
 
 
@@ -204,7 +205,7 @@ def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         {f"radius, {method}": share for method, share in kept.items()},
     )
     return Figure(
-        "3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " The joint turns by 170 degrees.",)
+        "3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " The joint rotates by 170 degrees.",)
     )
 
 
@@ -212,7 +213,8 @@ def trimmed(pictures: list[Picture]) -> list[Picture]:
     """The PNGs without the clear margin that all of them have. Requires Pillow."""
     from PIL import Image
 
-    images = [Image.open(io.BytesIO(picture.content)) for picture in pictures]
+    contents = [picture.content for picture in pictures if isinstance(picture.content, bytes)]
+    images = [Image.open(io.BytesIO(content)) for content in contents]
     boxes = np.array([image.getchannel("A").getbbox() or (0, 0, *image.size) for image in images])
     margin = images[0].width // 50
     low, high = boxes[:, :2].min(axis=0) - margin, boxes[:, 2:].max(axis=0) + margin

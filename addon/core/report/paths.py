@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sinew
@@ -13,8 +15,20 @@ from ..errors import SinewError
 from . import printed
 from .model import Fact, Figure, Picture
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
+
 # The report's three first.
-METHODS = ("matrix_linear", "qv_nlerp", "qv_slerp", "dlb", "sclerp", "matrix_polar", "matrix_log", "dib")
+METHODS: tuple[sinew.interpolate.Method, ...] = (
+    "matrix_linear",
+    "qv_nlerp",
+    "qv_slerp",
+    "dlb",
+    "sclerp",
+    "matrix_polar",
+    "matrix_log",
+    "dib",
+)
 ORIGIN, CORNER = np.zeros(3), np.ones(3)
 STEPS = 400
 NO_PLOTS = "Not drawn in this installation: plots need matplotlib; pip install matplotlib and try again."
@@ -26,15 +40,15 @@ class Path:
 
     moved  [steps + 1, 3] of the point
     other  [steps + 1, 3] of the other of the two points
-    turned [steps + 1] degrees from the first end; NaN where the transform is not rigid
+    rotated [steps + 1] degrees from the first end; NaN where the transform is not rigid
     """
 
     moved: np.ndarray
     other: np.ndarray
-    turned: np.ndarray
+    rotated: np.ndarray
 
 
-def layout(method: str) -> object:
+def layout(method: str) -> ModuleType:
     if method.startswith("matrix"):
         return sinew.affine
     return sinew.quat_vec if method.startswith("qv") else sinew.dual_quat
@@ -49,7 +63,7 @@ def ends() -> np.ndarray:
     return np.array(pairs)
 
 
-def in_layout(module: object, pairs: np.ndarray) -> np.ndarray:
+def in_layout(module: ModuleType, pairs: np.ndarray) -> np.ndarray:
     if module is sinew.quat_vec:
         return pairs
     return sinew.quat_vec.to_affine(pairs) if module is sinew.affine else sinew.quat_vec.to_dual_quat(pairs)
@@ -59,17 +73,17 @@ def paths(point: np.ndarray, steps: int = STEPS) -> dict[str, Path]:
     """By method, for `point` [3]; `other` is that of the other end of (0, 0, 0) to (1, 1, 1)."""
     t = np.linspace(0.0, 1.0, steps + 1)
     other = CORNER if not point.any() else ORIGIN
-    result = {}
+    result: dict[str, Path] = {}
     for method in METHODS:
         module = layout(method)
         a, b = in_layout(module, ends())
         between = sinew.interpolate.between(a, b, t, method).transforms
         if method == "matrix_linear":
-            turned = np.full(len(t), np.nan)
+            rotated = np.full(len(t), np.nan)
         else:
-            turned = np.degrees(module.rigid_distance(a, between).angle)
+            rotated = np.degrees(module.rigid_distance(a, between).angle)
         result[method] = Path(
-            module.transform_point(between, point), module.transform_point(between, other), turned
+            module.transform_point(between, point), module.transform_point(between, other), rotated
         )
     return result
 
@@ -80,12 +94,12 @@ def figure_3_4() -> Figure:
     notes = (_spline_note(),)
     title = "The origin under interpolated transforms, seen along z"
     try:
-        turned = {method: path.turned for method, path in all_paths.items()}
+        rotated = {method: path.rotated for method, path in all_paths.items()}
         pictures = (
             Picture(_PATH_CAPTION, _plot_paths(all_paths, "3.4")),
             Picture(
-                "How far each has turned from the first transform; linear matrices do not only turn.",
-                _plot_over_t(turned, "degrees turned", "3.4"),
+                "How far each has rotated from the first transform; linear matrices do not only rotate.",
+                _plot_over_t(rotated, "degrees rotated", "3.4"),
             ),
         )
     except SinewError as error:
@@ -138,7 +152,7 @@ def _bends(all_paths: dict[str, Path]) -> Fact:
     straight = max(values[method] for method in ("matrix_linear", "matrix_polar", "qv_nlerp", "qv_slerp"))
     curved = min(values[method] for method in ("dlb", "sclerp"))
     return Fact(
-        "Dual quaternions do not just turn about the origin, but about an ideal centre: their paths of the "
+        "Dual quaternions do not just rotate about the origin, but about an ideal centre: their paths of the "
         "origin are curved, those of the other methods straight.",
         f"Matrices (linear and polar) and pairs leave the straight line by at most {straight:.0e}, dual "
         f"quaternions by {curved:.2f}, logarithms of matrices by {values['matrix_log']:.2f}.",
@@ -149,7 +163,7 @@ def _bends(all_paths: dict[str, Path]) -> Fact:
 
 def _paces(all_paths: dict[str, Path]) -> Fact:
     dlb, sclerp = all_paths["dlb"], all_paths["sclerp"]
-    angle = float(np.abs(dlb.turned - sclerp.turned).max())
+    angle = float(np.abs(dlb.rotated - sclerp.rotated).max())
     distance = float(np.linalg.norm(dlb.moved - sclerp.moved, axis=1).max())
     a, b = in_layout(sinew.dual_quat, ends())
     t = np.linspace(0.1, 0.9, 9)
@@ -164,8 +178,8 @@ def _paces(all_paths: dict[str, Path]) -> Fact:
     apart = float(max(np.abs(one.axis - other.axis).max(), np.abs(one.moment - other.moment).max()))
     return Fact(
         "DLB uses the same screw axis as ScLERP, but interpolates differently.",
-        f"The axes are the same to {apart:.0e}. Turn and shift along it are not: at the same t the two are "
-        f"up to {angle:.1f} degrees and {distance:.2f} apart.",
+        f"The axes are the same to {apart:.0e}. Rotation and translation along it are not: at the same t "
+        f"the two are up to {angle:.1f} degrees and {distance:.2f} apart.",
         apart < 1e-9 and angle > 1.0,
         {"axis": apart, "degrees": angle, "distance": distance},
     )
@@ -212,7 +226,7 @@ _STYLES = {
 }
 
 
-def _pyplot() -> object:
+def _pyplot() -> tuple[ModuleType, type[Canvas]]:
     """matplotlib without a screen. Raises SinewError where it is not installed."""
     try:
         import matplotlib
@@ -264,7 +278,7 @@ def _settings(salt: str) -> dict[str, object]:
     return {"svg.fonttype": "none", "svg.hashsalt": salt, "font.family": "sans-serif", "font.size": 10}
 
 
-def _svg(figure: object) -> str:
+def _svg(figure: Canvas) -> str:
     """The <svg> element alone, with nothing that points outside the page."""
     file = io.StringIO()
     figure.savefig(file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import sinew
 
@@ -113,7 +115,8 @@ def point_operations(measurements: Measurements | None) -> Table:
         "matrix_4x4": "GLM's 4x4 matrix, fourth row and all",
     }
     why = {
-        "dual_quat": "Ours turns the point by two cross products and reads the translation off 2 dual real*. "
+        "dual_quat": "Ours rotates the point by two cross products and reads the translation from 2 dual "
+        "real*. "
         f"The report's formula, two products of dual quaternions, takes {products[0]} and {products[1]} when "
         "every component is computed; how it comes to the printed numbers, it does not say."
     }
@@ -194,8 +197,8 @@ def _time_table(
     each = OPERATIONS[number]
     counts = measurements.counts[_COUNTED_IN.get(number, number)]
 
-    def times(key: str, of: dict[str, Timing]) -> Timing | None:
-        return of.get(f"{number}/{key}")
+    def times(key: str, of: dict[str, Timing]) -> Timing:
+        return of[f"{number}/{key}"]
 
     base_key = next(iter(names))
     base = times(base_key, measurements.optimised)
@@ -203,7 +206,7 @@ def _time_table(
     rows = []
     for key, name in names.items():
         ours = times(key, measurements.optimised)
-        slow = times(key, measurements.unoptimised)
+        slow = measurements.unoptimised.get(f"{number}/{key}")
         ratio = ours.median / base.median
         expected = seconds[key] / seconds[base_key] if key in seconds else None
         agrees, why = None, ""
@@ -375,8 +378,9 @@ def chain(name: str, dtype: type, normalise: str) -> np.ndarray:
 
 
 def moved_one_by_one(name: str, dtype: type, normalise: str) -> np.ndarray:
-    """[4, 3]: the point (0, 0, 0) after each transform in turn."""
-    point, points = np.zeros(3, dtype), []
+    """[4, 3]: the point (0, 0, 0) after each transform, one after the other."""
+    point: np.ndarray = np.zeros(3, dtype)
+    points: list[np.ndarray] = []
     for transform in chain(name, dtype, normalise):
         point = LAYOUTS[name].transform_point(transform, point)
         points.append(point)
@@ -428,7 +432,7 @@ def translation() -> Table:
         )
     return Table(
         "3.6",
-        "The translation of one transform: (0, 0, 0) turned about (0, 1, 1) by 80 degrees and moved by (1, "
+        "The translation of one transform: (0, 0, 0) rotated about (0, 1, 1) by 80 degrees and moved by (1, "
         "0, 0.5)",
         ("x", "y", "z"),
         f"A component agrees within {TRANSLATION_TOLERANCE:.1e}, two steps of float32 at 1.",
@@ -471,7 +475,7 @@ def _chain_row(
     )
 
 
-def _built(compute: object, name: str) -> dict[tuple[str, type], np.ndarray]:
+def _built(compute: Callable[[str, type, str], np.ndarray], name: str) -> dict[tuple[str, type], np.ndarray]:
     return {
         (normalise, dtype): compute(name, dtype, normalise)
         for normalise in ("axis", "quaternion")
@@ -507,7 +511,7 @@ def chain_spreads() -> dict[str, float]:
         "unit_axes": spread(ours(np.float64, "axis")),
         "unit_axes_float32": spread(ours(np.float32, "axis")),
         "quaternions": spread(ours(np.float64, "quaternion")),
-        "axis_error": max(abs(np.linalg.norm(axis) - 1) for _, axis, _ in printed.CHAIN.values()),
+        "axis_error": max(abs(float(np.linalg.norm(axis)) - 1) for _, axis, _ in printed.CHAIN.values()),
     }
 
 

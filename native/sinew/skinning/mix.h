@@ -12,7 +12,7 @@ namespace sinew {
 struct Mix {
     static constexpr Parameter kParameters[] = {
         {"method", "Second Method", "The method that the weights mix in", "", ParameterKind::method},
-        {"weights", "Weights", "The share of the second method: 0 none of it, 1 all of it", "factor",
+        {"group", "Vertex Group", "The share of the second method: 0 none of it, 1 all of it", "factor",
          ParameterKind::vertex_group},
     };
     static constexpr StageInfo info{

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parameters of methods and stages by the names that commands and job files use, such as mix.group."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TypeAlias
+
+import sinew
+
+from .errors import WrongUse
+
+Value: TypeAlias = float | int | bool | str
+
+OFF = "off"
+"""The value of a parameter that names a method, for none."""
+
+SWITCHES = {"on": True, "off": False, "true": True, "false": False}
+
+
+def named() -> dict[str, sinew.Parameter]:
+    """Every parameter by its whole name."""
+    owners = (*sinew.methods(), *sinew.stages())
+    return {f"{owner.name}.{each.id}": each for owner in owners for each in owner.parameters}
+
+
+def parse(texts: Iterable[str]) -> dict[str, Value]:
+    """What NAME=VALUE texts set, by whole names; later ones win. A stage's name alone is its first parameter.
+
+    Raises WrongUse.
+    """
+    parameters = named()
+    short = {stage.name: f"{stage.name}.{stage.parameters[0].id}" for stage in sinew.stages()}
+    values: dict[str, Value] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise WrongUse(f"expected NAME=VALUE, got {text!r}")
+        whole = short.get(name, name)
+        if whole not in parameters:
+            raise WrongUse(f"expected one of {', '.join((*short, *parameters))}, got {name!r}")
+        values[whole] = _read(name, parameters[whole], value)
+    return values
+
+
+def _read(name: str, parameter: sinew.Parameter, text: str) -> Value:
+    if parameter.kind in ("float", "int"):
+        return _read_number(name, parameter, text)
+    if parameter.kind == "bool":
+        if text not in SWITCHES:
+            raise WrongUse(f"{name}: expected on or off, got {text!r}")
+        return SWITCHES[text]
+    if parameter.kind == "vertex_group":
+        return text
+    choices = [OFF, *(m.name for m in sinew.methods())] if parameter.kind == "method" else parameter.choices
+    if text not in choices:
+        raise WrongUse(f"{name}: expected one of {', '.join(choices)}, got {text!r}")
+    return text
+
+
+def _read_number(name: str, parameter: sinew.Parameter, text: str) -> float | int:
+    try:
+        number = int(text) if parameter.kind == "int" else float(text)
+    except ValueError:
+        number = math.nan
+    least = -math.inf if parameter.min is None else parameter.min
+    most = math.inf if parameter.max is None else parameter.max
+    if not (math.isfinite(number) and least <= number <= most):
+        whole = "a whole number" if parameter.kind == "int" else "a number"
+        raise WrongUse(f"{name}: expected {whole} from {least:g} to {most:g}, got {text!r}")
+    return number
+
+
+def as_texts(values: Mapping[str, Value]) -> list[str]:
+    """The way back of parse()."""
+    return [
+        f"{name}={('off', 'on')[value] if isinstance(value, bool) else value}" for name, value in values.items()
+    ]

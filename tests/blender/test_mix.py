@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mix of two methods that a vertex group paints: beside two Armature modifiers, which riggers build by hand."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import whole_file
+from sinew_addon.blender import drive, handlers, properties, safe_mode, small_meshes
+from sinew_addon.blender.plan import State
+
+FRAMES = [1, 4, 7, 11]
+GROUP = "dq here"
+
+
+def paint(obj: bpy.types.Object) -> None:
+    """Parts of it have all of the second method, parts none, and most something between."""
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex in obj.data.vertices:
+        share = float(np.clip(1.5 * vertex.co.x / 3.0 - 0.2, 0.0, 1.0))
+        if share > 0.0:
+            group.add([vertex.index], share, "REPLACE")
+
+
+def by_two_modifiers(obj: bpy.types.Object) -> np.ndarray:
+    """What Blender makes of it; afterwards the object is as it was."""
+    first = obj.modifiers["Armature"]
+    second = obj.modifiers.new("Second", "ARMATURE")
+    obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(first) + 1)
+    second.object, second.vertex_group = first.object, GROUP
+    second.use_multi_modifier = second.use_deform_preserve_volume = True
+    expected = scenes.shapes(obj, FRAMES)
+    obj.modifiers.remove(second)
+    return expected
+
+
+def mixed(obj: bpy.types.Object, method: str = "lbs", second: str = "dq") -> None:
+    scenes.add_sinew(obj, method)
+    mix = properties.of(obj).mix
+    mix.method, mix.group = second, GROUP
+
+
+def plain(_obj: bpy.types.Object) -> None:
+    pass
+
+
+def in_front(obj: bpy.types.Object) -> None:
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def behind(obj: bpy.types.Object) -> None:
+    obj.modifiers.new("Behind", "SUBSURF").levels = 1
+
+
+def with_keys(obj: bpy.types.Object) -> None:
+    scenes.key_shape(obj)
+
+
+@pytest.mark.parametrize("set_up", [plain, in_front, behind, with_keys])
+@pytest.mark.parametrize("is_safe", [False, True])
+def test_two_modifiers_have_the_same_shape(monkeypatch, set_up, is_safe):
+    obj, _armature = scenes.make_arm()
+    paint(obj)
+    set_up(obj)
+    expected = by_two_modifiers(obj)
+    alone = scenes.modifier_shapes(obj, FRAMES, preserve_volume=False)
+    assert scenes.worst(alone, expected) > 1e-3
+    monkeypatch.setattr(safe_mode, "is_on", lambda: is_safe)
+    mixed(obj)
+    got = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert handlers.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
+
+
+def test_painting_choosing_and_switching_off_are_seen():
+    obj, _armature = scenes.make_arm()
+    paint(obj)
+    linear, preserved = (scenes.modifier_shapes(obj, [11], preserve)[0] for preserve in (False, True))
+    mixed(obj)
+    bpy.context.scene.frame_set(11)
+    before = scenes.final_points(obj)
+    obj.vertex_groups[GROUP].add(range(len(obj.data.vertices)), 1.0, "REPLACE")
+    assert scenes.worst(scenes.final_points(obj), preserved) < 1e-5
+    obj.vertex_groups.new(name="none of it")
+    properties.of(obj).mix.group = "none of it"
+    assert scenes.worst(scenes.final_points(obj), linear) < 1e-5
+    properties.of(obj).mix.group = GROUP
+    assert scenes.worst(scenes.final_points(obj), before) > 1e-3
+    properties.of(obj).mix.method = "OFF"
+    assert scenes.worst(scenes.final_points(obj), linear) < 1e-5
+
+
+def test_the_second_method_can_be_keyed():
+    obj, _armature = scenes.make_arm()
+    paint(obj)
+    linear = scenes.modifier_shapes(obj, [4], preserve_volume=False)[0]
+    mixed(obj)
+    expected = scenes.shapes(obj, [8])[0]
+    mix = properties.of(obj).mix
+    mix.method = "OFF"
+    mix.keyframe_insert("method", frame=5)
+    mix.method = "dq"
+    mix.keyframe_insert("method", frame=6)
+    got = scenes.shapes(obj, [4, 8])
+    assert scenes.worst(got[0], linear) < 1e-5
+    assert scenes.worst(got[1], expected) == 0.0
+
+
+@pytest.mark.parametrize("rule", ["3.x", "none"])
+def test_under_other_scale_rules_it_is_between_its_two(rule):
+    """Linear blending takes other bones than the rest under Blender 3's rule."""
+    obj, armature = scenes.make_arm()
+    armature.pose.bones[1].scale = (1.4, 0.8, 1.2)
+    paint(obj)
+    scenes.add_sinew(obj, "lbs")
+    properties.of(obj).scale_rule = rule
+    first = scenes.shapes(obj, [8])[0]
+    properties.of(obj).method = "dq"
+    second = scenes.shapes(obj, [8])[0]
+    properties.of(obj).method = "lbs"
+    mix = properties.of(obj).mix
+    mix.method, mix.group = "dq", GROUP
+    index = obj.vertex_groups[GROUP].index
+    shares = np.array([[sum(g.weight for g in v.groups if g.group == index)] for v in obj.data.vertices])
+    got = scenes.shapes(obj, [8])[0]
+    assert scenes.worst(got, first + shares * (second - first)) < 1e-5
+    assert scenes.worst(first, second) > 1e-3
+
+
+def test_a_small_mesh_with_a_mix_is_not_left_to_blender(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    paint(obj)
+    expected = by_two_modifiers(obj)
+    monkeypatch.setattr(small_meshes, "is_used", True)
+    mixed(obj)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert handlers.state_of(obj).plan.state is State.IN_DEPSGRAPH
+
+
+def test_saved_copied_and_removed(tmp_path):
+    obj, _armature = scenes.make_arm()
+    paint(obj)
+    before = whole_file.of_open_file()
+    mixed(obj)
+    expected = scenes.shapes(obj, FRAMES)
+    path = tmp_path / "mixed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
+    drive.remove(copy)
+    bpy.data.objects.remove(copy)
+    bpy.context.scene.frame_set(1)
+    drive.remove(obj)
+    bpy.context.view_layer.update()
+    assert whole_file.differences(before, whole_file.of_open_file()) == []
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
