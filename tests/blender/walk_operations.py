@@ -1117,11 +1117,14 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
             and o.data.shape_keys is None
             and o.override_library is None
             and w.side.is_on(o)
+            and not w.side.has_qv(o)
         ),
     )
     if obj is None or not w.select(obj):
         return None
     w.before_evaluation()
+    # A window has evaluated what was appended just now.
+    bpy.context.view_layer.update()
     w.side.apply(obj)
     return f"apply what deforms {obj.name}"
 
@@ -1129,7 +1132,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(0.4)
 def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
-    if obj is None or obj.data.library is not None or not w.select(obj):
+    if obj is None or obj.data.library is not None or w.side.has_qv(obj) or not w.select(obj):
         return None
     w.before_evaluation()
     bpy.ops.object.convert(target="MESH")

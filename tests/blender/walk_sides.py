@@ -93,6 +93,10 @@ class BlenderSide:
     def method(self, obj: bpy.types.Object) -> str:
         return "qv" if obj.pass_index & QV else "dq" if obj.pass_index & DQ else "lbs"
 
+    def has_qv(self, obj: bpy.types.Object) -> bool:
+        """Whether it has a shape that is none of Blender's."""
+        return self.is_on(obj) and self.method(obj) == "qv"
+
     def _set(self, obj: bpy.types.Object, bit: int, on: bool) -> None:
         value = obj.pass_index | bit if on else obj.pass_index & ~bit
         if obj.pass_index != value:
@@ -306,6 +310,9 @@ class SinewSide:
 
     def is_on(self, obj: bpy.types.Object) -> bool:
         return self.is_driven(obj) and obj.sinew.enabled
+
+    def has_qv(self, obj: bpy.types.Object) -> bool:
+        return self.is_on(obj) and obj.sinew.method == "qv"
 
     def note_flags(self, obj: bpy.types.Object) -> None:
         pass
