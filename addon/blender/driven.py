@@ -394,7 +394,7 @@ def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: 
     if driven.mode != evaluated.mode or not (driven.is_alone or driven.plan.in_buffer):
         driven.declined = "its mode, or the users of its mesh, changed"
         return
-    if len(armatures) != len(driven.chain.links) or None in armatures:
+    if [armature is None for armature in armatures] != [not uid for uid in driven.armatures]:
         driven.declined = "its Armature modifiers changed"
         return
     shown = _points_to_write(settings, mesh, driven)

@@ -134,3 +134,21 @@ def test_what_is_kept_of_many_modifiers_is_of_each():
     there = properties.of(obj).stand_ins
     assert [kept.as_pointer() for _modifier, kept in pairs] == [kept.as_pointer() for kept in there]
     assert [kept.name for kept in there] == names(obj)
+
+
+@pytest.mark.parametrize("place", ["in front", "behind"])
+def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
+    obj, armature = scenes.make_arm()
+    obj.modifiers.new("None", "ARMATURE")
+    if place == "in front":
+        put(obj, "None", "Armature")
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj, "lbs")
+    check(obj, expected)
+    # By hand, where no event of a frame mends what the evaluation left.
+    bone = armature.pose.bones[1]
+    bone.rotation_mode, bone.rotation_euler = "XYZ", (0.5, 0.4, 0.3)
+    bpy.context.view_layer.update()
+    got = scenes.final_points(obj)
+    properties.of(obj).enabled = False
+    assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)

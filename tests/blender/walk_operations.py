@@ -135,7 +135,18 @@ class Walker:
 
     def editable(self, r: random.Random) -> bpy.types.Object | None:
         """With a mesh that can be edited."""
-        return self.mesh(r, lambda o: o.data.library is None and o.override_library is None)
+        return self.mesh(r, self.is_editable)
+
+    @staticmethod
+    def is_editable(obj: bpy.types.Object) -> bool:
+        return obj.data.library is None and obj.override_library is None
+
+    def has_upstream(self, obj: bpy.types.Object) -> bool:
+        """Whether Sinew evaluates apart what comes to the Armature modifier: two objects have the mesh then,
+        which operators of Blender that apply do not take."""
+        keys, modifiers = obj.data.shape_keys, self.modifiers(obj)
+        is_first = bool(modifiers) and modifiers[0].type == "ARMATURE"
+        return not is_first or obj.parent_type == "ARMATURE" or (keys is not None and not keys.use_relative)
 
     def armature(self, r: random.Random) -> bpy.types.Object | None:
         return self.one(r, self.armatures())
@@ -547,6 +558,7 @@ def key_pose(w: Walker, r: random.Random) -> str | None:
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = _turn(r)
     bone.keyframe_insert("rotation_euler", frame=number)
+    w.this_frame()
     return f"key {bone.name} of {rig.name} at {number}"
 
 
@@ -633,6 +645,7 @@ def key_object(w: Walker, r: random.Random) -> str | None:
     for number in r.sample(range(1, 12), 2):
         obj.location = [r.uniform(-1, 1) for _axis in range(3)]
         obj.keyframe_insert("location", frame=number)
+    w.this_frame()
     return f"key the location of {obj.name}"
 
 
@@ -863,7 +876,7 @@ def join(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def apply_transform(w: Walker, r: random.Random) -> str | None:
-    obj = w.editable(r)
+    obj = w.mesh(r, lambda o: w.is_editable(o) and not (w.side.is_driven(o) and w.has_upstream(o)))
     if obj is None or w.users(obj.data) > 1 or w.compared or not w.select(obj):
         return None
     bpy.ops.object.transform_apply()
@@ -1118,6 +1131,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
             and o.override_library is None
             and w.side.is_on(o)
             and not w.side.has_qv(o)
+            and not w.has_upstream(o)
         ),
     )
     if obj is None or not w.select(obj):
@@ -1197,6 +1211,7 @@ def key_shape_key(w: Walker, r: random.Random) -> str | None:
     for number in r.sample(range(1, 12), 2):
         block.value = r.random()
         block.keyframe_insert("value", frame=number)
+    w.this_frame()
     return f"key {block.name} of {obj.name}"
 
 
