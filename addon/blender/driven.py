@@ -277,7 +277,8 @@ def update(
             obj.update_tag(refresh={"OBJECT"})
     else:
         with driven.lock:
-            _deform(obj, driven, depsgraph, changes, inspect)
+            is_first = before is None or before.state is not State.AFTER_UPDATE
+            _deform(obj, driven, depsgraph, changes, inspect, is_first)
     driven.source.known_key_values = driven.source.key_values
     return driven
 
@@ -323,8 +324,12 @@ def _deform(
     depsgraph: bpy.types.Depsgraph,
     changes: Changes,
     touched: bool,
+    is_first: bool,
 ) -> None:
-    """Writes the points of this evaluation for the next one, where they differ from what is there."""
+    """Writes the points of this evaluation for the next one, where they differ from what is there.
+
+    is_first  the object was not deformed after the update before: what holds its points has others
+    """
     # Binding is not part of a frame's time: it happens once.
     started, before = time.perf_counter(), driven.rest_points
     differs = _shape(obj, driven, depsgraph)
@@ -333,7 +338,7 @@ def _deform(
     if changes.frame:
         reshaped = before is not None and driven.rest_points is not before
         driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
-    if differs:
+    if differs or is_first:
         points.write(obj, driven.chain.points, driven.source.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)
     elif touched and not points.are_written(obj, len(driven.rest_points)):

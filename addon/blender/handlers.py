@@ -12,7 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import attach, drive, driven, events, note, overrides, points, properties, redraw, stack
+from . import animation, attach, drive, driven, events, note, overrides, points, properties, redraw, stack
 from .changes import Changes, names_of_touched_meshes
 from .driven import Driven
 from .gate import Gate
@@ -682,6 +682,10 @@ def adopt_open_file() -> None:
     # While Blender starts, its data is out of reach, and loading the first file takes care of it.
     if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
         note.remove()
+        for obj in filter(properties.is_driven, bpy.data.objects):
+            # Without Sinew, Blender went on without what keys set of its settings.
+            if any(path.startswith("sinew.") for path in animation.animated_paths(obj)):
+                obj.update_tag(refresh={"TIME"})
         refresh(bpy.context)
 
 

@@ -248,6 +248,8 @@ def is_copy(obj: bpy.types.Object) -> bool:
 def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
     """Gives a group of settings the values of another, without telling the listeners."""
     for name, prop in source.bl_rna.properties.items():
+        if name == "rna_type":
+            continue
         if prop.type == "COLLECTION":
             getattr(target, name).clear()
             for item in getattr(source, name):

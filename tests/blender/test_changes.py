@@ -289,6 +289,25 @@ def test_registered_with_a_driven_file_open():
     assert scenes.worst(shown, scenes.final_points(obj)) <= 1e-6
 
 
+@pytest.mark.parametrize("safe", [False, True])
+def test_keys_of_a_file_that_was_on_another_frame_before_sinew(monkeypatch, safe):
+    monkeypatch.setattr(safe_mode, "_forced", safe)
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    for frame, method in ((1, "lbs"), (8, "dq")):
+        bpy.context.scene.frame_set(frame)
+        properties.of(obj).method = method
+        obj.keyframe_insert("sinew.method", frame=frame)
+    bpy.context.scene.frame_set(9)
+    sinew_addon.unregister()
+    bpy.context.scene.frame_set(3)
+    sinew_addon.register()
+    got = scenes.final_points(obj)
+    bpy.context.scene.frame_set(3)
+    assert properties.of(obj).method == "lbs"
+    assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
 def test_a_driver_that_gives_no_method_is_said_so():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
@@ -328,4 +347,18 @@ def test_changing_the_method_reads_no_weights_but_sees_those_that_changed(monkey
     evaluate.use_method(obj, "blender")
     expected = scenes.final_points(obj)
     evaluate.use_method(obj, "lbs")
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_a_heat_map_of_a_mesh_that_two_objects_have():
+    """Then Sinew deforms after the update, by points that no evaluation has written to the file."""
+    obj, _armature = scenes.make_arm()
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(6)
+    expected = scenes.final_points(other)
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    properties.of(obj).heat = True
+    bpy.context.view_layer.update()
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)

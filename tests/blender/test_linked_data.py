@@ -11,6 +11,7 @@ import pytest
 import scenes
 from sinew_addon.blender import drive, properties, stack
 from sinew_addon.core.errors import SinewError
+from sinew_addon.core.scale_rule import BLENDER_3
 
 FRAMES = [1, 4, 11]
 
@@ -113,3 +114,17 @@ def test_an_override_is_saved_as_a_blender_without_sinew_needs_it(tmp_path):
     saved = target.objects[0]
     assert saved.library.name == "shot.blend"
     assert [(m.type, m.show_viewport) for m in saved.modifiers] == [("NODES", False), ("ARMATURE", True)]
+
+
+def test_settings_are_copied_whole():
+    obj, _armature = scenes.make_arm()
+    other, _armature = scenes.make_arm(name="Other")
+    scenes.add_sinew(obj, "qv")
+    settings = properties.of(obj)
+    settings.leave_small = False
+    settings.scale_rule = BLENDER_3.name
+    properties.copy(settings, properties.of(other))
+    copied = properties.of(other)
+    assert [s.name for s in copied.stand_ins] == [s.name for s in settings.stand_ins]
+    for name in ("method", "leave_small", "scale_rule", "enabled", "standing_in"):
+        assert getattr(copied, name) == getattr(settings, name)
