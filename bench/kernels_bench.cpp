@@ -109,10 +109,12 @@ void register_all() {
                 }
                 if constexpr (HasPlainLoops<Method>) {
                     add("glm" + of, [=](benchmark::State& s) {
-                        plain_loop(s, [](Scene& data) { glm_loop(Method{}, data); }, shape);
+                        plain_loop(
+                            s, [](Scene& data) { glm_loop(Method{}, data); }, shape);
                     });
                     add("eigen" + of, [=](benchmark::State& s) {
-                        plain_loop(s, [](Scene& data) { eigen_loop(Method{}, data); }, shape);
+                        plain_loop(
+                            s, [](Scene& data) { eigen_loop(Method{}, data); }, shape);
                     });
                 }
             });

@@ -25,7 +25,7 @@ def job_schema(methods: Collection[str]) -> Table:
     )
     set_ = Key(
         "set",
-        checked(TEXTS, parse, 'NAME=VALUE, or a list such as ["mix=dq", "mix.group=Arms"]'),
+        checked(TEXTS, _check_parameters, 'NAME=VALUE, or a list such as ["mix=dq", "mix.group=Arms"]'),
         "parameters of methods and stages, as of `sinew methods`",
     )
     bake = Key(
@@ -117,6 +117,10 @@ def _check_something_set(values: Mapping[str, Any]) -> None:
 def _check_one_in_file(kinds: Sequence[str]) -> None:
     if len([kind for kind in kinds if kind in IN_FILE]) > 1:
         raise WrongUse(f"an object can have one of {', '.join(kind for kind in kinds if kind in IN_FILE)}")
+
+
+def _check_parameters(texts: Sequence[str]) -> None:
+    parse(texts)
 
 
 def _check_frame_list(text: str) -> None:

@@ -333,12 +333,13 @@ def _deform(
     is_first  the object was not deformed after the update before: what holds its points has others
     """
     # Binding is not part of a frame's time: it happens once.
-    started = time.perf_counter()
+    started, before = time.perf_counter(), driven.rest_points
     differs = _shape(obj, driven, depsgraph)
     if differs is None:
         return
     if changes.frame:
-        driven.dirtied_by_frames = bool(differs) or obj.session_uid in changes.moved
+        reshaped = before is not None and driven.rest_points is not before
+        driven.dirtied_by_frames = reshaped or obj.session_uid in changes.moved
     if differs or is_first:
         points.write(obj, driven.chain.points, driven.source.points)
         driven.milliseconds = 1000.0 * (time.perf_counter() - started)

@@ -158,7 +158,7 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
 
 
 def _check_groups(values: Mapping[str, Value]) -> None:
-    """Raises SinewError for a vertex group that no mesh of the file has; those without it may be beside others."""
+    """Raises SinewError for a vertex group that no mesh of the file has; single ones may lack it."""
     known = parameters.named()
     for name, value in values.items():
         if known[name].kind == "vertex_group" and value:

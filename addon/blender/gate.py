@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps Blender from evaluating a mesh twice where a change of frame itself makes it dirty.
 
-Where Sinew deforms after the update, Blender evaluates on a change of frame, calls Sinew, and evaluates again
-what Sinew wrote. The first round has the points of the last frame: all for nothing, and a simulation behind
-would run on the wrong shape. So the mesh's modifiers are suspended until the points are there.
+Where Sinew deforms after the update, Blender evaluates on a change of frame, calls Sinew, and evaluates
+again what Sinew wrote. A mesh that moves, or whose shape keys do, comes up in the first round too, with the
+points of the last frame: all for nothing. So its modifiers are suspended until the points are there. To
+suspend them has the mesh read anew: a mesh that is only posed is left alone, and evaluated twice.
 """
 
 from __future__ import annotations

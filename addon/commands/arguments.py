@@ -24,8 +24,8 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         action=_Set,
         default={},
         metavar="NAME=VALUE",
-        help="a parameter of a method or a stage of `sinew methods`, such as mix=dq and mix.group=NAME; may be "
-        "given several times",
+        help="a parameter of a method or a stage of `sinew methods`, such as mix=dq and mix.group=NAME; may "
+        "be given several times",
     )
 
 

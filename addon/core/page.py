@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
+import numpy as np
+
 from .comparison import Comparison
 from .diagnostics import Finding
 from .heat import HeatScale, viridis
@@ -192,7 +194,7 @@ def _sheet(sheet: Sheet, comparison: Comparison) -> str:
 def _legend(scale: HeatScale, unit: str) -> str:
     stops = ", ".join(
         f"rgb({round(255 * r)},{round(255 * g)},{round(255 * b)})"
-        for r, g, b in viridis([number / 16 for number in range(17)])
+        for r, g, b in viridis(np.linspace(0.0, 1.0, 17))
     )
     texts = legend_texts(scale, unit)
     ticks = []
@@ -277,7 +279,7 @@ def _percent_range(values: Sequence[float]) -> str:
 
 
 def _frame_list(frames: Sequence[float]) -> str:
-    """ "3, 7 to 12, 20"."""
+    """Such as "3, 7 to 12, 20"."""
     runs: list[list[float]] = []
     for frame in frames:
         if runs and frame == runs[-1][-1] + 1:

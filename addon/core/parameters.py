@@ -21,7 +21,7 @@ SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 def named() -> dict[str, sinew.Parameter]:
     """Every parameter by its whole name."""
-    owners = (*sinew.methods(), *sinew.stages())
+    owners: list[sinew.Method | sinew.Stage] = [*sinew.methods(), *sinew.stages()]
     return {f"{owner.name}.{each.id}": each for owner in owners for each in owner.parameters}
 
 
@@ -73,7 +73,6 @@ def _read_number(name: str, parameter: sinew.Parameter, text: str) -> float | in
 
 
 def as_texts(values: Mapping[str, Value]) -> list[str]:
-    """The way back of parse()."""
-    return [
-        f"{name}={('off', 'on')[value] if isinstance(value, bool) else value}" for name, value in values.items()
-    ]
+    """The inverse of parse()."""
+    words = {True: "on", False: "off"}
+    return [f"{name}={words[value] if isinstance(value, bool) else value}" for name, value in values.items()]

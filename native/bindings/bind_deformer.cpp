@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
 #include <cmath>
 #include <limits>
 #include <optional>
-
-#include <pybind11/stl.h>
 
 #include "arrays.h"
 #include "gil.h"
@@ -74,7 +74,8 @@ Binding make_binding(const py::object& rest_points, const py::object& influence_
                      const py::object& influence_bones, const py::object& influence_weights,
                      const py::object& rest_bones) {
     return Binding(
-        checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights, rest_bones).data());
+        checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights, rest_bones)
+            .data());
 }
 
 Deformer make_deformer(const py::object& rest_points, const py::object& influence_offsets,
@@ -220,8 +221,7 @@ void bind_deformer(py::module_& m) {
              "identity.\n\n"
              "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
         .def_property_readonly("vertex_count", &Binding::vertex_count)
-        .def_property_readonly("influence_count", &Binding::influence_count,
-                               "Influences of positive weight.")
+        .def_property_readonly("influence_count", &Binding::influence_count, "Influences of positive weight.")
         .def_property_readonly("bone_count", &Binding::bone_count,
                                "One more than the highest bone that an influence names.");
 
@@ -230,8 +230,10 @@ void bind_deformer(py::module_& m) {
              py::arg("mix") = py::none(),
              "binding: a Binding; not copied.\n"
              "method: the name of one of sinew.methods().\n"
-             "mix: None, or (name of another method, weights): weights float32 [vertices] say how much of the\n"
-             "    other method each vertex takes, from 0 (none) to 1 (all of it); clamped. As the stage `mix`.")
+             "mix: None, or (name of another method, weights): weights float32 [vertices] say how much of "
+             "the\n"
+             "    other method each vertex takes, from 0 (none) to 1 (all of it); clamped. As the stage "
+             "`mix`.")
         .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
              py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
              py::arg("rest_bones") = py::none(),
@@ -253,7 +255,8 @@ void bind_deformer(py::module_& m) {
         .def_property_readonly("bone_count", &Deformer::bone_count,
                                "One more than the highest bone that an influence names.")
         .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
-             "New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. Other\n"
+             "New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. "
+             "Other\n"
              "threads may deform meanwhile: each of their results has the old points or the new ones.")
         .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
              py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),

@@ -60,7 +60,8 @@ void def_facts(py::class_<Row>& of, const char* type) {
     of.def_property_readonly(
         "parameters", [](const Row& row) { return tuple_of<Parameter>(row.parameters); },
         "Its settings, one Parameter each.");
-    of.def("__repr__", [type](const Row& row) { return "<sinew." + std::string(type) + " " + text(row.name) + ">"; });
+    of.def("__repr__",
+           [type](const Row& row) { return "<sinew." + std::string(type) + " " + text(row.name) + ">"; });
 }
 
 }  // namespace

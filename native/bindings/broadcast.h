@@ -18,7 +18,7 @@ using Shape = std::vector<py::ssize_t>;
 /// "[2, 3]".
 std::string text_of(const Shape& shape);
 
-/// An argument as items of T side by side: `lead` are the axes before those of an item.
+/// An argument as neighbouring items of T: `lead` are the axes before those of an item.
 template <class T>
 struct Input {
     const char* argument;
@@ -104,15 +104,15 @@ Shape broadcast(std::span<Input<T>> inputs) {
         if (input.lead.size() > common.size()) {
             common.insert(common.begin(), input.lead.size() - common.size(), 1);
         }
-        const std::size_t shift = common.size() - input.lead.size();
+        const std::size_t missing = common.size() - input.lead.size();
         for (std::size_t axis = 0; axis < input.lead.size(); ++axis) {
             const py::ssize_t length = input.lead[axis];
-            py::ssize_t& joint = common[shift + axis];
-            if (length != joint && length != 1 && joint != 1) {
+            py::ssize_t& shared = common[missing + axis];
+            if (length != shared && length != 1 && shared != 1) {
                 fail(input.argument, "leading axes that broadcast with " + text_of(before),
                      text_of(input.lead));
             }
-            if (joint == 1) joint = length;
+            if (shared == 1) shared = length;
         }
     }
     for (Input<T>& input : inputs) {

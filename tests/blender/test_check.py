@@ -169,6 +169,7 @@ def test_what_can_not_be_read_does_not_stop_the_others(tmp_path):
     assert "no .blend files" in run_sinew("check", tmp_path / "c.blend", status=2).stderr
 
 
+@pytest.mark.once
 def test_a_file_that_takes_too_long(tmp_path):
     scenes.make_arm(bones=40, sides=400, rings=2000, name="Huge")
     path = save(tmp_path / "huge.blend")

@@ -34,6 +34,7 @@ def arm_file(tmp_path):
     return path, expected
 
 
+@pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
     # tests/python/test_documented.py holds that README names them all.
@@ -158,9 +159,8 @@ def test_parameters_are_set_by_name(tmp_path):
 def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):
     path, _expected = arm_file
     options = [option for text in given for option in ("--set", text)]
-    result = run_sinew(
-        "points", path, "--method", "lbs", *options, "--frames", "1", "--out", tmp_path / "o.npz", status=status
-    )
+    arguments = ("points", path, "--method", "lbs", "--frames", "1", "--out", tmp_path / "o.npz")
+    result = run_sinew(*arguments, *options, status=status)
     assert sentence in result.stderr
     assert "Traceback" not in result.stderr
 
@@ -211,6 +211,7 @@ def test_one_bad_file_does_not_stop_the_others(arm_file, tmp_path):
         assert sum(name in line for line in result.stderr.splitlines()) == 1, result.stderr
 
 
+@pytest.mark.once
 def test_bad_input_is_one_sentence(arm_file, tmp_path):
     path, _expected = arm_file
     (tmp_path / "empty.blend").touch()
@@ -383,6 +384,7 @@ def test_inbetween_writes_copies_of_all_armatures(keyed_file, tmp_path, live):
     assert "--overwrite" in run_sinew("inbetween", path, *options, status=1).stderr
 
 
+@pytest.mark.once
 def test_inbetween_says_what_is_wrong(keyed_file, tmp_path):
     path, _expected = keyed_file
     left, right = bpy.data.objects["Left Rig"], bpy.data.objects["Right Rig"]

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.batch.job_file import Settings
-from sinew_addon.blender import files, handlers, mesh_io, properties, reskin, safe_mode
+from sinew_addon.blender import drive, files, handlers, mesh_io, properties, reskin, safe_mode
 from sinew_addon.blender.updates import updates_suspended
 
 
@@ -125,6 +125,28 @@ def test_posing_evaluates_the_mesh_once(set_up: Setup):
         bpy.context.view_layer.update()
 
     assert [evaluations_in(pose, obj.name) for _ in range(3)] == [1, 1, 1]
+
+
+@pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
+def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
+    """Evaluated before Sinew deformed it, it would keep what it made of the last frame's."""
+    obj, armature = scenes.make_arm(sides=8, rings=12)
+    set_up(obj, armature)
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    pinned = obj.vertex_groups.new(name="Pinned")
+    pinned.add([vertex.index for vertex in obj.data.vertices if vertex.index % 3], 1.0, "REPLACE")
+    cloth = obj.modifiers.new("Cloth", "CLOTH")
+    cloth.settings.vertex_group_mass = "Pinned"
+    cloth.settings.quality = 2
+    frames = list(range(1, 9))
+    expected = scenes.shapes(obj, frames)
+    scenes.add_sinew(obj, "dq")
+    got = scenes.shapes(obj, frames)
+    assert scenes.worst(got, expected) < 1e-3
+    for frame in (3, 6):
+        assert scenes.worst(expected[frame], expected[frame - 1]) > 0.01
+    drive.remove(obj)
+    assert obj.modifiers["Armature"].object is not None
 
 
 @pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])

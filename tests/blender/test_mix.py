@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mix of two methods that a vertex group paints: beside two Armature modifiers, which riggers build by hand."""
+"""The mix of two methods that a vertex group paints, beside the two Armature modifiers that riggers build by
+hand."""
 
 from __future__ import annotations
 

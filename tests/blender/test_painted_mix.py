@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender is the oracle of the library's stage `mix`: a linear Armature modifier, and behind it one with Preserve
-Volume, Multi Modifier and the vertex group."""
+"""Blender is the oracle of the library's stage `mix`: a linear Armature modifier, and behind it one with
+Preserve Volume, Multi Modifier and the vertex group."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ GROUP = "Painted mix"
 def painted(count: int) -> np.ndarray:
     """Stretches of 0 and of 1, and all between."""
     rng = np.random.default_rng(1)
-    return np.repeat(np.clip(rng.uniform(-0.6, 1.6, count // 50 + 1), 0.0, 1.0), 50)[:count].astype(np.float32)
+    return np.repeat(np.clip(rng.uniform(-0.6, 1.6, count // 50 + 1), 0.0, 1.0), 50)[:count].astype(
+        np.float32
+    )
 
 
 def mixed_by_blender(obj: bpy.types.Object, shares: np.ndarray) -> np.ndarray:

@@ -40,6 +40,7 @@ def test_every_operation_is_chosen():
         ("plant_crash", "crash of sinew"),
     ],
 )
+@pytest.mark.once
 def test_what_is_planted_is_found_and_made_small(planted, kind, tmp_path, capsys):
     steps = steps_of("frame", "pose", "weights", planted, "frame", "pose")
     with walk.Pair("evaluation") as pair:
@@ -55,6 +56,7 @@ def test_what_is_planted_is_found_and_made_small(planted, kind, tmp_path, capsys
     assert kind in capsys.readouterr().out
 
 
+@pytest.mark.once
 def test_a_walk_where_nothing_is_wrong_says_so(capsys):
     assert walk.replay(steps_of("add", "frame", "pose", "remove_all"), "update") == 0
     out = capsys.readouterr().out

@@ -115,7 +115,8 @@ def _is_rendering() -> bool:
 
 def _check_rendered(run: Run, frames: int) -> None:
     seen = ComparingEngine.seen
-    run.check(len({frame for frame, _name, _off in seen}) == frames, f"{len(seen)} of {frames} frames were rendered")
+    count = len({frame for frame, _name, _off in seen})
+    run.check(count == frames, f"{count} of {frames} frames were rendered")
     wrong = [(frame, name, round(off, 4)) for frame, name, off in seen if off > window_scene.TOLERANCE]
     run.check(not wrong, f"rendered frames are off: {wrong[:6]}, {len(wrong)} of {len(seen)}")
 

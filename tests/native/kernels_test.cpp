@@ -72,7 +72,8 @@ Scene reordered(const Scene& scene, const std::vector<std::size_t>& order) {
 }
 
 /// How far each of `points` is from that of skinning/ in double, rising.
-std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const MethodInfo& method, const Scene& scene) {
+std::vector<double> errors_of(const std::vector<Vec3<float>>& points, const MethodInfo& method,
+                              const Scene& scene) {
     const auto expected = in_double(method, scene);
     std::vector<double> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {

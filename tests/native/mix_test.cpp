@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Deformers of a shared binding, and the stage `mix`.
+#include "sinew/skinning/mix.h"
+
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
@@ -8,7 +10,6 @@
 
 #include "scene.h"
 #include "sinew/deform/simd.h"
-#include "sinew/skinning/mix.h"
 
 namespace sinew {
 namespace {
@@ -175,8 +176,7 @@ TEST(Mix, refuses_what_it_can_not_mix) {
     const std::string message = ": expected one of " + names + ", got a method of number 1000";
     const MethodInfo unknown{1000, "none", "", "", "", Needs::nothing};
     EXPECT_EQ(with(unknown, {0, 1, 0}), "mix" + message);
-    EXPECT_EQ(refusal([&] { const Deformer deformer(binding, unknown); }),
-              "method" + message);
+    EXPECT_EQ(refusal([&] { const Deformer deformer(binding, unknown); }), "method" + message);
 }
 
 TEST(Bindings, are_shared_by_deformers_that_differ_in_nothing_from_others) {

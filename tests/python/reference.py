@@ -2,8 +2,8 @@
 """Skinning in float64 numpy and matrix form, from the papers: what the library is measured against.
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
-Collins, Zara, O'Sullivan 2008, algorithm 1 (dq) and Alexa 2002 (log); slow, one vertex at a time, and shares no
-formula with the library where there are two. Quaternions are (w, x, y, z).
+Collins, Zara, O'Sullivan 2008, algorithm 1 (dq) and Alexa 2002 (log); slow, one vertex at a time, and shares
+no formula with the library where there are two. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -125,8 +125,9 @@ def dq(point, motions, rotations, weights):
 
 @functools.lru_cache(maxsize=1000)
 def logarithm(of_rotation):
-    """scipy's matrix logarithm of a 3x3 rotation (as bytes), and the 3x3 matrix that makes the last column of the
-    rigid 4x4 matrix's logarithm of its translation: the inverse of the exponential's integral over unit time."""
+    """scipy's matrix logarithm of a 3x3 rotation (as bytes), and the 3x3 matrix that makes the last column of
+    the rigid 4x4 matrix's logarithm of its translation: the inverse of the exponential's integral over unit
+    time."""
     angular = scipy.linalg.logm(np.frombuffer(of_rotation).reshape(3, 3)).real
     block = np.zeros((6, 6))
     block[:3, :3], block[:3, 3:] = angular, np.eye(3)

@@ -298,7 +298,8 @@ def test_errors_of_bakes_have_a_line(tmp_path, old, new, line, sentence):
 
 def test_parameters_of_files_and_objects(tmp_path):
     """The command line's win over the file's, and a rule's over both."""
-    text = 'method = "lbs"\nset = ["mix=dq", "mix.group=Arms"]\n[[objects]]\nmatch = "Head"\nset = "mix=off"\n'
+    text = 'method = "lbs"\nset = ["mix=dq", "mix.group=Arms"]\n'
+    text += '[[objects]]\nmatch = "Head"\nset = "mix=off"\n'
     job = read(tmp_path, text)
     task = job.settings_of(Path("/x/a.blend"), Settings(set=("mix.group=Legs",))).as_task()
     assert task["set"] == ["mix=dq", "mix.group=Arms", "mix.group=Legs"]

@@ -76,7 +76,7 @@ def test_stages_say_what_they_are():
         assert parameters_are_whole(row.parameters)
     assert [(row.id, row.kind) for row in rows[0].parameters] == [
         ("method", "method"),
-        ("weights", "vertex_group"),
+        ("group", "vertex_group"),
     ]
 
 

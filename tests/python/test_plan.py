@@ -49,9 +49,11 @@ def test_the_table(facts, state, reason):
     assert bool(found.reason) == bool(reason)
 
 
-@pytest.mark.parametrize("fact", [{"mesh_is_editable": False}, {"mesh_is_shared": True}, {"has_upstream": True}])
-def test_points_of_a_mesh_that_is_not_its_own_are_in_a_buffer(fact):
-    assert plan(ObjectFacts(**fact)).in_buffer
+@pytest.mark.parametrize(
+    ("fact", "value"), [("mesh_is_editable", False), ("mesh_is_shared", True), ("has_upstream", True)]
+)
+def test_points_of_a_mesh_that_is_not_its_own_are_in_a_buffer(fact, value):
+    assert plan(ObjectFacts(**{fact: value})).in_buffer
     assert not plan(ObjectFacts()).in_buffer
 
 

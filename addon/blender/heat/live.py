@@ -112,7 +112,8 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         mesh = obj.data if properties.of(obj).front is None else front.evaluated_mesh(obj, depsgraph)
         if mesh is None or driven.frames is None or len(mesh.vertices) != len(driven.rest_points):
             return None
-        links = [Link(Binding(link.binding.weighting, link.binding.mix_weights), link.mask, link.multi) for link in driven.chain.links]
+        known = [(link, link.binding) for link in driven.chain.links]
+        links = [Link(Binding(b.weighting, b.mix_weights), link.mask, link.multi) for link, b in known]
         parts.append(Part(obj, driven, driven.source, mesh_io.read_surface(mesh), Chain(links)))
     if not parts:
         return None

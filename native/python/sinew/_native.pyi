@@ -69,6 +69,7 @@ class Stage:
 def methods() -> tuple[Method, ...]: ...
 def stages() -> tuple[Stage, ...]: ...
 def keep_thread_state() -> None: ...
+
 @final
 class Skeleton:
     def __init__(self, parents: NDArray[np.int32]) -> None: ...
@@ -108,8 +109,8 @@ class Binding:
 class Deformer:
     """A binding and a method, ready to deform at any pose.
 
-    mix  None, or (method, weights): the share of another method, float32 [vertices] from 0 to 1, that each vertex
-         takes (the stage `mix`)
+    mix  None, or (method, weights): the share of another method, float32 [vertices] from 0 to 1, that each
+         vertex takes (the stage `mix`)
     """
 
     @overload

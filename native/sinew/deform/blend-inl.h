@@ -18,7 +18,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Numbers of a bone's row: two quads.
+/// Numbers of a bone's row: two Float4.
 inline constexpr std::size_t kRow = 8;
 
 /// The weighted sum of rows.
@@ -35,11 +35,11 @@ HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin,
     }
 }
 
-/// A weighted sum, and that of the quaternions alone up to here, which says on what side the next is added.
+/// A weighted sum, and that of the quaternions alone so far: the next is added in its hemisphere.
 template <class D>
 struct Blend {
     Sum<D> sum;
-    Vec<D> side[4];
+    Vec<D> quaternion[4];
 };
 
 /// The base that rows are added without where they are added plainly.
@@ -50,34 +50,35 @@ template <class D>
 HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight, bool plain) {
     Blend<D> blend;
     for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Set(d, row[i]);
-    for (std::size_t i = 0; i < 4; ++i) blend.side[i] = hn::Mul(weight, hn::Set(d, row[i]));
+    for (std::size_t i = 0; i < 4; ++i) blend.quaternion[i] = hn::Mul(weight, hn::Set(d, row[i]));
     if (plain) {
         for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Mul(weight, hn::Set(d, row[i]));
     }
     return blend;
 }
 
-/// Adds what `row`, turned to the side of the blend, differs from the `base`: the first row, or kNoBase; the
-/// weight, negative where it was turned.
+/// Adds what `row`, in the hemisphere of the blend, differs from the `base`: the first row, or kNoBase; the
+/// weight, negative where it was negated.
 ///
 /// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
 /// must decide a tie alike.
 template <class Rigid, class D>
 HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight, Blend<D>& blend) {
-    Vec<D>* const side = blend.side;
-    const Vec<D> dot =
-        hn::Add(hn::Add(hn::Mul(hn::Set(d, row[0]), side[0]), hn::Mul(hn::Set(d, row[2]), side[2])),
-                hn::Add(hn::Mul(hn::Set(d, row[1]), side[1]), hn::Mul(hn::Set(d, row[3]), side[3])));
+    Vec<D>* const quaternion = blend.quaternion;
+    const Vec<D> dot = hn::Add(
+        hn::Add(hn::Mul(hn::Set(d, row[0]), quaternion[0]), hn::Mul(hn::Set(d, row[2]), quaternion[2])),
+        hn::Add(hn::Mul(hn::Set(d, row[1]), quaternion[1]), hn::Mul(hn::Set(d, row[3]), quaternion[3])));
     const auto away = hn::Lt(dot, hn::Zero(d));
     const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
     for (std::size_t i = 0; i < kRow; ++i) {
         const Vec<D> difference = hn::Set(d, row[i] - base[i]);
-        const Vec<D> turned = hn::Set(d, -row[i] - base[i]);
+        const Vec<D> negated = hn::Set(d, -row[i] - base[i]);
         const Vec<D> by =
-            i < 4 * Rigid::kSignedFloat4s ? hn::IfThenElse(away, turned, difference) : difference;
+            i < 4 * Rigid::kSignedFloat4s ? hn::IfThenElse(away, negated, difference) : difference;
         blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
     }
-    for (std::size_t i = 0; i < 4; ++i) side[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), side[i]);
+    for (std::size_t i = 0; i < 4; ++i)
+        quaternion[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), quaternion[i]);
     return signed_weight;
 }
 

@@ -74,16 +74,16 @@ struct Quats {
 HWY_INLINE Quats rotations(const Motions& m) {
     const BoneTag d;
     const BoneVec one = hn::Set(d, 1.0);
-    const BonePoints turn{hn::Sub(m.y.z, m.z.y), hn::Sub(m.z.x, m.x.z), hn::Sub(m.x.y, m.y.x)};
+    const BonePoints difference{hn::Sub(m.y.z, m.z.y), hn::Sub(m.z.x, m.x.z), hn::Sub(m.x.y, m.y.x)};
     const BonePoints sum{hn::Add(m.y.z, m.z.y), hn::Add(m.z.x, m.x.z), hn::Add(m.x.y, m.y.x)};
     const BoneVec more = hn::Add(one, m.x.x);
     const BoneVec less = hn::Sub(one, m.x.x);
     const BoneVec yz = hn::Add(m.y.y, m.z.z);
     const BoneVec y_z = hn::Sub(m.y.y, m.z.z);
-    const Quats multiples[4] = {{hn::Add(more, yz), turn},
-                                {turn.x, {hn::Sub(more, yz), sum.z, sum.y}},
-                                {turn.y, {sum.z, hn::Add(less, y_z), sum.x}},
-                                {turn.z, {sum.y, sum.x, hn::Sub(less, y_z)}}};
+    const Quats multiples[4] = {{hn::Add(more, yz), difference},
+                                {difference.x, {hn::Sub(more, yz), sum.z, sum.y}},
+                                {difference.y, {sum.z, hn::Add(less, y_z), sum.x}},
+                                {difference.z, {sum.y, sum.x, hn::Sub(less, y_z)}}};
     const BoneVec by[4] = {multiples[0].w, multiples[1].v.x, multiples[2].v.y, multiples[3].v.z};
     Quats q = multiples[0];
     BoneVec largest = by[0];
@@ -114,7 +114,8 @@ void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<fl
         alignas(64) double numbers[kRow][kMax];
         alignas(64) double rigid[kMax];
         for (std::size_t k = 0; k < kRow; ++k) hn::Store(row[k], d, numbers[k]);
-        const BoneVec sizes = hn::Max(dot(motions.translation, motions.translation), hn::Set(d, kMinSize * kMinSize));
+        const BoneVec sizes =
+            hn::Max(dot(motions.translation, motions.translation), hn::Set(d, kMinSize * kMinSize));
         const hn::Rebind<float, BoneTag> floats;
         hn::StoreU(hn::DemoteTo(floats, sizes), floats, palette.sizes + i);
         hn::Store(hn::IfThenElseZero(is_rotation(motions), hn::Set(d, 1.0)), d, rigid);

@@ -222,7 +222,7 @@ struct Deformer::State {
 
     std::shared_ptr<const Binding::Packed> packed;
     std::vector<Lanes<float>> own_rows;  // empty: those of the binding
-    std::array<std::size_t, 2> methods;  // places in the list; the second is that of the mix
+    std::array<std::size_t, 2> methods;  // indices in the list; the second is that of the mix
     std::array<const Kernel*, 2> kernels;
     std::optional<MixWeights> mix;
     PaletteStore palettes;
@@ -234,7 +234,8 @@ Deformer::State::State(std::shared_ptr<const Binding::Packed> from, std::vector<
       own_rows(std::move(rows)),
       methods{checked_method("method", method), with ? checked_method("mix", with->method) : 0},
       kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
-      mix(with ? std::optional(checked_mix(packed->mesh, with->weights, packed->vertex_count)) : std::nullopt),
+      mix(with ? std::optional(checked_mix(packed->mesh, with->weights, packed->vertex_count))
+               : std::nullopt),
       palettes(kernels_in_use(), packed->mesh.used_bones.size()) {}
 
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
@@ -291,12 +292,12 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         const Kernel& kernel = *state_->kernels[k];
         Palette& palette = reading.palette(k);
         prepare(kernel, bones, palette);
-        const bool there_and_back = kernel.is_rigid && !same_space;
+        const bool changes_space = kernel.is_rigid && !same_space;
         work.frames[k] = {&packed.mesh,
                           rows,
                           &palette,
-                          there_and_back ? bones_from_model.data() : nullptr,
-                          there_and_back ? model_from_bones.data() : nullptr,
+                          changes_space ? bones_from_model.data() : nullptr,
+                          changes_space ? model_from_bones.data() : nullptr,
                           points.data()};
     }
     const std::size_t threads = options.threads > 0

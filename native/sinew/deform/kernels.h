@@ -57,7 +57,7 @@ struct Kernel {
     [[nodiscard]] const TargetKernel& target() const noexcept;
 };
 
-/// The place in Kernel::targets of the instruction set in use.
+/// The index in Kernel::targets of the instruction set in use.
 [[nodiscard]] std::size_t target_in_use() noexcept;
 
 inline const TargetKernel& Kernel::target() const noexcept { return targets[target_in_use()]; }

@@ -24,8 +24,8 @@ using One = hn::CappedTag<float, 1>;
 template <class D>
 using Vec = hn::Vec<D>;
 
-/// Where a frame's blocks are and where their points go. A copy on the stack, as the compiler would read what
-/// the frame refers to anew after every vector that it stores.
+/// Where a frame's blocks are and where their points go. A copy on the stack: the compiler would read what the frame
+/// refers to again after every vector that it stores.
 struct MeshPointers {
     const Block* blocks;
     const Lanes<float>* rows;
@@ -63,7 +63,7 @@ HWY_INLINE Points<D> add(const Points<D>& a, const Points<D>& b) {
     return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
 
-/// rows  [3] of `displacement`, each (x, y, z, shift)
+/// rows  [3] of `displacement`, each (x, y, z, translation)
 template <class D>
 HWY_INLINE Points<D> displacement(D d, const float* rows, const Points<D>& p) {
     const auto row = [d, &p](const float* r) HWY_ATTR {
@@ -143,15 +143,15 @@ HWY_INLINE void store_runs(Full, const Run* runs, std::size_t count, const Point
     }
 }
 
-/// Lanes turned to points, then each by one masked store.
+/// Lanes are transposed to points, then each by one masked store.
 ///
 /// Apart from store_points, so that its stack is not that of every block.
-inline HWY_NOINLINE void scatter_points(Full d, const std::int32_t* place, Vec3<float>* points, Vec<Full> x,
-                                        Vec<Full> y, Vec<Full> z) {
-    alignas(64) float quads[4 * kLanes];
-    hn::StoreInterleaved4(x, y, z, z, d, quads);
+inline HWY_NOINLINE void scatter_points(Full d, const std::int32_t* vertices, Vec3<float>* points,
+                                        Vec<Full> x, Vec<Full> y, Vec<Full> z) {
+    alignas(64) float float4s[4 * kLanes];
+    hn::StoreInterleaved4(x, y, z, z, d, float4s);
     for (std::size_t i = 0; i < kLanes; ++i) {
-        _mm_mask_storeu_ps(&points[place[i]].x, 7, _mm_load_ps(quads + 4 * i));
+        _mm_mask_storeu_ps(&points[vertices[i]].x, 7, _mm_load_ps(float4s + 4 * i));
     }
 }
 
@@ -164,33 +164,34 @@ HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
 
 /// Apart from store_points, so that its stack is not that of every block.
 template <class D>
-HWY_NOINLINE void scatter_points(D d, const std::int32_t* place, Vec3<float>* points, Vec<D> x, Vec<D> y,
+HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>* points, Vec<D> x, Vec<D> y,
                                  Vec<D> z) {
-    // Numbers one by one: turning lanes into points first costs a fifth more of the whole.
+    // Numbers one by one: transposing lanes to points first costs a fifth more of the whole.
     alignas(64) float xs[hn::MaxLanes(D())];
     alignas(64) float ys[hn::MaxLanes(D())];
     alignas(64) float zs[hn::MaxLanes(D())];
     hn::Store(x, d, xs);
     hn::Store(y, d, ys);
     hn::Store(z, d, zs);
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) points[place[i]] = {xs[i], ys[i], zs[i]};
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) points[vertices[i]] = {xs[i], ys[i], zs[i]};
 }
 
 #endif
 
 /// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it once more.
 template <class D>
-HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane, const Points<D>& p) {
+HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane,
+                             const Points<D>& p) {
     const Block& block = to.blocks[b];
-    const std::int32_t* const place = to.vertices[b].lane.data() + lane;
+    const std::int32_t* const vertices = to.vertices[b].lane.data() + lane;
     if constexpr (hn::MaxLanes(D()) == 1) {
-        to.points[*place] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
+        to.points[*vertices] = {hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z)};
     } else {
-        if (block.consecutive) return store_consecutive(d, p, &to.points[block.place + lane].x);
+        if (block.consecutive) return store_consecutive(d, p, &to.points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3
-        if (block.runs > 0) return store_runs(d, to.runs + block.place, block.runs, p, &to.points->x);
+        if (block.runs > 0) return store_runs(d, to.runs + block.output, block.runs, p, &to.points->x);
 #endif
-        scatter_points(d, place, to.points, p.x, p.y, p.z);
+        scatter_points(d, vertices, to.points, p.x, p.y, p.z);
     }
 }
 
@@ -227,7 +228,7 @@ inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) 
 inline std::size_t end_of_set(const Frame& frame, std::size_t b, std::size_t end) {
     const Block* const blocks = frame.mesh->blocks.data();
     std::size_t after = b + 1;
-    // A set without bones has no place in PackedMesh::bones of its own.
+    // A set without bones has no entry of its own in PackedMesh::bones.
     while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
            blocks[after].influences == blocks[b].influences) {
         ++after;

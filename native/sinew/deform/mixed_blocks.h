@@ -22,7 +22,7 @@ struct MixWeights {
 /// weights  [vertices] not NaN; clamped to 0 to 1
 [[nodiscard]] MixWeights pack_mix(const PackedMesh& mesh, std::span<const float> weights);
 
-/// Deforms the blocks [begin, end) as Mix says, by two kernels. One that no vertex of a block takes is left out there,
+/// Deforms the blocks [begin, end) as Mix says, by two kernels. One that no vertex of a block takes does not run there,
 /// so such blocks have the bits that the other kernel alone gives.
 ///
 /// frames  for each kernel; of one mesh, and with the same points to write

@@ -9,7 +9,7 @@ namespace sinew {
 namespace {
 
 // A block costs the same however few of its lanes are filled: as much as two to six vertices of a mixed one,
-// by processor. It also bounds the memory: 16 / 6 of 24 bytes a vertex at four influences.
+// which depends on the processor. It also bounds the memory: 16 / 6 of 24 bytes a vertex at four influences.
 constexpr std::size_t kMinLanes = 6;
 
 // A run takes three masked stores; with more runs than this, one for each vertex is as fast.
@@ -168,9 +168,9 @@ private:
         const bool consecutive =
             !mixed && vertices.size() == kLanes && vertices.back() - vertices.front() == kLanes - 1;
         const std::size_t runs = consecutive ? 0 : add_runs(vertices);
-        const auto place =
+        const auto output =
             consecutive ? vertices.front() : static_cast<std::uint32_t>(mesh_.runs.size() - runs);
-        mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences), place,
+        mesh_.blocks.push_back({row_count_, first_bone, static_cast<std::uint32_t>(influences), output,
                                 static_cast<std::uint8_t>(vertices.size()), static_cast<std::uint8_t>(runs),
                                 mixed, consecutive});
         mesh_.vertices.push_back(numbers);
@@ -219,21 +219,21 @@ private:
         }
     }
 
-    /// Finds the bones that are used, and numbers those of the mesh by their place among them: what a frame
-    /// needs for its bones does not grow with the highest number.
+    /// Finds the bones that are used, and numbers those of the mesh by their index among them: the memory
+    /// of a frame does not grow with the highest number.
     void number_used_bones() {
         if (mesh_.bones.empty()) return;
         const std::int32_t highest = *std::ranges::max_element(mesh_.bones);
-        std::vector<std::int32_t> place_of(static_cast<std::size_t>(highest) + 1);
-        for (const std::int32_t bone : mesh_.bones) place_of[static_cast<std::size_t>(bone)] = 1;
+        std::vector<std::int32_t> index_of_bone(static_cast<std::size_t>(highest) + 1);
+        for (const std::int32_t bone : mesh_.bones) index_of_bone[static_cast<std::size_t>(bone)] = 1;
         std::int32_t count = 0;
         for (std::int32_t bone = 0; bone <= highest; ++bone) {
-            std::int32_t& place = place_of[static_cast<std::size_t>(bone)];
-            if (place == 0) continue;
-            place = count++;
+            std::int32_t& index = index_of_bone[static_cast<std::size_t>(bone)];
+            if (index == 0) continue;
+            index = count++;
             mesh_.used_bones.push_back(bone);
         }
-        for (std::int32_t& bone : mesh_.bones) bone = place_of[static_cast<std::size_t>(bone)];
+        for (std::int32_t& bone : mesh_.bones) bone = index_of_bone[static_cast<std::size_t>(bone)];
     }
 
     std::span<const std::uint32_t> offsets_;

@@ -27,7 +27,7 @@ struct Block {
     std::uint32_t first_row;
     std::uint32_t first_bone;  // of PackedMesh::bones: [influences], or if mixed [kLanes][influences]
     std::uint32_t influences;
-    std::uint32_t place;  // consecutive: the first vertex; else, where there are runs, the first of them
+    std::uint32_t output;  // consecutive: the first vertex; or else, where there are runs, the first of them
     std::uint8_t vertices;
     std::uint8_t runs;  // 0: too many to be worth it
     bool mixed;         // every lane has bones of its own; fewer influences are filled up with weight 0
@@ -36,17 +36,17 @@ struct Block {
 
 /// Lanes of a block whose vertices follow each other in the mesh.
 struct Run {
-    std::int32_t origin;                  // the place in the mesh that lane 0 would have
+    std::int32_t origin;                  // the vertex that lane 0 would be
     std::array<std::uint16_t, 3> floats;  // a bit for each of the coordinates x y z x y z ... of the block
 };
 
-/// A bound mesh in the order in which it is deformed: vertices with the same bones in the same order lie
-/// together, so that a bone is read once for many.
+/// A bound mesh in the order in which it is deformed: vertices with the same bones in the same order are
+/// neighbours, so that a bone is read once for many.
 struct PackedMesh {
     std::vector<Block> blocks;
     std::vector<Lanes<float>> rows;
-    std::vector<Lanes<float>> first_weights;  // [blocks] apart, as they are seldom read; if mixed not at all
-    std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the place of each lane in the mesh
+    std::vector<Lanes<float>> first_weights;  // [blocks] apart, as they are seldom read; not of mixed blocks
+    std::vector<Lanes<std::int32_t>> vertices;  // [blocks] the vertex of each lane
     std::vector<Run> runs;
     std::vector<std::int32_t> bones;       // indices into used_bones
     std::vector<std::int32_t> used_bones;  // rising, each once: bones as the caller numbers them

@@ -25,8 +25,8 @@ HWY_INLINE float dot(const float* a, const float* b) {
     return (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3]);
 }
 
-/// Whether a term's side of the running sum of those before it is the same whatever the weights: it is
-/// where the term lies on one side of each of them.
+/// Whether the sign by which a term joins the running sum of those before it is the same whatever the weights: it is
+/// where the term is in the hemisphere of each of them.
 HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t count) {
     // Far beyond the rounding of a sum, so that it decides as the sum in floats would.
     constexpr float kTie = 1e-5f;
@@ -61,24 +61,24 @@ HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
     return hn::Add(pairs, hn::Shuffle2301(pairs));
 }
 
-/// Copies rows of the palette, each turned to the side of the first; the least of their cosines.
+/// Copies rows of the palette, each in the hemisphere of the first; the least of their cosines.
 ///
 /// kDifferences  of all but the first, what they differ from it
 template <class Rigid, bool kDifferences>
 HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count,
-                             float* rows) {
+                              float* rows) {
     const Four d;
-    const auto quad_of = [&](std::size_t k, std::size_t q) HWY_ATTR {
+    const auto float4_of = [&](std::size_t k, std::size_t q) HWY_ATTR {
         return hn::Load(d, palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k]) + q].value.data());
     };
-    const Vec<Four> first = quad_of(0, 0);
-    const Vec<Four> first_second = quad_of(0, 1);
+    const Vec<Four> first = float4_of(0, 0);
+    const Vec<Four> first_second = float4_of(0, 1);
     hn::Store(first, d, rows);
     hn::Store(first_second, d, rows + 4);
     Vec<Four> least = hn::Set(d, 1.0f);
     for (std::size_t k = 1; k < count; ++k) {
-        Vec<Four> quad = quad_of(k, 0);
-        Vec<Four> second = quad_of(k, 1);
+        Vec<Four> quad = float4_of(k, 0);
+        Vec<Four> second = float4_of(k, 1);
         const Vec<Four> cosine = dot(quad, first);
         const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
         least = hn::Min(least, hn::Abs(cosine));
@@ -111,11 +111,12 @@ float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_
 
 #endif
 
-/// Copies the first bone of a set to `rows` and what the others differ from it, or if plain the others, each turned
-/// to the side on which it is added. False where that depends on the weights, or where a bone has scale and so
+/// Copies the first bone of a set to `rows` and what the others differ from it, or if plain the others, each with
+/// the sign by which it is added. False where that depends on the weights, or where a bone has scale and so
 /// depends on the vertex.
 template <class Rigid, bool kPlain>
-HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
+HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                              float* rows) {
     if (count > kMaxResolved) return false;
     if (palette.any_scale) {
         for (std::size_t k = 0; k < count; ++k) {
@@ -229,7 +230,7 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
             const Points<Full> rest = load_rest(d, rows, spaces, lane);
             const auto sum =
                 blend_bones<Rigid>(d, *frame.palette, bones, influences, plain,
-                                    first_weights_of(frame, b) + lane, weights_of(rows) + lane, rest);
+                                   first_weights_of(frame, b) + lane, weights_of(rows) + lane, rest);
             finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
         }
     }
@@ -282,21 +283,21 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
         const bool plain = is_plain(*frame.palette, of_vertex, block.influences);
         const float* const weights = weights_of(rows) + lane;
         const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, plain, weights,
-                                             weights + kLanes, rest);
+                                            weights + kLanes, rest);
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
     }
 }
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// One vertex of a mixed block: a bone's row is added as it lies in memory, quad by quad. Whether that is the right
+/// One vertex of a mixed block: a bone's row is added as it lies in memory, Float4 by Float4. Whether that is the right
 /// way to add these bones.
 ///
 /// weights  of each influence, kLanes apart
-/// sums     where the sum's quads are written, 4 * kLanes apart
+/// sums     where the sum's Float4s are written, 4 * kLanes apart
 template <class Rigid, bool kPlain>
-HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, std::size_t count,
-                            const float* weights, float* sums) {
+HWY_INLINE bool blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                             const float* weights, float* sums) {
     const Four d;
     using V4 = Vec<Four>;
     const auto row_at = [&](std::size_t k) {
@@ -307,7 +308,7 @@ HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, s
     float least = size;
     V4 sum[kRowFloat4s];
     for (std::size_t q = 0; q < kRowFloat4s; ++q) sum[q] = hn::Load(d, first[q].value.data());
-    V4 side = hn::Mul(hn::Set(d, weights[0]), sum[0]);
+    V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
     if (kPlain) {
         for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
     }
@@ -316,7 +317,7 @@ HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, s
         least = std::min(least, palette.sizes[bones[k]]);
         const V4 weight = hn::Set(d, weights[kLanes * k]);
         const V4 quaternion = hn::Load(d, row->value.data());
-        const auto below = hn::Lt(dot(quaternion, side), hn::Zero(d));
+        const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
         const V4 away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
         for (std::size_t q = 0; q < kRowFloat4s; ++q) {
             V4 by = hn::Load(d, row[q].value.data());
@@ -324,7 +325,7 @@ HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, s
             if (!kPlain) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
             sum[q] = hn::MulAdd(weight, by, sum[q]);
         }
-        side = hn::MulAdd(hn::Xor(weight, away), quaternion, side);
+        quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
     }
     for (std::size_t q = 0; q < kRowFloat4s; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
     return kPlain == is_plain(size, least);
@@ -332,12 +333,12 @@ HWY_INLINE bool blend_quads(const Palette& palette, const std::int32_t* bones, s
 
 /// Apart, so that its registers are not those of every vertex.
 template <class Rigid>
-HWY_NOINLINE void blend_quads_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
-                                      const float* weights, float* sums) {
-    blend_quads<Rigid, true>(palette, bones, count, weights, sums);
+HWY_NOINLINE void blend_vertex_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
+                                       const float* weights, float* sums) {
+    blend_vertex<Rigid, true>(palette, bones, count, weights, sums);
 }
 
-/// A mixed block: the sums of all vertices are turned into lanes.
+/// A mixed block: the sums of all vertices are transposed into lanes.
 template <class Rigid>
 void deform_mixed(const Frame& frame, std::size_t b) {
     const MeshPointers pointers = pointers_of(frame);
@@ -350,8 +351,8 @@ void deform_mixed(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
         const float* const weights = weights_of(rows) + lane;
         float* const to = sums[0] + 4 * lane;
-        if (!blend_quads<Rigid, false>(palette, bones, block.influences, weights, to)) {
-            blend_quads_plainly<Rigid>(palette, bones, block.influences, weights, to);
+        if (!blend_vertex<Rigid, false>(palette, bones, block.influences, weights, to)) {
+            blend_vertex_plainly<Rigid>(palette, bones, block.influences, weights, to);
         }
     }
     const Full d;

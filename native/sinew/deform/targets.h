@@ -2,8 +2,8 @@
 // The instruction sets that kernels are built for. To be included before Highway.
 #pragma once
 
-// What is left out has the vectors of what is there and adds integer instructions (AVX3_DL and after it),
-// or has vectors whose size the compiler does not know, which can not be members (SVE, RVV).
+// Disabled are those that have the vectors of another and add integer instructions (AVX3_DL and after it),
+// or whose vectors have a size that the compiler does not know: they can not be members (SVE, RVV).
 #define HWY_DISABLED_TARGETS \
     (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 
@@ -11,13 +11,13 @@
 //
 // Highway's own choice (HWY_DYNAMIC_DISPATCH) needs libhwy, which Debian ships as a shared library only: a
 // wheel would then need it on the user's machine. Its headers do without; so the choice is made in targets.cpp.
-#define SINEW_TARGETS(deform, prepare)                                                              \
-    {                                                                                               \
-        {                                                                                           \
-            {HWY_CHOOSE_AVX3(deform), HWY_CHOOSE_AVX3(prepare)},                                    \
-                {HWY_CHOOSE_AVX2(deform), HWY_CHOOSE_AVX2(prepare)},                                \
-                {HWY_CHOOSE_SSE4(deform), HWY_CHOOSE_SSE4(prepare)},                                \
-                {HWY_CHOOSE_SSSE3(deform), HWY_CHOOSE_SSSE3(prepare)},                              \
-                {&HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare)},                      \
-        }                                                                                           \
+#define SINEW_TARGETS(deform, prepare)                                         \
+    {                                                                          \
+        {                                                                      \
+            {HWY_CHOOSE_AVX3(deform), HWY_CHOOSE_AVX3(prepare)},               \
+                {HWY_CHOOSE_AVX2(deform), HWY_CHOOSE_AVX2(prepare)},           \
+                {HWY_CHOOSE_SSE4(deform), HWY_CHOOSE_SSE4(prepare)},           \
+                {HWY_CHOOSE_SSSE3(deform), HWY_CHOOSE_SSSE3(prepare)},         \
+                {&HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare)}, \
+        }                                                                      \
     }

@@ -29,9 +29,9 @@ namespace {
 using Work = std::function<void(std::size_t, std::size_t)>;
 
 // More threads than this wait for memory, not for each other.
-constexpr std::size_t kMostThreads = 64;
+constexpr std::size_t kMaxThreads = 64;
 
-// How long a thread looks for its next piece of news before it sleeps. Waking one takes 5 to 50 us, the
+// How long a thread spins for its next job before it sleeps. Waking one takes 5 to 50 us, the
 // objects of a frame follow each other faster than this; Blender's own threads lose next to nothing.
 constexpr std::chrono::microseconds kSpin{50};
 
@@ -43,7 +43,7 @@ void pause() {
 #endif
 }
 
-/// Whether `ready` became true while it was worth looking.
+/// Whether `ready` became true while spinning was worth it.
 template <class Ready>
 bool spin_until(const Ready& ready) {
     const auto end = std::chrono::steady_clock::now() + kSpin;
@@ -57,7 +57,7 @@ bool spin_until(const Ready& ready) {
 }
 
 /// A thread of the system. Not std::thread, which allocates, and whose destructor would end the process with the
-/// threads of a pool that is left as it is.
+/// threads of a pool that nobody destroys.
 class SystemThread {
 public:
     using Main = void (*)(std::size_t);
@@ -105,8 +105,8 @@ private:
 
 class Pool {
 public:
-    void run(std::size_t count, std::size_t threads, const Work& work, std::size_t piece) {
-        // A flag, not a mutex: a nested call asks on the thread that has the turn, which std::mutex forbids.
+    void run(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
+        // A flag, not a mutex: a nested call tries to lock on the thread that has locked, which std::mutex forbids.
         if (busy_.exchange(true, std::memory_order_acquire)) {
             work(0, count);
             return;
@@ -117,25 +117,25 @@ public:
         failed_.store(false, std::memory_order_relaxed);
         work_ = &work;
         count_ = count;
-        piece_ = piece;
+        chunk_ = chunk;
         shares_ = helpers + 1;
         for (std::size_t share = 0; share < shares_; ++share) {
             next_[share].index.store(share_begin(share), std::memory_order_relaxed);
         }
-        left_.store(0, std::memory_order_relaxed);
+        done_.store(0, std::memory_order_relaxed);
         const std::uint64_t job = (job_of(gate_.load(std::memory_order_relaxed)) + 1) << 32;
         gate_.store(job | helpers, std::memory_order_release);
         ring();
 
-        take_pieces(0);
-        // Workers that have not come yet would find no pieces left: close their seats.
-        const std::uint64_t unused = gate_.exchange(job, std::memory_order_acq_rel) & kSeats;
+        take_chunks(0);
+        // Workers that have not come yet would find no chunks: close their slots.
+        const std::uint64_t unused = gate_.exchange(job, std::memory_order_acq_rel) & kSlots;
         const auto came = static_cast<std::uint32_t>(helpers - unused);
-        const auto all_left = [this, came] { return left_.load(std::memory_order_acquire) == came; };
-        if (!spin_until(all_left)) {
-            for (std::uint32_t left = left_.load(std::memory_order_acquire); left != came;
-                 left = left_.load(std::memory_order_acquire)) {
-                left_.wait(left, std::memory_order_acquire);
+        const auto all_done = [this, came] { return done_.load(std::memory_order_acquire) == came; };
+        if (!spin_until(all_done)) {
+            for (std::uint32_t done = done_.load(std::memory_order_acquire); done != came;
+                 done = done_.load(std::memory_order_acquire)) {
+                done_.wait(done, std::memory_order_acquire);
             }
         }
         busy_.store(false, std::memory_order_release);
@@ -154,7 +154,7 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t kSeats = 0xFFFFFFFF;
+    static constexpr std::uint64_t kSlots = 0xFFFFFFFF;
 
     static std::uint64_t job_of(std::uint64_t gate) { return gate >> 32; }
 
@@ -169,24 +169,24 @@ private:
     void serve(std::size_t self) {
         std::uint64_t last_job = 0;
         for (;;) {
-            const std::uint32_t heard = bell_.load(std::memory_order_acquire);
-            if (take_seat(last_job)) {
-                take_pieces(self);
+            const std::uint32_t seen = bell_.load(std::memory_order_acquire);
+            if (take_slot(last_job)) {
+                take_chunks(self);
                 // The caller may be gone as soon as this is seen, but the pool never is.
-                left_.fetch_add(1, std::memory_order_release);
-                left_.notify_one();
+                done_.fetch_add(1, std::memory_order_release);
+                done_.notify_one();
             }
             if (ending_.load(std::memory_order_relaxed)) return;
-            const auto rung = [this, heard] { return bell_.load(std::memory_order_acquire) != heard; };
-            if (!spin_until(rung)) bell_.wait(heard, std::memory_order_acquire);
+            const auto rung = [this, seen] { return bell_.load(std::memory_order_acquire) != seen; };
+            if (!spin_until(rung)) bell_.wait(seen, std::memory_order_acquire);
         }
     }
 
-    /// Takes part in the job at the gate, at most once. The number of the job makes sure that a seat is
+    /// Takes part in the job at the gate, at most once. The number of the job makes sure that a slot is
     /// never taken of a job that ended meanwhile; and as long as one is taken, the caller waits.
-    bool take_seat(std::uint64_t& last_job) {
+    bool take_slot(std::uint64_t& last_job) {
         std::uint64_t gate = gate_.load(std::memory_order_acquire);
-        while ((gate & kSeats) > 0 && job_of(gate) != last_job) {
+        while ((gate & kSlots) > 0 && job_of(gate) != last_job) {
             if (gate_.compare_exchange_weak(gate, gate - 1, std::memory_order_acq_rel,
                                             std::memory_order_acquire)) {
                 last_job = job_of(gate);
@@ -196,26 +196,26 @@ private:
         return false;
     }
 
-    /// Where share `share` of the pieces starts.
+    /// Where share `share` of the chunks starts.
     [[nodiscard]] std::size_t share_begin(std::size_t share) const {
-        const std::size_t pieces = (count_ - 1) / piece_ + 1;
-        return std::min(pieces * share / shares_ * piece_, count_);
+        const std::size_t chunks = (count_ - 1) / chunk_ + 1;
+        return std::min(chunks * share / shares_ * chunk_, count_);
     }
 
     /// First the same share in every job, as what it reads and writes is still in this core's cache (with
-    /// pieces dealt out at random two threads took 0.74 of the time of one, not 0.5), then what others have
-    /// left. The first exception of all threads is kept for the caller, and ends the job.
-    void take_pieces(std::size_t self) noexcept {
+    /// chunks dealt out at random two threads took 0.74 of the time of one, not 0.5), then what others have
+    /// not taken. The first exception of all threads is kept for the caller, and ends the job.
+    void take_chunks(std::size_t self) noexcept {
         try {
-            for (std::size_t turn = 0; turn < shares_; ++turn) {
-                const std::size_t share = (self + turn) % shares_;
+            for (std::size_t step = 0; step < shares_; ++step) {
+                const std::size_t share = (self + step) % shares_;
                 const std::size_t end = share_begin(share + 1);
                 std::atomic<std::size_t>& next = next_[share].index;
                 while (next.load(std::memory_order_relaxed) < end) {
-                    const std::size_t begin = next.fetch_add(piece_, std::memory_order_relaxed);
+                    const std::size_t begin = next.fetch_add(chunk_, std::memory_order_relaxed);
                     if (begin >= end) break;
                     if (failed_.load(std::memory_order_relaxed)) return;
-                    (*work_)(begin, std::min(begin + piece_, end));
+                    (*work_)(begin, std::min(begin + chunk_, end));
                 }
             }
         } catch (...) {
@@ -233,15 +233,15 @@ private:
     std::exception_ptr* error_ = nullptr;  // of the first that failed
     std::atomic<bool> failed_{false};
     std::size_t count_ = 0;
-    std::size_t piece_ = 1;
+    std::size_t chunk_ = 1;
     std::size_t shares_ = 1;
     std::size_t worker_count_ = 0;
     // Apart, as all threads write them while they read the ones above.
-    alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, then its free seats
+    alignas(64) std::atomic<std::uint64_t> gate_{0};  // number of the job, then its free slots
     std::atomic<std::uint32_t> bell_{0};              // changes with every job; what workers sleep on
-    std::array<Next, kMostThreads> next_{};           // first piece of each share that nobody has
-    alignas(64) std::atomic<std::uint32_t> left_{0};  // workers that are done with the job
-    std::array<SystemThread, kMostThreads> workers_{};
+    std::array<Next, kMaxThreads> next_{};            // first chunk of each share that nobody has taken
+    alignas(64) std::atomic<std::uint32_t> done_{0};  // workers that are done with the job
+    std::array<SystemThread, kMaxThreads> workers_{};
 };
 
 // Not allocated, and never destroyed: at the end of a process its workers may still wait on it, and joining them
@@ -275,16 +275,16 @@ std::uint32_t forks() noexcept { return fork_count.load(std::memory_order_relaxe
 std::size_t hardware_threads() noexcept {
     // Asking the system takes 10 us: as long as 5,000 vertices.
     static const std::size_t threads =
-        std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
+        std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMaxThreads);
     return threads;
 }
 
-void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t piece) {
+void parallel_for(std::size_t count, std::size_t threads, const Work& work, std::size_t chunk) {
     if (count == 0) return;
-    piece = std::clamp<std::size_t>(piece, 1, count);
-    const std::size_t useful = std::min({threads, (count - 1) / piece + 1, kMostThreads});
+    chunk = std::clamp<std::size_t>(chunk, 1, count);
+    const std::size_t useful = std::min({threads, (count - 1) / chunk + 1, kMaxThreads});
     if (useful <= 1) return work(0, count);
-    pool.run(count, useful, work, piece);
+    pool.run(count, useful, work, chunk);
 }
 
 void end_threads() noexcept { pool.end(); }

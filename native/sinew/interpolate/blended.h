@@ -21,7 +21,7 @@ struct Blended {
 
 /// What a blend does with the free signs of quaternions.
 enum class Signs {
-    kToHeaviest,  ///< flips each to the side of the term of largest weight: the shortest path
+    kToHeaviest,  ///< flips each to the hemisphere of the term of largest weight: the shortest path
     kAsGiven,     ///< leaves them
 };
 
@@ -86,7 +86,7 @@ template <class Transform>
     return is_finite(result.transform) ? result : Blended<Transform>{heaviest, false};
 }
 
-/// `q` or -q, whichever is on the side of `pivot`.
+/// `q` or -q, whichever is in the hemisphere of `pivot`.
 template <class T>
 [[nodiscard]] Quat<T> aligned(const Quat<T>& q, const Quat<T>& pivot) noexcept {
     return glm::dot(q, pivot) < T(0) ? -q : q;
@@ -108,7 +108,7 @@ template <class T>
     return a;
 }
 
-/// Whether the shorter way from `a` to `b` is decided by rounding: half a turn lies between.
+/// Whether the shorter way from `a` to `b` is decided by rounding: they are 180 degrees apart.
 template <class T>
 [[nodiscard]] bool is_half_turn_apart(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
     return is_half_turn_apart(a.rotation, b.rotation);
@@ -157,7 +157,7 @@ template <class T>
 
 /// The sum of the components, 12, 7 or 8 of them, each times its weight times `scale`: no rigid transform
 /// (Smith 2013, section 3.2.2). Signs::kToHeaviest is not defined where a transform of weight other than 0
-/// is half a turn from the heaviest.
+/// is 180 degrees from the heaviest.
 template <Signs signs, class Transform, class T>
 [[nodiscard]] Blended<Transform> weighted_sum(std::span<const Transform> transforms,
                                               std::span<const T> weights, const Shares<T>& share) noexcept {

@@ -14,8 +14,8 @@ namespace sinew {
 /// ScLERP for n = 2 and does not depend on the order (Kavan et al. 2008, algorithm 3). Neither depends on
 /// the origin: x a, x b gives x times the result, and a x, b x the result times x.
 ///
-/// Not defined where two are half a turn apart (the signs as given then decide), and of n as Dlb, where the
-/// iteration does not settle, or where a rotation is half a turn from its result.
+/// Not defined where two are 180 degrees apart (the signs as given then decide), and of n as Dlb, where the
+/// iteration does not settle, or where a rotation is 180 degrees from its result.
 struct Sclerp {
     static constexpr std::string_view name = "sclerp";
     template <class T>
@@ -50,8 +50,8 @@ struct Sclerp {
             for (std::size_t i = 0; i < transforms.size(); ++i) {
                 if (weights[i] == T(0)) continue;
                 is_half_turn = is_half_turn || is_half_turn_apart(mean.transform, transforms[i]);
-                const DualQuat<T> turn = inverse(mean.transform) * transforms[i];
-                correction = correction + share.of(weights[i]) * to_twist(turn);
+                const DualQuat<T> difference = inverse(mean.transform) * transforms[i];
+                correction = correction + share.of(weights[i]) * to_twist(difference);
             }
             mean.transform = normalized(mean.transform * to_dual_quat(correction));
             if (!is_finite(mean.transform)) return {transforms[share.heaviest], false};

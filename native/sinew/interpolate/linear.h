@@ -16,7 +16,7 @@ namespace sinew {
 // The linear methods make what they give of a weighted sum by
 //   finished(total, heaviest)    `total` of weights of sum 1, defined where its signs are
 
-/// blend() of `a` and `b`, `b` first brought to the side of `a`; without its loops, in a quarter of the time.
+/// blend() of `a` and `b`, `b` first brought to the hemisphere of `a`; without its loops, in a quarter of the time.
 template <class Method, class Transform, class T>
 [[nodiscard]] Blended<Transform> blend_of_two(const Transform& a, const Transform& b, T t) noexcept {
     const T s = T(1) - t;
@@ -66,10 +66,10 @@ struct MatrixLinear {
 };
 
 /// MatrixLinear made rigid again: the rotation nearest to the sum (polar decomposition; Shoemake and Duff
-/// 1992). Between two it takes the shorter way, not at constant pace: the nearer to half a turn, the more of
+/// 1992). Between two it takes the shorter way, not at constant pace: the nearer to 180 degrees, the more of
 /// it happens about t = 1/2. Depends on the origin.
 ///
-/// Not defined where several rotations are as near (half a turn at equal weights): the linear part is then
+/// Not defined where several rotations are as near (180 degrees at equal weights): the linear part is then
 /// the heaviest transform's.
 struct MatrixPolar {
     static constexpr std::string_view name = "matrix_polar";
@@ -100,7 +100,7 @@ struct MatrixPolar {
 /// Rotations by normalised sum, translations by mean (Smith 2013, sections 2.2.1 and 3.6.1, direct
 /// quaternion blending). Between two: the shorter way, not at constant pace. Depends on the origin.
 ///
-/// Not defined where a rotation is half a turn from the heaviest (its sign as given then decides), or where
+/// Not defined where a rotation is 180 degrees from the heaviest (its sign as given then decides), or where
 /// the sum cancels: the rotation is then the heaviest's.
 struct QvNlerp {
     static constexpr std::string_view name = "qv_nlerp";
@@ -129,10 +129,10 @@ struct QvNlerp {
 };
 
 /// Unit dual quaternion along the weighted sum (DLB; Kavan et al. 2008, eq. 4; Smith 2013, sections 2.2.3
-/// and 2.3.1). Between two: about the axis of Sclerp's screw, turn and shift not at constant pace and out of
+/// and 2.3.1). Between two: about the axis of Sclerp's screw, rotation and translation not at constant pace and out of
 /// step by up to 8.15 degrees and 15 % of the shift. Does not depend on the origin.
 ///
-/// Not defined where a rotation is half a turn from the heaviest (its sign as given then decides), or where
+/// Not defined where a rotation is 180 degrees from the heaviest (its sign as given then decides), or where
 /// the sum of the real parts cancels: the result is then the heaviest.
 struct Dlb {
     static constexpr std::string_view name = "dlb";

@@ -12,7 +12,7 @@ namespace sinew {
 /// 2.3.1). Rigid; not the shortest path, as every logarithm is taken from the identity: the result depends
 /// on the orientation of the axes, and constant pace holds only from or to the identity.
 ///
-/// Not defined where a matrix is half a turn from the identity to within rounding: the axis of its
+/// Not defined where a matrix is 180 degrees from the identity to within rounding: the axis of its
 /// logarithm then has the sign that makes to_quat() of it.
 struct MatrixLog {
     static constexpr std::string_view name = "matrix_log";

@@ -9,7 +9,7 @@
 
 namespace sinew {
 
-/// Steps after which an iterated blend counts as not defined. One within a quarter turn takes 5 to 15.
+/// Steps after which an iterated blend counts as not defined. One within 90 degrees takes 5 to 15.
 inline constexpr int kBlendSteps = 100;
 
 /// Unit quaternions `a` to `b` along the great circle through both, the way their signs say (Shoemake 1985;
@@ -31,7 +31,7 @@ template <class T>
 /// constant pace. Of n: the weighted mean on the sphere (Buss and Fillmore 2001, algorithm A1), which does
 /// not depend on the order. Depends on the origin.
 ///
-/// Not defined as QvNlerp, where the iteration does not settle, or where a rotation is half a turn from its
+/// Not defined as QvNlerp, where the iteration does not settle, or where a rotation is 180 degrees from its
 /// result.
 struct QvSlerp {
     static constexpr std::string_view name = "qv_slerp";
@@ -60,8 +60,8 @@ struct QvSlerp {
             for (std::size_t i = 0; i < transforms.size(); ++i) {
                 if (weights[i] == T(0)) continue;
                 is_half_turn = is_half_turn || is_half_turn_apart(rotation, transforms[i].rotation);
-                const Quat<T> turn = glm::conjugate(rotation) * transforms[i].rotation;
-                correction += share.of(weights[i]) * rotation_vector(turn);
+                const Quat<T> difference = glm::conjugate(rotation) * transforms[i].rotation;
+                correction += share.of(weights[i]) * rotation_vector(difference);
             }
             rotation = glm::normalize(rotation * quat_from_rotation_vector(correction));
             if (safe_length(correction) <= T(8) * std::numeric_limits<T>::epsilon()) {

@@ -49,9 +49,9 @@ template <class T>
     return {{before, key, next, beyond}, {-leave, T(1) - onto - arrive, onto + leave, arrive}};
 }
 
-/// The four keys of a span with their signs brought to one side along the chain, from the second outwards:
+/// The four keys of a span with their signs brought to one hemisphere along the chain, from the second outwards:
 /// each step of the curve takes the shorter way, and no sign changes within it. Whether all steps of weight
-/// other than 0 are clear of half a turn.
+/// other than 0 are clear of 180 degrees.
 template <class Transform, class T>
 [[nodiscard]] Blended<std::array<Transform, 4>> along_chain(const SplineSpan<T>& span,
                                                             const std::array<Transform, 4>& keys) noexcept {
@@ -69,7 +69,7 @@ template <class Transform, class T>
 /// Vector form: the weighted sum of the components, which passes through the keys and is rigid only there;
 /// normalized() makes it rigid (Smith 2013, algorithm 3). The sign is that of the second key.
 ///
-/// Not defined where neighbours are half a turn apart (quaternions): signs as given then decide.
+/// Not defined where neighbours are 180 degrees apart (quaternions): signs as given then decide.
 template <class Transform, class T>
 [[nodiscard]] Blended<Transform> spline_vector(const SplineSpan<T>& span,
                                                const std::array<Transform, 4>& keys) noexcept {

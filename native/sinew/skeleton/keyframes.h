@@ -10,7 +10,7 @@
 namespace sinew {
 
 // Keyframes hold each bone relative to its parent, and the in-betweens are made there; root_relative()
-// comes after. Made from root-relative transforms, bones would turn about other centres and leave their
+// comes after. Made from root-relative transforms, bones would rotate about other centres and leave their
 // parents' ends (Smith 2013, figure 3.3).
 
 /// The skeleton between two keyframes (Smith 2013, algorithm 2), each bone by Method::between().

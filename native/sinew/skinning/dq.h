@@ -35,8 +35,8 @@ struct Dq {
     /// The deformed vertex.
     ///
     /// bones       one for each index in `influences`; the signs of the dual quaternions are free
-    /// influences  at least one; weights >= 0 with sum 1. Their order decides the side of a term that is
-    ///             square to the sum of those before it
+    /// influences  at least one; weights >= 0 with sum 1. Their order decides the sign of a term that is
+    ///             perpendicular to the sum of those before it
     ///
     /// If the blend cancels (norm below kDegenerateBlend), the heaviest influence alone moves the vertex.
     template <class T>
@@ -46,8 +46,8 @@ struct Dq {
         DualQuat<T> sum{Quat<T>(T(0), T(0), T(0), T(0)), Quat<T>(T(0), T(0), T(0), T(0))};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
-            const T side = glm::dot(bone.rigid.real, sum.real) < T(0) ? T(-1) : T(1);
-            const T weight = side * influence.weight;
+            const T sign = glm::dot(bone.rigid.real, sum.real) < T(0) ? T(-1) : T(1);
+            const T weight = sign * influence.weight;
             sum.real = sum.real + weight * bone.rigid.real;
             sum.dual = sum.dual + weight * dual_at(bone, rest);
         }
@@ -60,9 +60,9 @@ struct Dq {
         // Dividing once by the squared norm replaces the square root: both products below hold two
         // factors of the sum. dot(real, dual) != 0 does no harm: a point's image never reads it.
         const Vec3<T> axis = vector_part(sum.real);
-        const Vec3<T> turned = glm::cross(axis, glm::cross(axis, rest) + sum.real.w * rest);
-        const Vec3<T> shift = vector_part(sum.dual * glm::conjugate(sum.real));
-        return rest + (T(2) / squared_norm) * (turned + shift);
+        const Vec3<T> rotated = glm::cross(axis, glm::cross(axis, rest) + sum.real.w * rest);
+        const Vec3<T> translation = vector_part(sum.dual * glm::conjugate(sum.real));
+        return rest + (T(2) / squared_norm) * (rotated + translation);
     }
 
 private:

@@ -18,13 +18,13 @@ namespace sinew {
 /// jump. A vertex of one bone never does. Rotations are measured from the rest pose: if the whole character is
 /// rotated by its bones, the shape of its joints changes.
 struct Log {
-    static constexpr MethodInfo info{
-        4,
-        "log",
-        "Log-Matrix",
-        "Spreads a twist evenly along limbs near their rest pose; flips where a bone passes 180 degrees from rest",
-        "Alexa 2002; Cordier, Magnenat-Thalmann 2005",
-        Needs::rest_bones};
+    static constexpr MethodInfo info{4,
+                                     "log",
+                                     "Log-Matrix",
+                                     "Spreads a twist evenly along limbs near their rest pose; flips where a "
+                                     "bone passes 180 degrees from rest",
+                                     "Alexa 2002; Cordier, Magnenat-Thalmann 2005",
+                                     Needs::rest_bones};
     static const Kernel& kernel() noexcept;
 
     template <class T>

@@ -36,7 +36,7 @@ struct Parameter {
     std::string_view description;  // one sentence
     std::string_view unit;         // "", "length", "angle" (radians), "factor"
     ParameterKind kind;
-    double initial = 0.0;  // the default; 0 or 1 of a boolean, the place in `choices` of a choice
+    double initial = 0.0;  // the default; 0 or 1 of a boolean, the index in `choices` of a choice
     double minimum = -std::numeric_limits<double>::infinity();
     double maximum = std::numeric_limits<double>::infinity();
     std::span<const std::string_view> choices{};  // of a choice

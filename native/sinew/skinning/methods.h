@@ -30,7 +30,7 @@ constexpr void for_each_method(const Call& call) {
 inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
     std::apply([](const auto&... methods) { return std::array{methods.info...}; }, Methods{});
 
-/// The place of `method` in the list, or kMethodCount.
+/// The index of `method` in the list, or kMethodCount.
 [[nodiscard]] constexpr std::size_t index_of(const MethodInfo& method) noexcept {
     std::size_t index = 0;
     while (index < kMethodCount && !(kMethods[index] == method)) ++index;

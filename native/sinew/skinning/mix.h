@@ -16,7 +16,8 @@ struct Mix {
          ParameterKind::vertex_group},
     };
     static constexpr StageInfo info{
-        "mix", "Mix", "A vertex group says where another method takes over, as at a twisted wrist or a bent elbow",
+        "mix", "Mix",
+        "A vertex group says where another method takes over, as at a twisted wrist or a bent elbow",
         "Kavan, Zara 2005 (as a mix of linear and spherical blending)", kParameters};
 
     /// a, b    where the first and the second method put the vertex

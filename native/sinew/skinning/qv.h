@@ -10,7 +10,7 @@
 namespace sinew {
 
 /// Quaternion-vector blending: rotations by normalised sum, translations by weighted mean
-/// (Smith 2013, section 3.6, "direct quaternion blending"; Hejl 2004). Every blend turns about the
+/// (Smith 2013, section 3.6, "direct quaternion blending"; Hejl 2004). Every blend rotates about the
 /// origin of the space it is computed in, so the result depends on where that origin is.
 struct Qv {
     static constexpr MethodInfo info{
@@ -47,9 +47,9 @@ struct Qv {
         Vec3<T> translation{T(0)};
         for (const Influence<T>& influence : influences) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
-            // q and -q are one rotation but blend to two: keep each term on the side of the sum so far.
-            const T side = glm::dot(bone.rigid.rotation, rotation) < T(0) ? T(-1) : T(1);
-            rotation = rotation + (side * influence.weight) * bone.rigid.rotation;
+            // q and -q are one rotation but blend to two: keep each term in the hemisphere of the sum so far.
+            const T sign = glm::dot(bone.rigid.rotation, rotation) < T(0) ? T(-1) : T(1);
+            rotation = rotation + (sign * influence.weight) * bone.rigid.rotation;
             Vec3<T> offset = bone.rigid.translation;
             if (bone.has_scale) {
                 offset += rotate(bone.rigid.rotation, bone.scale_displacement(rest));

@@ -43,12 +43,12 @@ template <class T>
     const Vec3<T> yz = glm::cross(a.linear[1], a.linear[2]);
     // The cofactors are the inverse transpose times the determinant, and exist where it is 0.
     const Mat3<T> cofactors(yz, glm::cross(a.linear[2], a.linear[0]), glm::cross(a.linear[0], a.linear[1]));
-    const Vec3<T> turned = unit(cofactors * normal, Vec3<T>(T(0)));
-    return glm::dot(a.linear[0], yz) < T(0) ? -turned : turned;
+    const Vec3<T> rotated = unit(cofactors * normal, Vec3<T>(T(0)));
+    return glm::dot(a.linear[0], yz) < T(0) ? -rotated : rotated;
 }
 
-/// The rigid transform nearest to `a`: its linear part becomes nearest_rotation(). One that has no
-/// direction left (zero, or all of it on one line) gives any of the nearest.
+/// The rigid transform nearest to `a`: its linear part becomes nearest_rotation(). One without
+/// a direction (zero, or all of it on one line) gives any of the nearest.
 template <class T>
 [[nodiscard]] Affine<T> normalized(const Affine<T>& a) noexcept {
     return {to_mat3(nearest_rotation(a.linear).rotation), a.translation};

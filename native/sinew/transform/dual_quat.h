@@ -37,7 +37,7 @@ template <class T>
     return {factor.real * a.real, factor.real * a.dual + factor.dual * a.real};
 }
 
-/// real* + e dual*: the quaternion conjugate, which turns products round. It undoes a unit `a`.
+/// real* + e dual*: the quaternion conjugate, which reverses products. It undoes a unit `a`.
 template <class T>
 [[nodiscard]] DualQuat<T> conjugate(const DualQuat<T>& a) noexcept {
     return {glm::conjugate(a.real), glm::conjugate(a.dual)};
@@ -98,7 +98,7 @@ template <class T>
     return rotate(a.real, vector);
 }
 
-/// `normal` turned and brought to unit length; (0, 0, 0) stays.
+/// `normal` rotated and brought to unit length; (0, 0, 0) stays.
 template <class T>
 [[nodiscard]] Vec3<T> transform_normal(const DualQuat<T>& a, const Vec3<T>& normal) noexcept {
     return rotate(a.real, unit(normal, Vec3<T>(T(0))));

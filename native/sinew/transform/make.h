@@ -22,14 +22,14 @@ template <template <class> class Target, template <class> class Source, class T>
     }
 }
 
-/// The turn by `angle` radians about `axis`, of any length, through the origin. An axis of length 0 gives
+/// The rotation by `angle` radians about `axis`, of any length, through the origin. An axis of length 0 gives
 /// the identity.
 template <template <class> class Target, class T>
 [[nodiscard]] Target<T> from_axis_angle(const Vec3<T>& axis, T angle) noexcept {
     return to<Target>(QuatVec<T>{quat_from_axis_angle(axis, angle), Vec3<T>(T(0))});
 }
 
-/// The turn of `rotation`. Requires orthonormal columns and determinant +1 to within rounding.
+/// The rotation `rotation`. Requires orthonormal columns and determinant +1 to within rounding.
 template <template <class> class Target, class T>
 [[nodiscard]] Target<T> from_rotation_matrix(const Mat3<T>& rotation) noexcept {
     return to<Target>(Affine<T>{rotation, Vec3<T>(T(0))});

@@ -66,7 +66,7 @@ void jacobi(Mat4Rows<T>& k, Mat4Rows<T>& vectors) noexcept {
 }  // namespace detail
 
 /// The rotation nearest to `linear` in the sum of squared differences, as a unit quaternion with w >= 0:
-/// the turn of the polar decomposition where the determinant is positive (Horn 1987, section 4).
+/// the rotation of the polar decomposition where the determinant is positive (Horn 1987, section 4).
 ///
 /// `gap` is 2 (s2 + s3), the singular values in falling order, the last negative where `linear` mirrors.
 /// At 0 other rotations are as near and the one returned is any of them; for the zero matrix the identity.

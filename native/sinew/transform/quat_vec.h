@@ -36,7 +36,7 @@ template <class T>
     return rotate(a.rotation, vector);
 }
 
-/// `normal` turned and brought to unit length; (0, 0, 0) stays.
+/// `normal` rotated and brought to unit length; (0, 0, 0) stays.
 template <class T>
 [[nodiscard]] Vec3<T> transform_normal(const QuatVec<T>& a, const Vec3<T>& normal) noexcept {
     return rotate(a.rotation, unit(normal, Vec3<T>(T(0))));

@@ -12,7 +12,7 @@ struct RigidDistance {
     T translation = T(0);
 };
 
-/// The angle of the turn from `a` to `b`, 0 to pi, and the distance of the images of the origin. The same
+/// The angle of the rotation from `a` to `b`, 0 to pi, and the distance of the images of the origin. The same
 /// for x a and x b, for any rigid x; the angle is also the same for a x and b x.
 ///
 /// Rotations of unit length; the signs of quaternions do not matter.

@@ -32,7 +32,7 @@ template <class T>
     return hypot(v.x, v.y, v.z);
 }
 
-/// Unit quaternion of the turn by `angle` radians about `axis`, of any length. An axis of length 0 gives
+/// Unit quaternion of the rotation by `angle` radians about `axis`, of any length. An axis of length 0 gives
 /// the identity.
 template <class T>
 [[nodiscard]] Quat<T> quat_from_axis_angle(const Vec3<T>& axis, T angle) noexcept {
@@ -46,7 +46,7 @@ template <class T>
 }
 
 /// Axis times angle of the unit quaternion `q`, radians, of length 0 to pi: the shorter of the two ways
-/// that q and -q stand for. Where both are half a turn (w = 0) the signs of `q` decide.
+/// that q and -q stand for. Where both are 180 degrees (w = 0) the signs of `q` decide.
 template <class T>
 [[nodiscard]] Vec3<T> rotation_vector(const Quat<T>& q) noexcept {
     using std::atan2;
@@ -67,16 +67,16 @@ template <class T>
     return Quat<T>(cos(half), v.x, v.y, v.z);
 }
 
-/// The angle of the turn from `a` to `b`, both of unit length and either sign: 0 to pi.
+/// The angle of the rotation from `a` to `b`, both of unit length and either sign: 0 to pi.
 template <class T>
 [[nodiscard]] T angle_between(const Quat<T>& a, const Quat<T>& b) noexcept {
     using std::abs;
     using std::atan2;
-    const Quat<T> turn = glm::conjugate(a) * b;
-    return T(2) * atan2(safe_length(vector_part(turn)), abs(turn.w));
+    const Quat<T> difference = glm::conjugate(a) * b;
+    return T(2) * atan2(safe_length(vector_part(difference)), abs(difference.w));
 }
 
-/// Whether two unit quaternions are half a turn apart to within rounding, so that neither way round is
+/// Whether two unit quaternions are 180 degrees apart to within rounding, so that neither way round is
 /// the shorter one.
 template <class T>
 [[nodiscard]] bool is_half_turn_apart(const Quat<T>& a, const Quat<T>& b) noexcept {

@@ -7,7 +7,7 @@
 
 namespace sinew {
 
-/// A turn about a line and a shift along it: every rigid transform is one (Chasles 1830).
+/// A rotation about a line and a translation along it: every rigid transform is one (Chasles 1830).
 ///
 /// axis         unit direction of the line
 /// moment       point x axis, for any point on the line
@@ -40,7 +40,7 @@ template <class T>
 /// Unit dual quaternion of `screw` (Daniilidis 1999, eq. 13; Kavan et al. 2008, section 3.3).
 ///
 /// Axis and moment are Pluecker coordinates: both are divided by the length of the axis, and a part of the
-/// moment along the axis is left out. An axis of length 0 gives the identity.
+/// moment along the axis is not read. An axis of length 0 gives the identity.
 template <class T>
 [[nodiscard]] DualQuat<T> to_dual_quat(const Screw<T>& screw) noexcept {
     using std::cos;
@@ -51,10 +51,11 @@ template <class T>
     Vec3<T> moment = screw.moment / length;
     moment -= axis * glm::dot(axis, moment);
     const T half = screw.angle * T(0.5);
-    const T shift = screw.translation * T(0.5);
-    const Vec3<T> turn = sin(half) * axis;
-    const Vec3<T> dual = sin(half) * moment + (shift * cos(half)) * axis;
-    return {Quat<T>(cos(half), turn.x, turn.y, turn.z), Quat<T>(-shift * sin(half), dual.x, dual.y, dual.z)};
+    const T along = screw.translation * T(0.5);
+    const Vec3<T> axial = sin(half) * axis;
+    const Vec3<T> dual = sin(half) * moment + (along * cos(half)) * axis;
+    return {Quat<T>(cos(half), axial.x, axial.y, axial.z),
+            Quat<T>(-along * sin(half), dual.x, dual.y, dual.z)};
 }
 
 template <class T>
@@ -69,9 +70,9 @@ template <class T>
 
 /// The screw of the unit dual quaternion `a`, its angle 0 to pi (Kavan et al. 2008, section 3.3).
 ///
-/// A turn that moves nothing beyond rounding counts as none: the axis is then that of the translation, the
-/// moment 0, the translation >= 0; for the identity the axis is z. At half a turn the signs of `a` decide
-/// between the two directions of the axis. The moment grows as 1 / angle for small turns.
+/// A rotation that moves nothing beyond rounding counts as none: the axis is then that of the translation, the
+/// moment 0, the translation >= 0; for the identity the axis is z. At 180 degrees the signs of `a` decide
+/// between the two directions of the axis. The moment grows as 1 / angle for small rotations.
 template <class T>
 [[nodiscard]] Screw<T> to_screw(const DualQuat<T>& a) noexcept {
     using std::atan2;
@@ -79,16 +80,16 @@ template <class T>
     const Vec3<T> v = vector_part(near.real);
     const T sine = safe_length(v);
     if (sine <= std::numeric_limits<T>::epsilon()) {
-        const Vec3<T> shift = translation(near);
-        return {unit(shift, Vec3<T>(T(0), T(0), T(1))), Vec3<T>(T(0)), T(0), safe_length(shift)};
+        const Vec3<T> path = translation(near);
+        return {unit(path, Vec3<T>(T(0), T(0), T(1))), Vec3<T>(T(0)), T(0), safe_length(path)};
     }
     const Vec3<T> axis = v / sine;
-    const T shift = glm::dot(axis, translation(near));
-    // From the dual part: sin(angle/2) moment + (shift/2) cos(angle/2) axis.
+    const T along = glm::dot(axis, translation(near));
+    // From the dual part: sin(angle/2) moment + (along/2) cos(angle/2) axis.
     Vec3<T> moment = vector_part(near.dual);
-    // Twice: what is left of a long vector by the first is square to the axis only to its rounding.
+    // Twice: the difference of long vectors is perpendicular to the axis only to its rounding.
     for (int pass = 0; pass < 2; ++pass) moment -= axis * glm::dot(axis, moment);
-    return {axis, moment / sine, T(2) * atan2(sine, near.real.w), shift};
+    return {axis, moment / sine, T(2) * atan2(sine, near.real.w), along};
 }
 
 template <class T>

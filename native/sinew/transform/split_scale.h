@@ -34,7 +34,7 @@ struct ScaleSplit {
 /// Unit quaternion that Blender reads from `axes`, whose columns are of unit length or zero.
 ///
 /// For a rotation it is the rotation's. With zero columns it is nobody's, and kept for what follows from it:
-/// the place of vertices that share a bone of no width with another.
+/// the positions of vertices that share a bone of no width with another.
 template <class T>
 [[nodiscard]] Quat<T> quat_of_columns(const Mat3<T>& axes) noexcept {
     // Which of the four components is computed first decides the result where the columns are no rotation.
@@ -44,27 +44,27 @@ template <class T>
     } else if (axes[0][0] < -axes[1][1]) {
         first = 2;
     }
-    const Vec3<T> turn(axes[1][2] - axes[2][1], axes[2][0] - axes[0][2], axes[0][1] - axes[1][0]);
+    const Vec3<T> difference(axes[1][2] - axes[2][1], axes[2][0] - axes[0][2], axes[0][1] - axes[1][0]);
     if (first == 3) {
         const T s = T(2) * std::sqrt(T(1) + axes[0][0] + axes[1][1] + axes[2][2]);
-        return glm::normalize(Quat<T>(s / T(4), turn.x / s, turn.y / s, turn.z / s));
+        return glm::normalize(Quat<T>(s / T(4), difference.x / s, difference.y / s, difference.z / s));
     }
     const int second = (first + 1) % 3;
     const int third = (first + 2) % 3;
     T s = T(2) * std::sqrt(T(1) + axes[first][first] - axes[second][second] - axes[third][third]);
-    if (turn[first] < T(0)) s = -s;
+    if (difference[first] < T(0)) s = -s;
     Vec3<T> v{};
     v[first] = s / T(4);
     v[second] = (axes[first][second] + axes[second][first]) / s;
     v[third] = (axes[first][third] + axes[third][first]) / s;
-    return glm::normalize(Quat<T>(turn[first] / s, v.x, v.y, v.z));
+    return glm::normalize(Quat<T>(difference[first] / s, v.x, v.y, v.z));
 }
 
 /// The right-handed rotation that keeps the direction of the Y column of `linear` and makes the others
-/// square to it. A mirror in `linear` is not in the rotation.
+/// perpendicular to it. A mirror in `linear` is not in the rotation.
 ///
 /// Columns below 1e-6 of the longest count as zero. Without Y it is the identity; where X or Z is zero, or X
-/// along Y, quat_of_columns() of what is left decides.
+/// along Y, quat_of_columns() of the others decides.
 template <class T>
 [[nodiscard]] Mat3<T> rotation_keeping_y(const Mat3<T>& linear) noexcept {
     // Bones come as float32: what is shorter than this is their rounding.
@@ -87,7 +87,7 @@ template <class T>
         x = glm::cross(y, Vec3<T>(y.y, y.z, y.x));
     }
     if (is_zero(x)) return to_mat3(quat_of_columns(Mat3<T>(Vec3<T>(T(0)), y, Vec3<T>(T(0)))));
-    // Twice, because a short difference of long vectors is not square to y.
+    // Twice, because a short difference of long vectors is not perpendicular to y.
     x = glm::normalize(x);
     x = glm::normalize(x - y * glm::dot(y, x));
     Mat3<T> axes(x, y, glm::cross(x, y));

@@ -23,7 +23,7 @@ template <class T>
     return {factor * a.angular, factor * a.linear};
 }
 
-/// The logarithm of `a`, its angle 0 to pi. At half a turn the two signs of the axis are both logarithms,
+/// The logarithm of `a`, its angle 0 to pi. At 180 degrees the two signs of the axis are both logarithms,
 /// and those of a.rotation decide (Murray, Li, Sastry 1994, section 2.3.3).
 template <class T>
 [[nodiscard]] Twist<T> to_twist(const QuatVec<T>& a) noexcept {

@@ -39,6 +39,15 @@ void deform() {
                    deformer.bone_count() == 2 && deformer.method() == method,
                "a Deformer says what it was made of");
     }
+    const sinew::Binding binding({rest, offsets, bones, weights});
+    expect(binding.vertex_count() == 3 && binding.influence_count() == 3 && binding.bone_count() == 2,
+           "a Binding says what it was made of");
+    const std::vector<float> shares{0.0f, 0.5f, 1.0f};
+    const sinew::Deformer mixed(binding, sinew::Lbs::info, sinew::MixData{sinew::Dq::info, shares});
+    std::vector<sinew::Vec3<float>> points(rest.size());
+    mixed.deform(pose, {}, points);
+    expect(points[1] == sinew::Vec3<float>(100, 202, 300), "both methods move the second point alike");
+    expect(mixed.mixed_method()->name == "dq", "a mix says what it adds");
 }
 
 void interpolate() {

@@ -29,13 +29,13 @@ struct DqKernel {
         if (!scaled(d, palette, bone, rest, by)) return;
         const float* const row = row_of(palette, bone);
         const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
-        const Points<D> turned = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
+        const Points<D> rotated = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
         const Vec<D> half = hn::Mul(signed_weight, hn::Set(d, 0.5f));
         const Vec<D> along = hn::MulAdd(axis.x, by.x, hn::MulAdd(axis.y, by.y, hn::Mul(axis.z, by.z)));
         sum.value[4] = hn::NegMulAdd(half, along, sum.value[4]);
-        sum.value[5] = hn::MulAdd(half, turned.x, sum.value[5]);
-        sum.value[6] = hn::MulAdd(half, turned.y, sum.value[6]);
-        sum.value[7] = hn::MulAdd(half, turned.z, sum.value[7]);
+        sum.value[5] = hn::MulAdd(half, rotated.x, sum.value[5]);
+        sum.value[6] = hn::MulAdd(half, rotated.y, sum.value[6]);
+        sum.value[7] = hn::MulAdd(half, rotated.z, sum.value[7]);
     }
 
     /// Division by the squared norm replaces the square root, as in skinning/dq.h.
@@ -48,11 +48,11 @@ struct DqKernel {
                        hn::MulAdd(real[1], real[1], hn::MulAdd(real[2], real[2], hn::Mul(real[3], real[3]))));
         const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
         const Points<D> axis{real[1], real[2], real[3]};
-        const Points<D> shift{dual[1], dual[2], dual[3]};
-        const Points<D> inner = add_cross<D>(add_scaled<D>(shift, real[0], p), axis, p);
-        const Points<D> moved{hn::NegMulAdd(dual[0], axis.x, hn::Mul(real[0], shift.x)),
-                              hn::NegMulAdd(dual[0], axis.y, hn::Mul(real[0], shift.y)),
-                              hn::NegMulAdd(dual[0], axis.z, hn::Mul(real[0], shift.z))};
+        const Points<D> translation{dual[1], dual[2], dual[3]};
+        const Points<D> inner = add_cross<D>(add_scaled<D>(translation, real[0], p), axis, p);
+        const Points<D> moved{hn::NegMulAdd(dual[0], axis.x, hn::Mul(real[0], translation.x)),
+                              hn::NegMulAdd(dual[0], axis.y, hn::Mul(real[0], translation.y)),
+                              hn::NegMulAdd(dual[0], axis.z, hn::Mul(real[0], translation.z))};
         return add_scaled<D>(p, scale, add_cross<D>(moved, axis, inner));
     }
 
@@ -78,7 +78,7 @@ void deform_dq(const Frame& frame, std::size_t begin, std::size_t end) {
 }
 
 void prepare_dq(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                    Palette& palette) {
+                Palette& palette) {
     prepare_rigid<DqKernel>(used, posed_from_rest, palette);
 }
 

@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "sinew/deform/kernels.h"
-#include "sinew/transform/convert.h"
 #include "sinew/deform/targets.h"
+#include "sinew/transform/convert.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sinew/deform/kernels/lbs.cpp"
@@ -22,7 +22,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// `v`, which the compiler then does not load anew for each of its uses, as GCC else does: a tenth of the
+/// `v`, which the compiler then does not load again for each of its uses, as GCC would: a tenth of the
 /// time of a kernel that is bound by loads on AVX-512.
 template <class V>
 HWY_INLINE V in_register(V v) {
@@ -77,10 +77,8 @@ HWY_INLINE void add_along(D d, const Bone& bone, std::size_t row, Vec<D> Points<
     const Vec<D> z = bone.at(d, 8 + row);
     const Vec<D> translation = bone.at(d, 12 + row);
     for (std::size_t v = 0; v < kVectors; ++v) {
-        const Vec<D> moved =
-            hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, translation)));
-        sum[v].*axis =
-            kWeighted ? hn::MulAdd(weight[v], moved, sum[v].*axis) : hn::Add(moved, sum[v].*axis);
+        const Vec<D> moved = hn::MulAdd(x, p[v].x, hn::MulAdd(y, p[v].y, hn::MulAdd(z, p[v].z, translation)));
+        sum[v].*axis = kWeighted ? hn::MulAdd(weight[v], moved, sum[v].*axis) : hn::Add(moved, sum[v].*axis);
     }
 }
 
@@ -100,8 +98,9 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
 /// other_of  what the bone of an influence differs from it; if plain, that bone
 /// kCount    the number of influences, or 0 for `count`
 template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class OtherOf>
-HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b, std::size_t lane,
-                             std::size_t count, const float* first, const OtherOf& other_of) {
+HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b,
+                             std::size_t lane, std::size_t count, const float* first,
+                             const OtherOf& other_of) {
     const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
     const std::size_t step = hn::Lanes(d);
     Points<D> p[kVectors];
@@ -303,8 +302,8 @@ void deform_lbs(const Frame& frame, std::size_t begin, std::size_t end) {
 #if HWY_TARGET != HWY_SCALAR
 
 /// The columns of each displacement, for lbs.
-void prepare_lbs(std::span<const std::int32_t> used,
-                            std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                 Palette& palette) {
     const hn::CappedTag<float, 4> d;
     const auto three = hn::FirstN(d, 3);
     // Of vectors, as the identity's other columns are this one in other lanes.
@@ -320,28 +319,29 @@ void prepare_lbs(std::span<const std::int32_t> used,
             hn::Store(displacement, d, to + 4 * c);
         }
         // From one before, as there is none after the last.
-        const auto shift = hn::ShiftRightLanes<1>(d, hn::LoadU(d, from + 8));
-        hn::Store(shift, d, to + 12);
-        const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(shift, shift)));
+        const auto translation = hn::ShiftRightLanes<1>(d, hn::LoadU(d, from + 8));
+        hn::Store(translation, d, to + 12);
+        const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(translation, translation)));
         const float length = hn::GetLane(hn::SumOfLanes(d, squares));
-        palette.sizes[i] = length < kLong ? std::max(size, kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
+        palette.sizes[i] =
+            length < kLong ? std::max(size, kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
     }
 }
 
 #else
 
-void prepare_lbs(std::span<const std::int32_t> used,
-                            std::span<const Affine<float>> posed_from_rest, Palette& palette) {
+void prepare_lbs(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                 Palette& palette) {
     for (std::size_t i = 0; i < used.size(); ++i) {
         const Affine<float>& motion = posed_from_rest[static_cast<std::size_t>(used[i])];
         const Mat3<float> m = motion.linear - Mat3<float>(1.0f);
         Float4* const to = &palette.bones[kLbsColumns * i];
         for (int c = 0; c < 3; ++c) to[c] = {{m[c].x, m[c].y, m[c].z, 0.0f}};
-        const Vec3<float>& shift = motion.translation;
-        to[3] = {{shift.x, shift.y, shift.z, 0.0f}};
+        const Vec3<float>& translation = motion.translation;
+        to[3] = {{translation.x, translation.y, translation.z, 0.0f}};
         const float length = glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]);
-        palette.sizes[i] =
-            length < kLong ? std::max(glm::dot(shift, shift), kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
+        palette.sizes[i] = length < kLong ? std::max(glm::dot(translation, translation), kMinSize * kMinSize)
+                                          : std::numeric_limits<float>::infinity();
     }
 }
 

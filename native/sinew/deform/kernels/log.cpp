@@ -54,8 +54,9 @@ struct LogKernel {
                                          2.4801040126476437e-05f,
                                          -2.7524663437361596e-07f,
                                          1.990741571589183e-09f};
-        static constexpr float kRest[] = {0.1666666716337204f,     -0.033333323895931244f, 0.0031745603773742914f,
-                                          -0.00017629233479965478f, 6.35449077890371e-06f,  -1.4276758975029225e-07f};
+        static constexpr float kRest[] = {0.1666666716337204f,    -0.033333323895931244f,
+                                          0.0031745603773742914f, -0.00017629233479965478f,
+                                          6.35449077890371e-06f,  -1.4276758975029225e-07f};
         const Points<D> angular{sum.value[0], sum.value[1], sum.value[2]};
         const Points<D> linear{sum.value[4], sum.value[5], sum.value[6]};
         const Vec<D> half = hn::Set(d, 0.5f);
@@ -65,9 +66,9 @@ struct LogKernel {
         const Vec<D> sinc = polynomial(d, y, kSinc);
         const Vec<D> w = polynomial(d, y, kCos);
         const Points<D> axis{hn::Mul(sinc, by_half.x), hn::Mul(sinc, by_half.y), hn::Mul(sinc, by_half.z)};
-        // Divided by its square, the quaternion rotates also where rounding left it no longer of length 1.
-        const Vec<D> squared_norm = hn::MulAdd(
-            w, w, hn::MulAdd(axis.x, axis.x, hn::MulAdd(axis.y, axis.y, hn::Mul(axis.z, axis.z))));
+        // Divided by its square, the quaternion rotates also where rounding changed its length.
+        const Vec<D> squared_norm =
+            hn::MulAdd(w, w, hn::MulAdd(axis.x, axis.x, hn::MulAdd(axis.y, axis.y, hn::Mul(axis.z, axis.z))));
         const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
         const Points<D> inner = add_scaled<D>(cross<D>(axis, p), w, p);
         const Points<D> rotated = add_scaled<D>(p, scale, cross<D>(axis, inner));
@@ -75,11 +76,9 @@ struct LogKernel {
         const Points<D> across = cross<D>(angular, linear);
         const Vec<D> first = hn::Mul(half, hn::Mul(sinc, sinc));
         const Vec<D> second = polynomial(d, y, kRest);
-        const Points<D> terms = add_cross<D>({hn::Mul(first, across.x), hn::Mul(first, across.y),
-                                              hn::Mul(first, across.z)},
-                                             angular,
-                                             {hn::Mul(second, across.x), hn::Mul(second, across.y),
-                                              hn::Mul(second, across.z)});
+        const Points<D> terms = add_cross<D>(
+            {hn::Mul(first, across.x), hn::Mul(first, across.y), hn::Mul(first, across.z)}, angular,
+            {hn::Mul(second, across.x), hn::Mul(second, across.y), hn::Mul(second, across.z)});
         return add<D>(rotated, add<D>(linear, terms));
     }
 
@@ -89,17 +88,17 @@ struct LogKernel {
         const BoneVec one = hn::Set(d, 1.0);
         // The angle by the tangent of an eighth of it, sqrt(2) - 1 at most: of the series of the arc tangent the next
         // term is below 1e-12. w >= 0, so no denominator is small.
-        static constexpr double kArcTangent[] = {1.0,        -1.0 / 3.0,  1.0 / 5.0,  -1.0 / 7.0,  1.0 / 9.0,
-                                                 -1.0 / 11.0, 1.0 / 13.0, -1.0 / 15.0, 1.0 / 17.0, -1.0 / 19.0,
-                                                 1.0 / 21.0, -1.0 / 23.0, 1.0 / 25.0, -1.0 / 27.0};
+        static constexpr double kArcTangent[] = {
+            1.0,         -1.0 / 3.0, 1.0 / 5.0,   -1.0 / 7.0, 1.0 / 9.0,   -1.0 / 11.0, 1.0 / 13.0,
+            -1.0 / 15.0, 1.0 / 17.0, -1.0 / 19.0, 1.0 / 21.0, -1.0 / 23.0, 1.0 / 25.0,  -1.0 / 27.0};
         const BoneVec sine_squared = dot(q.v, q.v);
         const BoneVec more = hn::Add(one, q.w);
         const BoneVec quarter_squared = hn::Div(sine_squared, hn::Mul(more, more));
         const BoneVec root = hn::Add(one, hn::Sqrt(hn::Add(one, quarter_squared)));
         const BoneVec eighth_squared = hn::Div(quarter_squared, hn::Mul(root, root));
         // Angle / sine of its half.
-        const BoneVec factor = hn::Div(
-            hn::Mul(hn::Set(d, 8.0), polynomial(d, eighth_squared, kArcTangent)), hn::Mul(more, root));
+        const BoneVec factor = hn::Div(hn::Mul(hn::Set(d, 8.0), polynomial(d, eighth_squared, kArcTangent)),
+                                       hn::Mul(more, root));
         const BonePoints angular{hn::Mul(factor, q.v.x), hn::Mul(factor, q.v.y), hn::Mul(factor, q.v.z)};
         // (1 - x cot(x)) / 4 x^2 with x half the angle; its series where the difference cancels.
         static constexpr double kSeries[] = {1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0};
@@ -109,8 +108,9 @@ struct LogKernel {
             hn::IfThenElse(hn::Lt(angle_squared, hn::Set(d, 4e-4)), polynomial(d, angle_squared, kSeries),
                            hn::Div(hn::Sub(one, cotangent), angle_squared));
         const BonePoints across = cross<BoneTag>(angular, translation);
-        const BonePoints linear = add_scaled<BoneTag>(
-            add_scaled<BoneTag>(translation, hn::Set(d, -0.5), across), third, cross<BoneTag>(angular, across));
+        const BonePoints linear =
+            add_scaled<BoneTag>(add_scaled<BoneTag>(translation, hn::Set(d, -0.5), across), third,
+                                cross<BoneTag>(angular, across));
         row[0] = angular.x;
         row[1] = angular.y;
         row[2] = angular.z;
@@ -152,7 +152,8 @@ void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
         return to_twist(QuatVec<double>{rotation, rotate(rotation, displacement)}).linear;
     };
     const Mat3<double> m = bone.scale.linear - Mat3<double>(1.0);
-    write_displacement(Mat3<double>(added(m[0]), added(m[1]), added(m[2])), added(bone.scale.translation), scale);
+    write_displacement(Mat3<double>(added(m[0]), added(m[1]), added(m[2])), added(bone.scale.translation),
+                       scale);
 }
 
 constexpr Kernel kKernel{kRestRow, true, prepare_rigid_method<Log, write_bone>,

@@ -21,7 +21,7 @@ namespace HWY_NAMESPACE {
 struct QvKernel {
     static constexpr std::size_t kSignedFloat4s = 1;
 
-    /// The translation that also moves by the turned scale.
+    /// The translation that also moves by the rotated scale.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D>& sum) {
@@ -30,10 +30,10 @@ struct QvKernel {
         const float* const row = row_of(palette, bone);
         const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
         const Points<D> inner = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
-        const Points<D> turned = add_scaled<D>(by, hn::Set(d, 2.0f), cross<D>(axis, inner));
-        sum.value[4] = hn::MulAdd(weight, turned.x, sum.value[4]);
-        sum.value[5] = hn::MulAdd(weight, turned.y, sum.value[5]);
-        sum.value[6] = hn::MulAdd(weight, turned.z, sum.value[6]);
+        const Points<D> rotated = add_scaled<D>(by, hn::Set(d, 2.0f), cross<D>(axis, inner));
+        sum.value[4] = hn::MulAdd(weight, rotated.x, sum.value[4]);
+        sum.value[5] = hn::MulAdd(weight, rotated.y, sum.value[5]);
+        sum.value[6] = hn::MulAdd(weight, rotated.z, sum.value[6]);
     }
 
     template <class D>
@@ -44,8 +44,8 @@ struct QvKernel {
         const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
         const Points<D> axis{q[1], q[2], q[3]};
         const Points<D> inner = add_scaled<D>(cross<D>(axis, p), q[0], p);
-        const Points<D> turned = add_scaled<D>(p, scale, cross<D>(axis, inner));
-        return {hn::Add(turned.x, q[4]), hn::Add(turned.y, q[5]), hn::Add(turned.z, q[6])};
+        const Points<D> rotated = add_scaled<D>(p, scale, cross<D>(axis, inner));
+        return {hn::Add(rotated.x, q[4]), hn::Add(rotated.y, q[5]), hn::Add(rotated.z, q[6])};
     }
 
     static HWY_INLINE void write_row(const Quats& rotation, const BonePoints& translation, BoneVec* row) {
@@ -65,7 +65,7 @@ void deform_qv(const Frame& frame, std::size_t begin, std::size_t end) {
 }
 
 void prepare_qv(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
-                    Palette& palette) {
+                Palette& palette) {
     prepare_rigid<QvKernel>(used, posed_from_rest, palette);
 }
 
