@@ -75,6 +75,7 @@ SENTENCES = (
     "was deleted, or is in no collection",
     "is linked from another file",
     "is a simulation",
+    "its parent deforms it as well",
 )
 
 
