@@ -26,7 +26,7 @@ class ShapeKeys:
         if self.names != other.names or not np.array_equal(self.basis, other.basis):
             return False
         return all(
-            (a is None) == (b is None) and (a is None or np.array_equal(a, b))
+            a is b if a is None or b is None else np.array_equal(a, b)
             for a, b in zip(self.moves, other.moves, strict=True)
         )
 
