@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from . import animation, front, node_group, points, pose_driver, properties, stack
+from . import animation, animation_paths, front, node_group, points, pose_driver, properties, stack
 from .heat import heat_view
 from .stack import armature_modifier, sinew_modifier
 from .updates import updates_suspended
@@ -187,7 +187,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         for modifier in stack.armature_modifiers(obj):
             stand_in = _stand_in(obj, modifier)
             # What an animation sets was left alone.
-            if not animation.is_visibility_animated(obj, modifier):
+            if not animation_paths.is_visibility_animated(obj, modifier):
                 _show(modifier, stand_in.show_viewport, stand_in.show_render)
         _show(nodes, False, False)
     properties.store(settings, "standing_in", on)
@@ -234,7 +234,7 @@ def _switch_off(obj: bpy.types.Object) -> None:
             properties.store(stand_in, "show_viewport", modifier.show_viewport)
             properties.store(stand_in, "show_render", modifier.show_render)
         # What an animation sets it would set again with the next frame, and tells Sinew until then.
-        if not animation.is_visibility_animated(obj, modifier):
+        if not animation_paths.is_visibility_animated(obj, modifier):
             _show(modifier, stays_beside(obj) and stand_in.show_viewport, False)
 
 
@@ -294,7 +294,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
         kept.remove(kept.find(name))
     for place, name in enumerate(names):
         kept.move(kept.find(name), place)
-    if "sinew.method" not in animation.animated_paths(obj):
+    if "sinew.method" not in animation_paths.animated_paths(obj):
         settings.method = methods[names[0]]
     for name, method in _methods(settings).items():
         if method != methods[name]:
@@ -307,8 +307,8 @@ def _place_sinew(obj: bpy.types.Object) -> None:
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
     if stays_beside(obj) or _is_visibility_animated(obj):
-        if own < last:
-            obj.modifiers.move(own, last)
+        if own != last + 1:
+            obj.modifiers.move(own, last if own < last else last + 1)
     elif own + 1 != first:
         obj.modifiers.move(own, first if own > first else first - 1)
 
@@ -321,7 +321,7 @@ def stays_beside(obj: bpy.types.Object) -> bool:
 
 def _is_visibility_animated(obj: bpy.types.Object) -> bool:
     """Whether an animation decides when one of the Armature modifiers is on."""
-    return any(animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
+    return any(animation_paths.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:

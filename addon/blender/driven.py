@@ -14,7 +14,6 @@ from ..core.errors import SinewError
 from ..core.rig import Bones, RigFacts
 from ..core.session import Binding, Chain, Link, LinkFrame
 from . import (
-    animation,
     armature_io,
     attach,
     drive,
@@ -28,6 +27,7 @@ from . import (
     stack,
     survey,
 )
+from .animation_paths import animated_paths, is_visibility_animated
 from .changes import Changes
 from .modifier_options import ModifierOptions
 from .plan import MODES_OF_THE_MODIFIER, Plan, State
@@ -257,7 +257,7 @@ def update(
     if inspect or not driven.watched:
         driven.plan, driven.needs_apply, driven.name, driven.is_touched = wanted, False, obj.name, True
         driven.left_by = small_meshes.choices(obj) if wanted.state is State.BUILT_IN else []
-        driven.keyed = [animation.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
+        driven.keyed = [is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
         driven.modifier, driven.looks = stack.sinew_modifier(obj).name, _looks(obj)
         mesh = obj.data.session_uid
         keys = _uid(obj.data.shape_keys)
@@ -310,7 +310,7 @@ def _looks(obj: bpy.types.Object) -> list:
     looks += [armature.mode for armature in settings.armatures]
     # What an animation sets has no other event.
     looks += sorted(
-        path for path in animation.animated_paths(obj) if path.startswith(("sinew.", "modifiers"))
+        path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers"))
     )
     looks += obj.vertex_groups.keys()
     for modifier in obj.modifiers:
@@ -626,7 +626,7 @@ def _bind(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Driven | N
     ]
     facts = survey.describe(obj, pairs[0][1].armature, links[0].binding.weighting, read.points, depsgraph)
     armatures = [_uid(stand_in.armature) for _modifier, stand_in in pairs]
-    keyed = [animation.is_visibility_animated(obj, modifier) for modifier, _stand_in in pairs]
+    keyed = [is_visibility_animated(obj, modifier) for modifier, _stand_in in pairs]
     return Driven(obj.mode, armatures, options, keyed, read, Chain(links), facts, mix_group)
 
 

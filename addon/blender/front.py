@@ -11,7 +11,7 @@ import bpy
 
 from ..core.errors import SinewError
 from . import properties, stack
-from .animation import animated_paths
+from .animation_paths import animated_paths
 
 # A copy would run a simulation of its own, with a cache of its own.
 SIMULATIONS = {

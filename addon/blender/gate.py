@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import animation, node_group, stack
+from . import node_group, stack
+from .animation_paths import animated_paths, is_visibility_animated
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Gate:
             if (
                 stack.is_on(modifier)
                 and not node_group.is_sinew(modifier)
-                and not animation.is_visibility_animated(obj, modifier)
+                and not is_visibility_animated(obj, modifier)
             ):
                 self._suspended.append(
                     _Suspended(obj, modifier.persistent_uid, modifier.show_viewport, modifier.show_render)
@@ -71,4 +72,4 @@ def _is_animated(mesh: bpy.types.Mesh) -> bool:
     """Whether animation sets anything of an object that has the mesh. To set one of its modifiers has Blender
     (4.2 to 5.2) copy all of them anew, with what the originals have: in a render that of another frame."""
     users = (obj for obj in bpy.data.objects if obj.data == mesh)
-    return any(not path.startswith(_STAYING) for obj in users for path in animation.animated_paths(obj))
+    return any(not path.startswith(_STAYING) for obj in users for path in animated_paths(obj))

@@ -12,7 +12,19 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import animation, attach, drive, driven, events, note, overrides, points, properties, redraw, stack
+from . import (
+    attach,
+    drive,
+    driven,
+    events,
+    note,
+    overrides,
+    points,
+    properties,
+    redraw,
+    stack,
+)
+from .animation_paths import animated_paths
 from .changes import Changes, names_of_touched_meshes
 from .driven import Driven
 from .gate import Gate
@@ -686,7 +698,7 @@ def adopt_open_file() -> None:
         note.remove()
         for obj in filter(properties.is_driven, bpy.data.objects):
             # Without Sinew, Blender went on without what keys set of its settings.
-            if any(path.startswith("sinew.") for path in animation.animated_paths(obj)):
+            if any(path.startswith("sinew.") for path in animated_paths(obj)):
                 obj.update_tag(refresh={"TIME"})
         refresh(bpy.context)
 

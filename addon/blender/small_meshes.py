@@ -10,7 +10,8 @@ from __future__ import annotations
 import bpy
 
 from ..core.scale_rule import BLENDER_4
-from . import animation, drive, front, pose_driver, properties
+from . import drive, front, pose_driver, properties
+from .animation_paths import animated_paths
 
 # Below as many vertices an Armature modifier is the faster one (bench/README.md), by method.
 VERTICES = {"lbs": 10_000, "dq": 6_000}
@@ -31,7 +32,7 @@ def is_left_to_blender(obj: bpy.types.Object) -> bool:
         and not settings.heat
         and _blend_alike(obj)
         and not front.is_needed(obj)
-        and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animation.animated_paths(obj))
+        and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animated_paths(obj))
     )
 
 

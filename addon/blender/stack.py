@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from . import node_group, properties
+from .animation_paths import is_visibility_animated
 
 # Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
 HARMLESS_IN_FRONT = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
@@ -13,6 +14,11 @@ HARMLESS_IN_FRONT = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
 
 def is_on(modifier: bpy.types.Modifier) -> bool:
     return modifier.show_viewport or modifier.show_render
+
+
+def _can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+    """Whether it is on, or an animation may switch it on."""
+    return is_on(modifier) or is_visibility_animated(obj, modifier)
 
 
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
@@ -45,7 +51,7 @@ def _start(obj: bpy.types.Object) -> int:
     modifiers = list(obj.modifiers)
     if not properties.is_driven(obj):
         candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
-        return _index(obj, min(candidates, key=lambda m: not is_on(m), default=None))
+        return _index(obj, min(candidates, key=lambda m: not _can_be_on(obj, m), default=None))
     behind_own = _index(obj, sinew_modifier(obj)) + 1
     names = {stand_in.name for stand_in in properties.of(obj).stand_ins}
     known = [i for i, m in enumerate(modifiers) if m.type == "ARMATURE" and m.name in names]
@@ -82,7 +88,7 @@ def in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 def changes_in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Those ahead that are on and change positions, topology or weights."""
-    return [m for m in in_front(obj) if is_on(m) and m.type not in HARMLESS_IN_FRONT]
+    return [m for m in in_front(obj) if _can_be_on(obj, m) and m.type not in HARMLESS_IN_FRONT]
 
 
 def parent_deforms(obj: bpy.types.Object) -> bool:

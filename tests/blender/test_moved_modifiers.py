@@ -170,3 +170,39 @@ def test_a_keyed_modifier_is_renamed_while_it_is_off():
     handlers.refresh(bpy.context)
     assert properties.is_driven(obj)
     check(obj, expected)
+
+
+def key_visibility(modifier: bpy.types.Modifier, *keys: tuple[int, bool]) -> None:
+    for frame, shown in keys:
+        modifier.show_viewport = shown
+        modifier.keyframe_insert("show_viewport", frame=frame)
+
+
+def test_put_on_while_an_animation_has_the_first_modifier_off():
+    obj, armature = scenes.make_arm()
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object = armature
+    key_visibility(obj.modifiers["Armature"], (2, False), (10, True))
+    frames = [3, 10, 11, 4]
+    expected = scenes.shapes(obj, frames)
+    scenes.add_sinew(obj, "lbs")
+    got = scenes.shapes(obj, frames)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert scenes.worst(expected[1], expected[2]) > 0.01
+
+
+def test_one_moved_in_front_and_back_while_visibility_is_keyed():
+    """Sinew's modifier is behind the Armature modifier there, and follows it."""
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Solidify", "SOLIDIFY").thickness = 0.1
+    key_visibility(obj.modifiers["Armature"], (1, True), (6, True))
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    expected = scenes.shapes(obj, [11])
+    obj.modifiers["Armature"].use_deform_preserve_volume = False
+    scenes.add_sinew(obj, "dq")
+    bpy.context.view_layer.objects.active = obj
+    for place in (0, 2):
+        obj.modifiers.move(list(obj.modifiers).index(obj.modifiers["Solidify"]), place)
+        bpy.context.view_layer.update()
+    assert [m.name for m in obj.modifiers] == ["Armature", "Sinew", "Solidify"]
+    assert scenes.worst(scenes.shapes(obj, [11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)

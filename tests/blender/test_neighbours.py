@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import animation, drive, driven, handlers, properties, safe_mode, stack
+from sinew_addon.blender import animation_paths, drive, driven, handlers, properties, safe_mode, stack
 from sinew_addon.blender.plan import State
 from sinew_addon.blender.updates import turn, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
@@ -435,9 +435,9 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     handlers.refresh(bpy.context)
     assert other.animation_data.action == obj.animation_data.action
     drive.remove(obj)
-    assert "sinew.method" in animation.animated_paths(other)
+    assert "sinew.method" in animation_paths.animated_paths(other)
     drive.remove(other)
     bpy.context.scene.frame_set(5)
     for each in (obj, other):
-        assert not animation.animated_paths(each)
+        assert not animation_paths.animated_paths(each)
         assert not each.is_property_set("sinew")

@@ -16,7 +16,8 @@ import numpy as np
 
 from ...core import bake
 from ...core.errors import SinewError
-from .. import animation, drive, driven, evaluate, files, front, handlers, properties, stack
+from .. import drive, driven, evaluate, files, front, handlers, properties, stack
+from ..animation_paths import curves_of
 from . import bake_export, shape_animation
 
 SHAPE_KEYS = "shape-keys"
@@ -252,7 +253,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 def _mute(obj: bpy.types.Object, start: str) -> bool:
     """Whether nothing sets those paths any more: curves of a linked action do."""
-    found = [curve for curve in animation.curves_of(obj) if curve.data_path.startswith(start)]
+    found = [curve for curve in curves_of(obj) if curve.data_path.startswith(start)]
     for curve in found:
         if curve.id_data.library is None:
             curve.mute = True

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which properties of an object its animation sets. Changes nothing."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import actions
+
+
+def animated_paths(obj: bpy.types.Object) -> set[str]:
+    """The data paths that the object's actions and drivers set."""
+    return {curve.data_path for curve in curves_of(obj)}
+
+
+def curves_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Those of the object's actions, in strips too, and its drivers."""
+    animation = obj.animation_data
+    if animation is None:
+        return []
+    played = [actions.all_curves(p.action, actions.slot_of(p)) for p in players(animation)]
+    return [*animation.drivers, *(curve for each in played for curve in each)]
+
+
+def players(animation: bpy.types.AnimData) -> list[bpy.types.AnimData | bpy.types.NlaStrip]:
+    """What plays an action, or could."""
+    return [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
+
+
+def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+    """Whether keys or drivers decide when a modifier is on."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
+    return not animated_paths(obj).isdisjoint((f"{start}viewport", f"{start}render"))
