@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..core.comparison import Comparison, RestFacts
+from ..core.comparison import USUAL_METHODS, Comparison, RestFacts
 from ..core.diagnostics import USUAL_INFLUENCES
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
@@ -38,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
     parser.add_argument(
         "--methods",
-        default="lbs,qv,dq",
+        default=",".join(USUAL_METHODS),
         help="of `sinew methods`, and blender for the Armature modifier (default: %(default)s)",
     )
     parser.add_argument(

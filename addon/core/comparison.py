@@ -14,6 +14,8 @@ from dataclasses import asdict, dataclass, fields
 from .diagnostics import Finding
 from .metrics import METRICS, Gauge, Summary
 
+# What is compared where nobody chooses.
+USUAL_METHODS = ("lbs", "qv", "dq")
 # Smaller parts of the diagonal, or of the value at rest, are rounding.
 ROUNDING = 1e-5
 LENGTHS = {"distance_max", "distance_rms", "bulge_min", "bulge_max", "bulge_worst"}

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...core.comparison import USUAL_METHODS
 from ...core.errors import SinewError
 from .. import drive, evaluate, operators, properties
 from . import comparison, comparison_state
@@ -62,7 +63,7 @@ class SINEW_OT_compare(bpy.types.Operator):
             ),
         ],
         options={"ENUM_FLAG"},
-        default=set(properties.METHODS),
+        default=set(USUAL_METHODS),
     )
 
     @classmethod
