@@ -165,7 +165,7 @@ def test_tls_as_documented(rig, tmp_path, certificates):
         without = run_sinew(*arguments(rig, tmp_path / "out 2", address), status=1)
         assert "how to set up TLS" in without.stderr
         plain = run_sinew(*arguments(rig, tmp_path / "out 3", address.replace("tls", "tcp")), status=1)
-        assert "no dask scheduler answers there" in plain.stderr
+        assert "no dask scheduler answers at this address" in plain.stderr
     assert_done(tmp_path / "out")
 
 
