@@ -10,7 +10,6 @@ import numpy as np
 
 from ..core.errors import SinewError
 from . import drive, front, node_group, points, properties, safe_mode, small_meshes, stack
-from .animation_paths import is_visibility_animated
 from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
 
 log = logging.getLogger("sinew")
@@ -39,7 +38,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "") -> ObjectFacts:
         mesh_is_editable=mesh.is_editable,
         is_comparison_copy=properties.is_copy(obj),
         has_heat_map=settings.heat,
-        visibility_is_keyed=any(is_visibility_animated(obj, modifier) for modifier, _ in pairs),
+        visibility_is_keyed=stack.visibility_is_animated(obj),
         views_differ=any(each.show_viewport != each.show_render for each in flags),
         safe_mode=safe_mode.is_on(),
         failure=failure,

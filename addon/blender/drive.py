@@ -10,7 +10,8 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from . import animation, animation_paths, front, node_group, points, pose_driver, properties, stack
+from . import animation, front, node_group, points, pose_driver, properties, stack
+from .animation_paths import animated_paths, is_visibility_animated
 from .heat import heat_view
 from .stack import armature_modifier, sinew_modifier
 from .updates import updates_suspended
@@ -176,7 +177,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
     if on:
         adopt_pointers(obj)
         _switch_off(obj)
-        keyed = _is_visibility_animated(obj)
+        keyed = stack.visibility_is_animated(obj)
         shown = [s for s in settings.stand_ins if s.armature is not None]
         viewport, render = (
             any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render")
@@ -187,7 +188,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         for modifier in stack.armature_modifiers(obj):
             stand_in = _stand_in(obj, modifier)
             # What an animation sets was left alone.
-            if not animation_paths.is_visibility_animated(obj, modifier):
+            if not is_visibility_animated(obj, modifier):
                 _show(modifier, stand_in.show_viewport, stand_in.show_render)
         _show(nodes, False, False)
     properties.store(settings, "standing_in", on)
@@ -234,7 +235,7 @@ def _switch_off(obj: bpy.types.Object) -> None:
             properties.store(stand_in, "show_viewport", modifier.show_viewport)
             properties.store(stand_in, "show_render", modifier.show_render)
         # What an animation sets it would set again with the next frame, and tells Sinew until then.
-        if not animation_paths.is_visibility_animated(obj, modifier):
+        if not is_visibility_animated(obj, modifier):
             _show(modifier, stays_beside(obj) and stand_in.show_viewport, False)
 
 
@@ -294,7 +295,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
         kept.remove(kept.find(name))
     for place, name in enumerate(names):
         kept.move(kept.find(name), place)
-    if "sinew.method" not in animation_paths.animated_paths(obj):
+    if "sinew.method" not in animated_paths(obj):
         settings.method = methods[names[0]]
     for name, method in _methods(settings).items():
         if method != methods[name]:
@@ -306,7 +307,7 @@ def _place_sinew(obj: bpy.types.Object) -> None:
     it, as it moves each vertex to its point whatever came before."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if stays_beside(obj) or _is_visibility_animated(obj):
+    if stays_beside(obj) or stack.visibility_is_animated(obj):
         if own != last + 1:
             obj.modifiers.move(own, last if own < last else last + 1)
     elif own + 1 != first:
@@ -316,12 +317,7 @@ def _place_sinew(obj: bpy.types.Object) -> None:
 def stays_beside(obj: bpy.types.Object) -> bool:
     """Whether the Armature modifiers stay on in the viewport, in front of Sinew's: tools for weights look
     there for the bones that deform."""
-    return obj.mode in MODES_FOR_WEIGHTS and not _is_visibility_animated(obj)
-
-
-def _is_visibility_animated(obj: bpy.types.Object) -> bool:
-    """Whether an animation decides when one of the Armature modifiers is on."""
-    return any(animation_paths.is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
+    return obj.mode in MODES_FOR_WEIGHTS and not stack.visibility_is_animated(obj)
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:

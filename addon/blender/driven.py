@@ -309,9 +309,7 @@ def _looks(obj: bpy.types.Object) -> list:
         looks.append(front.signature(obj))
     looks += [armature.mode for armature in settings.armatures]
     # What an animation sets has no other event.
-    looks += sorted(
-        path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers"))
-    )
+    looks += sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
     looks += obj.vertex_groups.keys()
     for modifier in obj.modifiers:
         looks += (modifier.name, modifier.show_viewport, modifier.show_render)
@@ -389,7 +387,8 @@ def _shape(obj: bpy.types.Object, driven: Driven, depsgraph: bpy.types.Depsgraph
 
 
 def deform_evaluated(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, driven: Driven) -> None:
-    """Writes the points into an evaluated mesh, while Blender evaluates its object, of evaluated data alone.
+    """Writes the points into an evaluated mesh, or into the evaluated carrier, while Blender evaluates its
+    object, of evaluated data alone.
 
     Leaves it as it is where something is out of the ordinary: that is for update().
     """
@@ -452,7 +451,7 @@ def _deform_into(
         driven.frames, driven.rest_points = frames, rest_points
         driven.shapes += 1
     if driven.plan.in_buffer:
-        points.tell_from(shown, driven.source.points)
+        points.make_differ(shown, driven.source.points)
     driven.first = shown[0].tobytes()
     driven.answered, driven.declined, driven.attempts = mesh.as_pointer(), "", 0
     driven.milliseconds = 1000.0 * (time.perf_counter() - started)

@@ -63,8 +63,6 @@ def _in_mix(obj: bpy.types.Object) -> Iterator[str]:
 
 def _bones_of_all_armatures(obj: bpy.types.Object) -> Iterator[str]:
     armatures = {modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE"}
-    # While Sinew is at work, its modifiers do not point to them.
-    armatures |= set(properties.of(obj).armatures) if properties.is_driven(obj) else set()
     for armature in armatures - {None}:
         yield from (bone.name for bone in armature.data.bones)
 

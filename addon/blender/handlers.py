@@ -12,18 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.errors import SinewError
-from . import (
-    attach,
-    drive,
-    driven,
-    events,
-    note,
-    overrides,
-    points,
-    properties,
-    redraw,
-    stack,
-)
+from . import attach, drive, driven, events, note, overrides, points, properties, redraw, stack
 from .animation_paths import animated_paths
 from .changes import Changes, names_of_touched_meshes
 from .driven import Driven

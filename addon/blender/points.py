@@ -49,7 +49,7 @@ def _ensure_attribute(obj: bpy.types.Object) -> None:
     if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
         # What an evaluation shows that Sinew could not answer.
         rest = mesh_io.read_points(mesh)
-        mesh_io.write_vectors(mesh, settings.attribute, _told_from(rest, rest))
+        mesh_io.write_vectors(mesh, settings.attribute, _differing_from(rest, rest))
 
 
 def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
@@ -57,7 +57,7 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
 
     rest  the points as the mesh comes with them
     """
-    carrier.write(properties.of(obj).carrier, _told_from(points, rest))
+    carrier.write(properties.of(obj).carrier, _differing_from(points, rest))
 
 
 def make_room(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
@@ -66,10 +66,10 @@ def make_room(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
         write(obj, rest, rest)
 
 
-def tell_from(shown: np.ndarray, rest: np.ndarray) -> None:
-    """_told_from() in place."""
+def make_differ(shown: np.ndarray, rest: np.ndarray) -> None:
+    """_differing_from() in place."""
     if np.array_equal(shown[:1], rest[:1]) and np.array_equal(shown, rest):
-        shown[:] = _told_from(shown, rest)
+        shown[:] = _differing_from(shown, rest)
 
 
 def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
@@ -109,10 +109,10 @@ def are_in_mesh(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarra
         return is_gone and (shown is None or np.array_equal(shown, own))
     if rest is None or shown is None or rest.shape != own.shape or np.array_equal(rest, own):
         return False
-    return np.array_equal(_told_from(shown, rest), own)
+    return np.array_equal(_differing_from(shown, rest), own)
 
 
-def _told_from(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def _differing_from(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """The points; where they are the rest points to the last bit, one of them off by a rounding. So a mesh
     that Sinew's modifier was applied to is told from one that it was deleted from, and points that Sinew
     wrote from those that a mesh comes with."""

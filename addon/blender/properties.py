@@ -85,8 +85,7 @@ class SinewStandIn(bpy.types.PropertyGroup):
 
     armature: bpy.props.PointerProperty(
         name="Armature",
-        description="The armature that deforms this mesh; kept here because the Armature modifier does not "
-        "point to it while Sinew is at work",
+        description="The armature that deforms this mesh",
         type=bpy.types.Object,
         poll=lambda _self, obj: obj.type == "ARMATURE",
         override=OVERRIDABLE,

@@ -78,6 +78,11 @@ def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
     return next((i for i, m in enumerate(obj.modifiers) if m == modifier), len(obj.modifiers))
 
 
+def visibility_is_animated(obj: bpy.types.Object) -> bool:
+    """Whether an animation decides when one of the Armature modifiers is on."""
+    return any(is_visibility_animated(obj, modifier) for modifier in armature_modifiers(obj))
+
+
 def in_front(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """The modifiers ahead of those that Sinew stands in for, without Sinew's own."""
     # Also while it has no node group yet.
