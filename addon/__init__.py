@@ -3,16 +3,14 @@
 
 
 def register() -> None:
-    from . import cli
-    from .blender import registration
+    from . import cli, registration
 
     registration.register()
     cli.register_command()
 
 
 def unregister() -> None:
-    from . import cli
-    from .blender import registration
+    from . import cli, registration
 
     cli.unregister_command()
     registration.unregister()
@@ -20,13 +18,13 @@ def unregister() -> None:
 
 def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
     """Blender's glTF exporter calls this before an export."""
-    from .blender import exporters
+    from .deform import exporters
 
     exporters.before_export(export_settings)
 
 
 def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
     """Blender's glTF exporter calls this after an export."""
-    from .blender import exporters
+    from .deform import exporters
 
     exporters.after_export(export_settings)

@@ -10,7 +10,7 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
-from .blender import native
+from . import native
 from .core import interrupt
 from .core.errors import SinewError, WrongUse
 from .core.output import sentence as output_sentence

@@ -16,7 +16,8 @@ def prepare_blender() -> None:
         import bpy
     except ImportError as error:
         raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
-    from .blender import native, registration, small_meshes
+    from . import native, registration
+    from .deform import small_meshes
 
     reason = native.load_error()
     if reason is not None:

@@ -13,9 +13,9 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .batch.journal import content_hash
 from .blender_process import DOING, PROCESSORS
 from .core.errors import SinewError
+from .jobs.journal import content_hash
 
 Report = Callable[..., None]
 """Told what is being done to the file, such as "opening it", and by keyword what else there is to know."""
@@ -23,8 +23,8 @@ Report = Callable[..., None]
 
 def run(task: dict, report: Report) -> dict:
     """Does one task in this process: what became of it, and the hash of what was read."""
-    from .blender import preflight, reskin
-    from .blender.bake import bake_apart
+    from .features.bake import bake_apart
+    from .jobs.tasks import preflight, reskin
 
     actions = {
         "reskin": reskin.reskin,

@@ -14,9 +14,10 @@ import time
 import bpy
 import numpy as np
 import sinew_addon
-from sinew_addon.blender import drive, handlers
-from sinew_addon.blender.heat import measures
+from sinew_addon.attach import attach
 from sinew_addon.core.metrics import METRICS
+from sinew_addon.deform import handlers
+from sinew_addon.features.heat import measures
 
 SIDES, RINGS, ROUNDS, FRAMES = 200, 500, 8, range(2, 12)
 
@@ -72,7 +73,7 @@ def main() -> None:
     else:
         obj = make_tube()
     scene = bpy.context.scene
-    drive.add(obj, "dq")
+    attach.add(obj, "dq")
     handlers.refresh(bpy.context)
     least = {name: math.inf for name in ("off", *METRICS)}
     for _round in range(ROUNDS):

@@ -10,18 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..batch.inputs import Job, plan_jobs
 from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
 from ..core.output import folder_to_write
+from ..jobs.inputs import Job, plan_jobs
 from .arguments import add_set
 from .console import Console
 from .outcome import Outcome
 
 if TYPE_CHECKING:
-    from ..blender.bake.bake import Started
+    from ..features.bake.bake import Started
 
 HELP = """\
 Writes what Sinew makes of every armature-deformed mesh as data that plays without it. Inputs are never
@@ -98,18 +98,20 @@ def _bake(
 ) -> None:
     import bpy
 
-    from ..blender import drive, evaluate, files
-    from ..blender.bake import bake, bake_apart
+    from ..attach import attach
+    from ..deform import evaluate
+    from ..features.bake import bake, bake_apart
+    from ..io import files
 
     source, target = outcome.job.source, outcome.job.target
     if target.exists() and not args.overwrite:
         raise SinewError(f"{target}: is there already; use --overwrite to replace it")
     files.open_file(source)
     scene = bpy.context.scene
-    meshes = drive.deformed_meshes(list(scene.objects))
+    meshes = attach.deformed_meshes(list(scene.objects))
     if not meshes:
         raise SinewError(f"{source}: no mesh is deformed by an armature; nothing written")
-    elsewhere = [obj for obj in drive.deformed_meshes(list(bpy.data.objects)) if obj.library is None]
+    elsewhere = [obj for obj in attach.deformed_meshes(list(bpy.data.objects)) if obj.library is None]
     outcome.left_out += [
         f"{obj.name} is not in the scene {scene.name}" for obj in elsewhere if obj not in meshes
     ]

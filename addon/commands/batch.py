@@ -14,15 +14,15 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..batch.inputs import STANDARD_INPUT, Job, plan_jobs
-from ..batch.job_file import JobFile, Settings, read_job_file
-from ..batch.journal import Journal, tells_all
-from ..batch.report import PICTURES, write_report
-from ..batch.workers import run_here, run_in_dask, run_on_this_machine
 from ..blender_process import Limits
 from ..core.bake import bake_path
 from ..core.errors import SinewError, WrongUse
 from ..core.output import folder_to_write, writing
+from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
+from ..jobs.job_file import JobFile, Settings, read_job_file
+from ..jobs.journal import Journal, tells_all
+from ..jobs.report import PICTURES, write_report
+from ..jobs.workers import run_here, run_in_dask, run_on_this_machine
 from .arguments import count, seconds
 from .console import BatchProgress, Console
 
@@ -254,15 +254,15 @@ def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings
 def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> dict | None:
     """What the source must still be for its copy to stand. Raises SinewError where a copy is in the way."""
     record = journal.latest.get(journal.name_of(job.target))
-    is_ours = journal.holds(job.target, record)
-    if job.target.exists() and not args.overwrite and not (args.resume and is_ours):
+    may_react = journal.holds(job.target, record)
+    if job.target.exists() and not args.overwrite and not (args.resume and may_react):
         if args.resume and record is not None:
             raise SinewError(f"{job.target}: was changed since it was written; use --overwrite to replace it")
         raise SinewError(
             f"{job.target}: is there already; use --overwrite to replace it, or --resume to go on"
         )
     same = ("command", "source", "settings")
-    if record is None or not args.resume or not is_ours or "error" in record:
+    if record is None or not args.resume or not may_react or "error" in record:
         return None
     stands = journal.holds_all(job.target, record) and tells_all(record)
     if stands and all(record.get(k) == task[k] for k in same):

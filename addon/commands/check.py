@@ -12,9 +12,9 @@ from pathlib import Path
 
 import sinew
 
-from ..batch.inputs import blend_files_below
 from ..blender_process import BlenderLost, BlenderProcess, Limits
 from ..core.errors import WrongUse
+from ..jobs.inputs import blend_files_below
 from ..other_blender import Answer, ask
 from .arguments import seconds
 from .console import Console

@@ -22,8 +22,8 @@ from .arguments import add_set
 from .console import Console
 
 if TYPE_CHECKING:
-    from ..blender.pages.measure import Subject
-    from ..blender.pages.render import Studio
+    from ..features.pages.measure import Subject
+    from ..features.pages.render import Studio
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
@@ -86,8 +86,8 @@ def _folder_or_sheet(given: str) -> Path:
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..blender import evaluate
-    from ..blender.pages import render, video
+    from ..deform import evaluate
+    from ..features.pages import render, video
 
     methods = list(dict.fromkeys(name.strip() for name in args.methods.split(",")))
     evaluate.check_methods([*methods, args.reference])
@@ -135,8 +135,9 @@ def _compare(
     """Writes one file's page; false where a mesh was left out."""
     import bpy
 
-    from ..blender import evaluate, files
-    from ..blender.pages import illustrate, measure, render
+    from ..deform import evaluate
+    from ..features.pages import illustrate, measure, render
+    from ..io import files
 
     files.open_file(path)
     scene = bpy.context.scene
@@ -172,7 +173,7 @@ def _compare(
 def _write_video(
     subject: Subject, comparison: Comparison, studio: Studio, path: Path, console: Console
 ) -> None:
-    from ..blender.pages import illustrate, video
+    from ..features.pages import illustrate, video
 
     render = subject.scene.render
     with scratch_folder() as folder:
@@ -190,8 +191,9 @@ def _measure(
     args: argparse.Namespace,
     console: Console,
 ) -> Comparison:
-    from ..blender import evaluate, properties
-    from ..blender.pages import measure
+    from ..attach import properties
+    from ..deform import evaluate
+    from ..features.pages import measure
 
     batches = measure.batches(subject, frames, len(methods) + 1)
     summaries: dict[str, list[Summary]] = {method: [] for method in methods}

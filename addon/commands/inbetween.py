@@ -6,9 +6,9 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass, field
 
-from ..batch.inputs import Job, plan_jobs
 from ..core.errors import SinewError, WrongUse
 from ..core.output import folder_to_write
+from ..jobs.inputs import Job, plan_jobs
 from .console import Console
 from .outcome import Outcome
 
@@ -84,9 +84,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _inbetween(job: Job, args: argparse.Namespace) -> Inbetweened:
     import bpy
 
-    from ..blender import actions, files
-    from ..blender.inbetween import inbetween, inbetween_bake, inbetween_handlers
     from ..core import inbetween as core
+    from ..features.inbetween import inbetween, inbetween_bake, inbetween_handlers
+    from ..io import actions, files
 
     outcome = Inbetweened(job)
     path = core.SPLINE if args.spline else core.STRAIGHT

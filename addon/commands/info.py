@@ -42,12 +42,14 @@ def describe_file(path: Path) -> list[dict[str, object]]:
     """A dictionary for each mesh that an armature deforms, in any scene of the file."""
     import bpy
 
-    from ..blender import drive, files, survey
+    from ..attach import attach
+    from ..deform import survey
+    from ..io import files
 
     files.open_file(path)
     meshes = []
-    for obj in drive.deformed_meshes(list(bpy.data.objects)):
-        armature = drive.armature_of(obj)
+    for obj in attach.deformed_meshes(list(bpy.data.objects)):
+        armature = attach.armature_of(obj)
         if armature is None:
             raise SinewError(f"{path}: {obj.name} was driven by Sinew, and its armature is gone")
         facts = survey.describe_undriven(obj)
@@ -70,9 +72,9 @@ def left_to_blender() -> list[str]:
     """The open file's objects that an armature deforms and that are no meshes."""
     import bpy
 
-    from ..blender import drive
+    from ..attach import attach
 
-    return [f"{obj.name} ({obj.type.title()})" for obj in drive.not_meshes(list(bpy.data.objects))]
+    return [f"{obj.name} ({obj.type.title()})" for obj in attach.not_meshes(list(bpy.data.objects))]
 
 
 def _show(report: dict, console: Console) -> None:

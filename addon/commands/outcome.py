@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..batch.inputs import Job
+from ..jobs.inputs import Job
 from .console import Console
 
 

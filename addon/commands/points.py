@@ -43,7 +43,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 def run(args: argparse.Namespace, console: Console) -> int:
     import bpy
 
-    from ..blender import evaluate, files, properties
+    from ..attach import properties
+    from ..deform import evaluate
+    from ..io import files
 
     frames = parse_frames(args.frames)
     evaluate.check_methods([args.method])

@@ -64,7 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
-    from ..blender import evaluate
+    from ..deform import evaluate
 
     if not args.tolerance >= 0.0:
         raise WrongUse(f"tolerance: expected a percentage of 0 or more, got {args.tolerance}")
@@ -122,8 +122,9 @@ def _draw(
 ) -> None:
     import bpy
 
-    from ..blender import evaluate, files
-    from ..blender.pages import render
+    from ..deform import evaluate
+    from ..features.pages import render
+    from ..io import files
 
     size = args.size or (golden.size if golden else 640)
     render.check_size(size)
@@ -160,7 +161,7 @@ def _draw(
 
 def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> int:
     """Compares pictures, shows a table, draws what differs; exit status."""
-    from ..blender.pages import pictures
+    from ..features.pages import pictures
 
     rows, failures = [], 0
     for frame in frames:

@@ -102,7 +102,7 @@ def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
         return meshes.missing(
             f"Not drawn in this installation: {error}. Install bpy and pillow and try again."
         )
-    from ..blender.pages import render, report_figures
+    from ..features.pages import render, report_figures
 
     engine = render.chosen_engine(args.engine)
     size = QUICK_PICTURE_SIZE if args.quick else PICTURE_SIZE

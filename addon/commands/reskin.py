@@ -7,12 +7,12 @@ import argparse
 
 import sinew
 
-from ..batch.job_file import Settings
-from ..batch.job_schema import job_schema
-from ..batch.schema import rows
 from ..core.errors import WrongUse
 from ..core.frames import parse_frames
 from ..core.parameters import as_texts
+from ..jobs.job_file import Settings
+from ..jobs.job_schema import job_schema
+from ..jobs.schema import rows
 from . import batch
 from .arguments import add_set
 from .console import Console

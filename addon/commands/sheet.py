@@ -23,8 +23,10 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     where the methods differ most and the volume against the rest pose."""
     import bpy
 
-    from ..blender import evaluate, files, properties
-    from ..blender.pages import measure, render
+    from ..attach import properties
+    from ..deform import evaluate
+    from ..features.pages import measure, render
+    from ..io import files
 
     require_pillow()
     if len(args.files) != 1:

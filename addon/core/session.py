@@ -187,7 +187,7 @@ def _same(a: Frame, b: Frame) -> bool:
 
 
 @dataclass
-class Link:
+class SkinStage:
     """One of the Armature modifiers that deform a mesh one after the other.
 
     mask   float32 [vertices], the share of the deformation each vertex takes; None for all of it
@@ -200,7 +200,7 @@ class Link:
 
 
 @dataclass
-class LinkFrame:
+class SkinStageFrame:
     """What decides a link's part in one frame: see Frame."""
 
     method: str
@@ -210,11 +210,11 @@ class LinkFrame:
     mix: str = ""
 
 
-class Chain:
+class SkinStack:
     """The links of one mesh, in the order of its modifiers."""
 
-    def __init__(self, links: Sequence[Link]) -> None:
-        self.links = links
+    def __init__(self, skin_stages: Sequence[SkinStage]) -> None:
+        self.skin_stages = skin_stages
         # The last link that took part, where all of its deformation counts: its points are the result.
         self._end: Binding | None = None
         self._points: np.ndarray | None = None
@@ -229,7 +229,7 @@ class Chain:
     def deform(
         self,
         rest_points: np.ndarray,
-        frames: Sequence[LinkFrame | None],
+        frames: Sequence[SkinStageFrame | None],
         out: np.ndarray | None = None,
     ) -> bool:
         """Brings `points` up to date; false where nothing differs from the last call.
@@ -251,31 +251,31 @@ class Chain:
         return changed
 
     def _run(
-        self, rest_points: np.ndarray, frames: Sequence[LinkFrame | None], out: np.ndarray | None
+        self, rest_points: np.ndarray, frames: Sequence[SkinStageFrame | None], out: np.ndarray | None
     ) -> bool:
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
-        last = self.links[max(number for number, frame in enumerate(frames) if frame is not None)]
+        last = self.skin_stages[max(number for number, frame in enumerate(frames) if frame is not None)]
         self._end = last.binding if last.mask is None else None
-        for number, (link, frame) in enumerate(zip(self.links, frames, strict=True)):
+        for number, (skin_stage, frame) in enumerate(zip(self.skin_stages, frames, strict=True)):
             if frame is None:
                 continue
             # What comes in here is kept for the Multi Modifiers right behind that have nothing yet.
-            for behind in range(number + 1, len(self.links)):
-                if not self.links[behind].multi or behind in starts:
+            for behind in range(number + 1, len(self.skin_stages)):
+                if not self.skin_stages[behind].multi or behind in starts:
                     break
                 starts[behind] = result
             start = starts.get(number, result)
-            is_end = link.binding is self._end
-            changed |= link.binding.deform(
+            is_end = skin_stage.binding is self._end
+            changed |= skin_stage.binding.deform(
                 Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule, frame.mix),
                 out if is_end else None,
             )
-            if link.mask is not None:
-                result = result + link.mask[:, None] * (link.binding.points - result)
+            if skin_stage.mask is not None:
+                result = result + skin_stage.mask[:, None] * (skin_stage.binding.points - result)
             elif not is_end:
                 # The next link compares with what it was given: a buffer that is written again will not do.
-                result = link.binding.points.copy()
+                result = skin_stage.binding.points.copy()
         self._points = result
         return changed
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from sinew_addon.blender import small_meshes
+from sinew_addon.deform import small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))

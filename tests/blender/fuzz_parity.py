@@ -31,8 +31,9 @@ import numpy as np
 import routes
 import scenes
 from mathutils import Euler, Matrix, Vector
-from sinew_addon.blender import drive, handlers
+from sinew_addon.attach import attach
 from sinew_addon.core import session
+from sinew_addon.deform import handlers
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import reference
@@ -101,7 +102,7 @@ def random_rotation(rng: np.random.Generator) -> Matrix:
 def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
     rng = numbers(seed, "bones")
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.scene.collection.objects.skin_stage(armature)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     bones = armature.data.edit_bones
@@ -157,7 +158,7 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
     mesh = bpy.data.meshes.new("Mesh")
     mesh.from_pydata(rng.uniform(-1.2, 1.2, (count, 3)).tolist(), [], [(0, 1, 2), (3, 4, 5)])
     obj = bpy.data.objects.new("Mesh", mesh)
-    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.scene.collection.objects.skin_stage(obj)
     groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
     messy = has(seed, "messy weights", features)
     if messy:
@@ -253,7 +254,7 @@ def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> No
         modifier.factor = rng.uniform(-0.5, 0.8)
     elif kind == "LATTICE":
         lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-        bpy.context.scene.collection.objects.link(lattice)
+        bpy.context.scene.collection.objects.skin_stage(lattice)
         lattice.scale = rng.uniform(2.0, 4.0, 3)
         for point in lattice.data.points:
             point.co_deform += Vector(rng.normal(0, 0.1, 3))
@@ -271,7 +272,7 @@ def add_further_armatures(
     rng = numbers(seed, "further armatures")
     other = armature.copy()
     other.data = armature.data.copy()
-    bpy.context.scene.collection.objects.link(other)
+    bpy.context.scene.collection.objects.skin_stage(other)
     other.location = rng.uniform(-0.5, 0.5, 3)
     pose(seed + 1, features, other)
     place = list(obj.modifiers).index(obj.modifiers["Armature"])
@@ -317,8 +318,10 @@ def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
 
 def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, of an object that was just deformed."""
-    driven = handlers.state_of(obj)
-    bindings = [link.binding for link in driven.chain.links if link.binding.last_frame is not None]
+    skinned = handlers.state_of(obj)
+    bindings = [
+        link.binding for link in skinned.skin_stack.skin_stages if link.binding.last_frame is not None
+    ]
     return np.logical_or.reduce([undecided_by(binding) for binding in bindings])
 
 
@@ -354,16 +357,17 @@ def undecided_by(binding: session.Binding) -> np.ndarray:
 def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     """bool [vertices]: those that a change of the input by its rounding moves by the tolerance, as curved
     mapping does with what lies far inside a bend, and one modifier after the other."""
-    driven = handlers.state_of(obj)
-    rest_points = driven.rest_points.astype(np.float64)
+    skinned = handlers.state_of(obj)
+    rest_points = skinned.rest_points.astype(np.float64)
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
     shapes = []
     for points in (rest_points, rest_points + moved):
         links = [
-            session.Link(session.Binding(k.binding.weighting), k.mask, k.multi) for k in driven.chain.links
+            session.SkinStage(session.Binding(k.binding.weighting), k.mask, k.multi)
+            for k in skinned.skin_stack.skin_stages
         ]
-        chain = session.Chain(links)
-        chain.deform(points.astype(np.float32), driven.frames)
+        chain = session.SkinStack(links)
+        chain.deform(points.astype(np.float32), skinned.frames)
         shapes.append(chain.points)
     return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
 
@@ -388,7 +392,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
-        drive.remove(obj)
+        attach.remove(obj)
         handlers.session.forget()
     routes.release()
     return outcome
@@ -406,7 +410,7 @@ def error_of(
 
     Raises routes.NotBySinewError.
     """
-    drive.use_one_method(obj, method)
+    attach.use_one_method(obj, method)
     # Another pose and back, so that the shape has to be made.
     before = [bone.location.copy() for bone in armature.pose.bones]
     for bone in armature.pose.bones:

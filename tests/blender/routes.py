@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import bpy
-from sinew_addon.blender import handlers, properties, safe_mode, small_meshes
+from sinew_addon.attach import properties
+from sinew_addon.deform import handlers, safe_mode, small_meshes
 
 EVALUATION, UPDATE = "evaluation", "update"
 ROUTES = (EVALUATION, UPDATE)
@@ -41,9 +42,9 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
         raise NotBySinewError("Sinew has not deformed it")
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for modifier in obj.evaluated_get(depsgraph).modifiers:
-        replaced = modifier.type == "ARMATURE" and modifier.name in settings.stand_ins
+        replaced = modifier.type == "ARMATURE" and modifier.name in settings.replaced_modifiers
         if replaced and modifier.show_viewport:
             raise NotBySinewError(f"the Armature modifier {modifier.name} is on")
     if state.shapes <= shapes_before:
         raise NotBySinewError("Sinew made no shape for this pose")
-    return EVALUATION if state.answered else UPDATE
+    return EVALUATION if state.deformed_mesh else UPDATE

@@ -8,7 +8,8 @@ import math
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
-from sinew_addon.blender import drive, handlers
+from sinew_addon.attach import attach
+from sinew_addon.deform import handlers
 
 # Stated tolerance against the Armature modifier, as a part of the bounding box's diagonal.
 TOLERANCE = 1e-5
@@ -129,7 +130,7 @@ def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume:
 
 
 def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
-    drive.add(obj, method)
+    attach.add(obj, method)
     handlers.refresh(bpy.context)
 
 

@@ -25,8 +25,9 @@ import numpy as np
 import psutil
 import routes
 import scenes
-from sinew_addon.blender import drive, handlers
-from sinew_addon.blender.comparison import comparison
+from sinew_addon.attach import attach
+from sinew_addon.deform import handlers
+from sinew_addon.features.compare import comparison
 
 LENGTH = 24
 SAMPLES = 20
@@ -107,7 +108,7 @@ def disturb(objects: list[bpy.types.Object], number: int) -> None:
         bpy.context.scene.frame_set(5)
         comparison.end(bpy.context)
     elif what == 3:
-        drive.remove(obj)
+        attach.remove(obj)
         handlers.session.forget()
         bpy.context.scene.frame_set(7)
         scenes.add_sinew(obj, "dq")

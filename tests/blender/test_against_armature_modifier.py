@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import scenes
 from conftest import BLEND_FILES, REAL_RIGS
-from sinew_addon.blender import drive, files, handlers, mesh_io, properties
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import handlers
+from sinew_addon.io import files, mesh_io
 
 ORACLES = [("lbs", False), ("dq", True)]
 
@@ -39,7 +41,7 @@ def test_real_rigs_at_every_frame(real_rig, name):
 
 def assert_every_mesh_equal():
     scene = bpy.context.scene
-    meshes = drive.deformed_meshes(list(scene.objects))
+    meshes = attach.deformed_meshes(list(scene.objects))
     assert meshes
     for obj in meshes:
         assert_equal_to_modifier(obj, list(range(scene.frame_start, scene.frame_end + 1)))
@@ -294,7 +296,7 @@ def test_a_switched_off_armature_modifier_in_front_is_passed_over():
     first.show_viewport = first.show_render = False
     obj.modifiers.move(1, 0)
     assert_equal_to_modifier(obj, [1, 6, 11])
-    assert drive.armature_modifier(obj).name == "Armature"
+    assert attach.armature_modifier(obj).name == "Armature"
 
 
 def with_envelopes(armature: bpy.types.Object) -> None:
@@ -377,6 +379,6 @@ def test_modes_in_which_blenders_tools_need_the_modifier(mode):
     assert scenes.worst(final_points_in_any_mode(obj), expected) == 0.0
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
-    drive.use_one_method(obj, "lbs")
+    attach.use_one_method(obj, "lbs")
     assert scenes.worst(scenes.final_points(obj), shown) <= 1e-6
     assert not obj.modifiers["Armature"].show_viewport

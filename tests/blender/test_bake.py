@@ -17,10 +17,11 @@ import numpy as np
 import program
 import pytest
 import scenes
-from sinew_addon.blender import actions, properties
-from sinew_addon.blender.bake import bake
+from sinew_addon.attach import properties
 from sinew_addon.core import bake as core
 from sinew_addon.core.errors import SinewError
+from sinew_addon.features.bake import bake
+from sinew_addon.io import actions
 from test_command_line import run_sinew
 
 FRAMES = list(range(1, 12))
@@ -186,7 +187,7 @@ def test_the_armature_modifier_stays_for_the_way_back(arm, tmp_path):
     run_sinew("bake", path, "--method", METHOD, "--to", "mdd", "--out", tmp_path / "out")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "arm.blend"))
     obj = bpy.data.objects["Arm"]
-    assert not properties.is_driven(obj)
+    assert not properties.has_sinew(obj)
     assert [m.type for m in obj.modifiers] == ["MESH_CACHE", "ARMATURE"]
     assert obj.modifiers[0].filepath == "//arm_cache/Arm.mdd"
     armature = obj.modifiers[1]
@@ -207,7 +208,7 @@ def test_stopped_anywhere_nothing_is_left(arm, tmp_path):
         steps.close()
         assert not [p for p in (tmp_path / "out").rglob("*")]
         assert (len(bpy.data.objects), bpy.context.scene.frame_current) == (objects, 1)
-        assert properties.is_driven(obj)
+        assert properties.has_sinew(obj)
 
 
 @contextmanager
@@ -276,7 +277,7 @@ def test_the_operator(arm, tmp_path, kind):
     objects = set(bpy.data.objects)
     assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
     in_file = kind in ("shape-keys", "mdd", "pc2")
-    assert properties.is_driven(obj) == (not in_file)
+    assert properties.has_sinew(obj) == (not in_file)
     assert set(bpy.data.objects) == objects if in_file else len(bpy.data.objects) == len(objects)
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= TOLERANCE * scenes.diagonal(obj)
     if kind != "shape-keys":

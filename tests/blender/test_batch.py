@@ -24,9 +24,10 @@ import pytest
 import scenes
 import whole_file
 from program import ENVIRONMENT, run_sinew
-from sinew_addon.batch.job_file import Settings
-from sinew_addon.blender import files, properties
+from sinew_addon.attach import properties
 from sinew_addon.blender_process import BlenderProcess, Limits
+from sinew_addon.io import files
+from sinew_addon.jobs.job_file import Settings
 from test_bake import read_elsewhere
 
 newest_only = pytest.mark.skipif(bpy.app.version < (5, 2), reason="long: runs with the newest Blender alone")
@@ -145,10 +146,10 @@ def contents(folder: Path) -> dict[str, bytes]:
 def driven_points(path: Path) -> dict[str, bytes]:
     """The final points of a copy, and the settings that give them."""
     files.open_file(path)
-    driven = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
-    assert driven, f"{path} is not re-skinned"
+    skinned = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+    assert skinned, f"{path} is not re-skinned"
     found = whole_file.evaluated([1, 6, 11])
-    return found | {f"{obj.name} method": properties.of(obj).method for obj in driven}
+    return found | {f"{obj.name} method": properties.of(obj).method for obj in skinned}
 
 
 def test_settings_for_files_and_objects(tmp_path):
@@ -184,8 +185,8 @@ def test_settings_for_files_and_objects(tmp_path):
     methods = {}
     for name in ("hero", "extra"):
         files.open_file(tmp_path / "out" / "sub" / f"{name}.blend")
-        driven = [obj for obj in bpy.data.objects if properties.is_driven(obj)]
-        methods[name] = {obj.name: properties.of(obj).method for obj in driven}
+        skinned = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+        methods[name] = {obj.name: properties.of(obj).method for obj in skinned}
     assert methods == {
         "hero": {"Body": "dq", "Face": "lbs"},
         "extra": {"Body": "dq", "Face": "dq", "Hair": "dq"},
@@ -267,7 +268,7 @@ def test_bakes_of_a_job_file(tmp_path):
         assert scenes.worst(points[name], expected[name]) <= 1e-6 * scenes.diagonal(bpy.data.objects[name])
     files.open_file(out / "hero.baked.blend")
     assert bpy.data.objects["Face"].hide_viewport
-    assert [o.name for o in bpy.data.objects if properties.is_driven(o)] == ["Hair"]
+    assert [o.name for o in bpy.data.objects if properties.has_sinew(o)] == ["Hair"]
     assert bpy.data.objects["Body"].modifiers[0].filepath == "//hero.baked_cache/Body.mdd"
 
     before = contents(out)

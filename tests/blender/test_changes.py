@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from sinew_addon.blender import attach, drive, evaluate, handlers, mesh_io, properties, safe_mode
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import apply_plan, evaluate, handlers, safe_mode
+from sinew_addon.io import mesh_io
 from test_editing import assert_follows
 
 
@@ -230,7 +232,7 @@ def test_what_the_artist_switched_while_off_stays():
     properties.of(obj).enabled = False
     obj.modifiers["Armature"].show_render = False
     properties.of(obj).enabled = True
-    drive.remove(obj)
+    attach.remove(obj)
     assert obj.modifiers["Armature"].show_viewport
     assert not obj.modifiers["Armature"].show_render
 
@@ -253,7 +255,7 @@ def test_no_attribute_stays_after_a_linked_duplicate_is_made_single():
     bpy.context.scene.frame_set(3)
     other.data = other.data.copy()
     for each in (obj, other):
-        drive.remove(each)
+        attach.remove(each)
         assert not [a.name for a in each.data.attributes if a.name.startswith("sinew")]
 
 
@@ -270,7 +272,7 @@ def test_linked_characters_say_so_and_keep_moving(tmp_path):
         bpy.context.scene.collection.objects.link(linked)
     obj = bpy.data.objects["Arm"]
     assert scenes.worst(scenes.shapes(obj, [1, 11]), expected) <= 1e-5
-    assert "make a library override" in attach.plan_of(obj).reason
+    assert "make a library override" in apply_plan.plan_of(obj).reason
     # What is written into linked data, a library override made later would have.
     assert properties.of(obj).enabled
     assert not properties.of(obj).error

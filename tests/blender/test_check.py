@@ -15,7 +15,7 @@ import bpy
 import pytest
 import scenes
 from program import run_sinew
-from sinew_addon.blender import drive, properties
+from sinew_addon.attach import attach, properties
 
 
 def check(*arguments: object, status: int = 0) -> dict[str, dict]:
@@ -115,7 +115,7 @@ def test_an_armature_modifier_that_was_left_off(tmp_path):
     """As a file looks that lost Sinew's settings, of an object and a modifier that are otherwise whole."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
-    drive.remove(obj)
+    attach.remove(obj)
     modifier = obj.modifiers["Armature"]
     assert "ok" in run_sinew("check", save(tmp_path / "a.blend")).stdout
     modifier.object, modifier.show_viewport, modifier.show_render = None, False, False

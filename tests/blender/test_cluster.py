@@ -22,7 +22,7 @@ import scenes
 from conftest import REPOSITORY
 from distributed.utils import get_ip
 from program import run_sinew
-from sinew_addon.blender import properties
+from sinew_addon.attach import properties
 
 pytestmark = pytest.mark.skipif(
     bpy.app.version < (5, 2), reason="not of Blender: runs with the newest one alone"

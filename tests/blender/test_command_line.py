@@ -18,8 +18,9 @@ import sinew
 import test_mix
 from conftest import REPOSITORY
 from program import run_sinew
-from sinew_addon.blender import files, properties
+from sinew_addon.attach import properties
 from sinew_addon.cli import make_parser
+from sinew_addon.io import files
 
 METHODS = [method.name for method in sinew.methods()]
 
@@ -94,7 +95,7 @@ def test_info_names_what_is_left_to_blender(tmp_path):
     )
     lattice.select_set(True)
     bpy.ops.sinew.add()
-    assert not any(properties.is_driven(o) for o in (lattice, armature))
+    assert not any(properties.has_sinew(o) for o in (lattice, armature))
     assert lattice.modifiers["Armature"].object == armature
 
 

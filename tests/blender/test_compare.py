@@ -20,10 +20,10 @@ import pytest
 import scenes
 import trimesh
 from conftest import REPOSITORY
-from sinew_addon.blender.pages import pictures, video
 from sinew_addon.commands import compare, render
 from sinew_addon.commands.console import Console
 from sinew_addon.core.errors import SinewError
+from sinew_addon.features.pages import pictures, video
 from test_command_line import run_sinew
 
 # Pictures take a third of a second each, and are much the same in all versions.

@@ -12,8 +12,11 @@ import test_restore
 import whole_file
 from conftest import BLEND_FILES
 from program import run_sinew
-from sinew_addon.blender import drive, evaluate, files, operators, properties
-from sinew_addon.blender.comparison import comparison_labels, comparison_state
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import evaluate
+from sinew_addon.features.compare import comparison_labels, comparison_state
+from sinew_addon.io import files
+from sinew_addon.ui import operators
 
 METHODS = evaluate.method_names()
 # The copies' coordinates are larger than the original's by the offset.
@@ -63,20 +66,20 @@ def assert_copies_show(obj: bpy.types.Object, frames: list[int], expected: dict[
 
 def shapes_of_methods(obj: bpy.types.Object, frames: list[int]) -> dict[str, np.ndarray]:
     """What Sinew makes of the object itself; afterwards it is as it was."""
-    driven, method = (
-        properties.is_driven(obj),
+    skinned, method = (
+        properties.has_sinew(obj),
         properties.of(obj).method if obj.is_property_set("sinew") else "",
     )
-    found = {evaluate.BLENDER: scenes.shapes(obj, frames)} if not driven else {}
+    found = {evaluate.BLENDER: scenes.shapes(obj, frames)} if not skinned else {}
     for name in METHODS[:-1]:
         evaluate.use_method(obj, name)
         found[name] = scenes.shapes(obj, frames)
-    if driven:
+    if skinned:
         evaluate.use_method(obj, evaluate.BLENDER)
         found[evaluate.BLENDER] = scenes.shapes(obj, frames)
         evaluate.use_method(obj, method)
     else:
-        drive.remove(obj)
+        attach.remove(obj)
     return found
 
 
@@ -104,7 +107,7 @@ def assert_ends_without_trace(before: dict[str, object]) -> None:
 @pytest.mark.parametrize("path", BLEND_FILES, ids=lambda path: path.stem)
 def test_samples(path):
     files.open_file(path)
-    (obj,) = (o for o in bpy.data.objects if drive.armature_of(o) is not None)
+    (obj,) = (o for o in bpy.data.objects if attach.armature_of(o) is not None)
     assert_compared(obj, [1, 12, 24])
 
 
@@ -196,10 +199,10 @@ SETUPS = [
 
 @pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
 @pytest.mark.parametrize("set_up", SETUPS, ids=lambda f: f.__name__)
-def test_rigs(set_up, driven):
+def test_rigs(set_up, skinned):
     obj, armature = scenes.make_arm(sides=8, rings=11)
     set_up(obj, armature)
-    if driven:
+    if skinned:
         scenes.add_sinew(obj, "dq")
         properties.of(obj).scale_rule = "3.x"
         bpy.context.scene.frame_set(1)
@@ -241,7 +244,7 @@ def test_a_full_scene_is_as_it_was(tmp_path):
     characters = [
         obj
         for obj in bpy.context.view_layer.objects
-        if obj.type == "MESH" and drive.armature_of(obj) is not None and obj.visible_get()
+        if obj.type == "MESH" and attach.armature_of(obj) is not None and obj.visible_get()
     ]
     assert len(characters) >= 7
     scene.frame_set(3)
@@ -264,10 +267,10 @@ def test_a_full_scene_is_as_it_was(tmp_path):
 
 @pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
 @pytest.mark.parametrize("set_up", [plain, mirrored_in_front], ids=lambda f: f.__name__)
-def test_save_and_reopen(tmp_path, set_up, driven):
+def test_save_and_reopen(tmp_path, set_up, skinned):
     obj, armature = scenes.make_arm()
     set_up(obj, armature)
-    if driven:
+    if skinned:
         scenes.add_sinew(obj, "qv")
     expected = shapes_of_methods(obj, [1, 6, 11])
     bpy.context.scene.frame_set(4)
@@ -404,9 +407,9 @@ def test_what_the_artist_put_into_the_collection_stays():
 
 
 @pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
-def test_the_original_is_deleted(tmp_path, driven):
+def test_the_original_is_deleted(tmp_path, skinned):
     obj, _armature = scenes.make_arm()
-    if driven:
+    if skinned:
         scenes.add_sinew(obj, "dq")
     path = test_restore.save(tmp_path / "arm.blend")
 
@@ -446,7 +449,7 @@ def test_keys_of_the_method_are_the_originals_own():
     got = without_offset(copies(obj)["dq"], 2)
     bpy.context.scene.frame_set(1)
     assert_ends_without_trace(before)
-    drive.remove(obj)
+    attach.remove(obj)
     dq = scenes.modifier_shapes(obj, [11], preserve_volume=True)[0]
     assert scenes.worst(got, dq) <= scenes.TOLERANCE * scenes.diagonal(obj)
 

@@ -10,8 +10,8 @@ import bpy
 import pytest
 import scenes
 from mathutils import Quaternion
-from sinew_addon.blender import drive
-from sinew_addon.blender.diagnostics import diagnose
+from sinew_addon.attach import attach
+from sinew_addon.features.diagnose import diagnose
 
 # Vertices of the planted faults; the tube's rings have twelve.
 UNWEIGHTED = [3, 4, 5]
@@ -44,9 +44,9 @@ def selected(obj: bpy.types.Object) -> list[int]:
 
 
 @pytest.mark.parametrize("driven", [False, True])
-def test_finds_exactly_the_planted_faults(driven):
+def test_finds_exactly_the_planted_faults(skinned):
     obj, _armature = faulty_arm()
-    if driven:
+    if skinned:
         bpy.ops.sinew.add()
     assert bpy.ops.sinew.check() == {"FINISHED"}
     assert found(obj) == {
@@ -161,9 +161,9 @@ def test_select_can_be_undone():
 
 
 @pytest.mark.parametrize("driven", [False, True])
-def test_results_go_stale_when_weights_change_and_not_before(driven):
+def test_results_go_stale_when_weights_change_and_not_before(skinned):
     obj, armature = faulty_arm()
-    if driven:
+    if skinned:
         scenes.add_sinew(obj, "dq")
     bpy.ops.sinew.check()
     bpy.context.scene.frame_set(9)
@@ -248,6 +248,6 @@ def test_a_check_touches_nothing(tmp_path):
     bpy.ops.sinew.check_frames(over="SCENE")
     assert bpy.data.is_dirty == dirty
     assert bpy.context.scene.frame_current == 5
-    assert not drive.properties.is_driven(obj)
+    assert not attach.properties.has_sinew(obj)
     assert not obj.is_property_set("sinew")
     assert not bpy.context.scene.is_property_set("sinew_measures")

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import scenes
 import snapshot
-from sinew_addon.blender import armature_io, drive, handlers, points, properties, safe_mode
+from sinew_addon.attach import attach, point_store, properties
+from sinew_addon.deform import handlers, safe_mode
+from sinew_addon.io import armature_io
 
 
 def assert_follows(obj: bpy.types.Object, frames: tuple[float, ...] = (1, 6, 11)) -> None:
@@ -42,8 +44,8 @@ def test_add_on_the_armature_takes_all_its_meshes():
         obj.select_set(obj == armature)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.sinew.add()
-    assert properties.is_driven(first)
-    assert properties.is_driven(second)
+    assert properties.has_sinew(first)
+    assert properties.has_sinew(second)
     assert_follows(first)
     assert_follows(second)
 
@@ -78,7 +80,7 @@ def test_remove_takes_keys_of_the_method_along():
     before = snapshot.of_file()
     scenes.add_sinew(obj)
     obj.keyframe_insert("sinew.method", frame=1)
-    drive.remove(obj)
+    attach.remove(obj)
     assert snapshot.of_file() == before
 
 
@@ -88,7 +90,7 @@ def test_remove_keeps_other_keys():
     before = snapshot.of_file()
     scenes.add_sinew(obj)
     obj.keyframe_insert("sinew.method", frame=1)
-    drive.remove(obj)
+    attach.remove(obj)
     assert snapshot.of_file() == before
 
 
@@ -130,7 +132,7 @@ def test_undo_and_redo():
     bpy.ops.ed.undo()
     bpy.ops.ed.undo()
     obj = bpy.data.objects[name]
-    assert not properties.is_driven(obj)
+    assert not properties.has_sinew(obj)
     assert obj.modifiers["Armature"].object is not None
     bpy.ops.ed.redo()
     bpy.ops.ed.redo()
@@ -221,7 +223,7 @@ def test_renamed_modifiers_are_still_known():
     obj.modifiers["Sinew"].name = "deform"
     obj.modifiers["Armature"].name = "old"
     assert_follows(obj)
-    drive.remove(obj)
+    attach.remove(obj)
     assert [m.name for m in obj.modifiers] == ["old"] != before
     assert obj.modifiers["old"].object is not None
 
@@ -252,7 +254,7 @@ def test_deleted_armature_turns_the_mesh_off_with_a_sentence():
     assert not properties.of(obj).enabled
     assert "armature was deleted" in properties.of(obj).error
     assert_follows(other)
-    drive.remove(obj)
+    attach.remove(obj)
 
 
 def test_armature_deleted_as_in_the_window_is_noticed():
@@ -378,7 +380,7 @@ def test_an_unchanged_object_is_not_written(monkeypatch):
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(6)
     written = []
-    monkeypatch.setattr(points, "write", lambda *_args: written.append(1))
+    monkeypatch.setattr(point_store, "write", lambda *_args: written.append(1))
     bpy.context.scene.frame_set(6)
     handlers.refresh(bpy.context)
     assert not written
@@ -415,8 +417,8 @@ def test_deleted_armature_modifier_turns_the_mesh_off_with_a_sentence():
     obj.modifiers.remove(obj.modifiers["Armature"])
     bpy.context.scene.frame_set(6)
     assert "Armature modifier was deleted" in properties.of(obj).error
-    drive.remove(obj)
-    assert not properties.is_driven(obj)
+    attach.remove(obj)
+    assert not properties.has_sinew(obj)
     assert len(obj.modifiers) == 0
 
 
@@ -433,6 +435,6 @@ def test_remove_while_off_keeps_what_the_artist_switched():
     scenes.add_sinew(obj, "dq")
     properties.of(obj).enabled = False
     obj.modifiers["Armature"].show_viewport = False
-    drive.remove(obj)
+    attach.remove(obj)
     assert not obj.modifiers["Armature"].show_viewport
     assert obj.modifiers["Armature"].show_render

@@ -14,9 +14,12 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.batch.job_file import Settings
-from sinew_addon.blender import drive, files, handlers, mesh_io, properties, reskin, safe_mode
-from sinew_addon.blender.updates import updates_suspended
+from sinew_addon.attach import attach, properties
+from sinew_addon.attach.updates import updates_suspended
+from sinew_addon.deform import handlers, safe_mode
+from sinew_addon.io import files, mesh_io
+from sinew_addon.jobs.job_file import Settings
+from sinew_addon.jobs.tasks import reskin
 
 
 @pytest.fixture
@@ -145,7 +148,7 @@ def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
     assert scenes.worst(got, expected) < 1e-3
     for frame in (3, 6):
         assert scenes.worst(expected[frame], expected[frame - 1]) > 0.01
-    drive.remove(obj)
+    attach.remove(obj)
     assert obj.modifiers["Armature"].object is not None
 
 
@@ -283,8 +286,8 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     child, armature = scenes.make_arm(name="Child")
     child.modifiers.clear()
     child.parent, child.parent_type = armature, "ARMATURE"
-    driven, _ = scenes.make_arm(name="Driven")
-    scenes.add_sinew(driven, "lbs")
+    skinned, _ = scenes.make_arm(name="Driven")
+    scenes.add_sinew(skinned, "lbs")
     bpy.context.scene.frame_set(7)
     path = tmp_path / "all.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

@@ -118,7 +118,7 @@ WITHOUT_LIBRARY = """
 import sys
 sys.modules["sinew"] = None
 import bpy, sinew_addon
-from sinew_addon.blender import native
+from sinew_addon import native
 sinew_addon.register()
 assert "does not load" in native.load_error(), native.load_error()
 assert bpy.types.SINEW_PT_unavailable.bl_category == "Sinew"

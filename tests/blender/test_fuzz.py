@@ -7,7 +7,8 @@ import fuzz_parity
 import pytest
 import routes
 import scenes
-from sinew_addon.blender import drive, handlers, properties, small_meshes
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import handlers, small_meshes
 
 RIGS = 300
 
@@ -60,4 +61,4 @@ def test_a_shape_of_another_pose_is_not_taken_for_this_one():
     properties.of(obj).enabled = False
     with pytest.raises(routes.NotBySinewError, match="off"):
         routes.taken(obj, -1)
-    drive.remove(obj)
+    attach.remove(obj)

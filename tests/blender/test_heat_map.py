@@ -13,13 +13,14 @@ import scenes
 import snapshot
 import test_linked_data
 import whole_file
-from sinew_addon.blender import drive, evaluate, handlers, properties
-from sinew_addon.blender.heat import heat_legend, heat_nodes, live, measures
-from sinew_addon.blender.pages import measure
+from sinew_addon.attach import attach, properties
 from sinew_addon.commands import compare
 from sinew_addon.commands.console import Console
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS
+from sinew_addon.deform import evaluate, handlers
+from sinew_addon.features.heat import heat_legend, heat_nodes, live, measures
+from sinew_addon.features.pages import measure
 
 
 def shown_colours(obj: bpy.types.Object) -> np.ndarray:
@@ -161,7 +162,7 @@ def test_two_objects_of_one_mesh_have_colours_of_their_own_and_one_range():
     bpy.ops.sinew.add()
     choose("bulge")
     bpy.ops.sinew.heat_map()
-    assert properties.of(first).carrier != properties.of(second).carrier
+    assert properties.of(first).point_buffer != properties.of(second).point_buffer
     bent, straight = shown_colours(first), shown_colours(second)
     assert np.ptp(bent, axis=0).max() > 0.1
     assert np.ptp(straight, axis=0).max() < 1e-3
@@ -340,8 +341,8 @@ def test_a_duplicate_has_colours_of_its_own():
     assert not properties.of(twin).heat
     bpy.context.scene.frame_set(7)
     assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
-    carriers = [properties.of(each).carrier for each in (obj, twin)]
-    assert [heat_nodes.COLOURS in carrier.data.attributes for carrier in carriers] == [True, False]
+    carriers = [properties.of(each).point_buffer for each in (obj, twin)]
+    assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in carriers] == [True, False]
 
 
 def test_a_render_shows_it(tmp_path):
@@ -442,7 +443,7 @@ def test_numbers_are_those_that_compare_writes(tmp_path):
 @pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
 def test_linked_meshes_show_it_too(tmp_path, override, front):
     """By their material: a linked mesh keeps the active colour attribute that it has."""
-    test_linked_data.save_library(tmp_path, driven=False, front=front)
+    test_linked_data.save_library(tmp_path, skinned=False, front=front)
     test_linked_data.link(tmp_path, override)
     obj = test_linked_data.character()
     scenes.add_sinew(obj, "dq")
@@ -458,7 +459,7 @@ def test_linked_meshes_show_it_too(tmp_path, override, front):
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=True)
     np.testing.assert_allclose(shown_colours(test_linked_data.character()), colours, atol=1e-6)
-    drive.remove(test_linked_data.character())
+    attach.remove(test_linked_data.character())
     assert color_types() == types
     assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
     assert not [g for g in bpy.data.node_groups if g.get("sinew_node_group") and g.library is None]

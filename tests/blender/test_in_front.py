@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 import snapshot
-from sinew_addon.blender import drive, properties
+from sinew_addon.attach import attach, properties
 from sinew_addon.core.errors import SinewError
 from test_against_armature_modifier import assert_equal_to_modifier
 
@@ -38,7 +38,7 @@ def arm_with(kind: str, **options: object) -> bpy.types.Object:
 def test_modifiers_in_front(kind, options):
     obj = arm_with(kind, **options)
     assert_equal_to_modifier(obj, FRAMES)
-    assert properties.of(obj).front is not None
+    assert properties.of(obj).upstream_proxy is not None
 
 
 def test_a_multi_modifier_behind_a_deforming_parent_is_refused():
@@ -47,7 +47,7 @@ def test_a_multi_modifier_behind_a_deforming_parent_is_refused():
     obj.parent, obj.parent_type = armature, "ARMATURE"
     obj.modifiers["Armature"].use_multi_modifier = True
     with pytest.raises(SinewError, match="Multi Modifier, and its parent deforms it"):
-        drive.add(obj, "dq")
+        attach.add(obj, "dq")
     obj.modifiers["Armature"].use_multi_modifier = False
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(4)
@@ -155,7 +155,7 @@ def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     properties.of(obj).enabled = False
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    drive.remove(obj)
+    attach.remove(obj)
     assert snapshot.of_file() == before
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
 
@@ -200,8 +200,8 @@ def test_a_modifier_in_front_that_comes_changes_and_goes():
     check()
     obj.modifiers["Front"].show_viewport = obj.modifiers["Front"].show_render = False
     check()
-    assert properties.of(obj).front is None
-    assert properties.of(obj).carrier is None
+    assert properties.of(obj).upstream_proxy is None
+    assert properties.of(obj).point_buffer is None
     assert armature.name in bpy.data.objects
 
 
@@ -241,7 +241,7 @@ def test_removing_leaves_the_file_as_it_was():
     before = snapshot.of_file()
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(5)
-    drive.remove(obj)
+    attach.remove(obj)
     bpy.context.scene.frame_set(1)
     assert snapshot.of_file() == before
 
@@ -253,10 +253,10 @@ def test_a_copy_has_points_of_its_own():
     bpy.context.scene.collection.objects.link(copy)
     bpy.context.view_layer.update()
     bpy.context.scene.frame_set(8)
-    assert properties.of(copy).carrier != properties.of(obj).carrier
-    assert properties.of(copy).front != properties.of(obj).front
+    assert properties.of(copy).point_buffer != properties.of(obj).point_buffer
+    assert properties.of(copy).upstream_proxy != properties.of(obj).upstream_proxy
     assert scenes.worst(scenes.final_points(copy), scenes.final_points(obj)) == 0.0
-    drive.remove(obj)
+    attach.remove(obj)
     bpy.context.scene.frame_set(4)
     shown = scenes.final_points(copy)
     properties.of(copy).enabled = False

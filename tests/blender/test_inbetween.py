@@ -15,9 +15,9 @@ import sinew
 import sinew_addon
 from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import Rotation
-from sinew_addon.blender import actions, files
-from sinew_addon.blender.inbetween import inbetween, inbetween_bake, inbetween_handlers
 from sinew_addon.core import inbetween as core
+from sinew_addon.features.inbetween import inbetween, inbetween_bake, inbetween_handlers
+from sinew_addon.io import actions, files
 from test_render import prepare, render_animation
 
 METHODS = sinew.interpolate.METHODS
@@ -773,10 +773,10 @@ def test_a_library_override_keeps_the_choice(tmp_path):
 
 
 @pytest.mark.parametrize("driven", [False, True], ids=["modifier", "Sinew"])
-def test_meshes_follow_in_the_same_frame(driven):
+def test_meshes_follow_in_the_same_frame(skinned):
     """Live as baked, of which Blender plays plain keys."""
     obj, armature = scenes.make_arm()
-    if driven:
+    if skinned:
         scenes.add_sinew(obj, "dq")
     frames = list(range(1, 12))
     blender = scenes.shapes(obj, frames)

@@ -9,14 +9,14 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import drive, properties, stack
+from sinew_addon.attach import attach, properties, stack
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.scale_rule import BLENDER_3
 
 FRAMES = [1, 4, 11]
 
 
-def save_library(folder: Path, driven: bool, front: bool) -> np.ndarray:
+def save_library(folder: Path, skinned: bool, front: bool) -> np.ndarray:
     """A file with an arm in a collection; the arm's shapes under Preserve Volume."""
     obj, armature = scenes.make_arm()
     if front:
@@ -28,7 +28,7 @@ def save_library(folder: Path, driven: bool, front: bool) -> np.ndarray:
     for each in (obj, armature):
         bpy.context.scene.collection.objects.unlink(each)
         collection.objects.link(each)
-    if driven:
+    if skinned:
         scenes.add_sinew(obj, "dq")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
     return expected
@@ -69,31 +69,31 @@ def assert_shapes(expected: np.ndarray) -> None:
 @pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])
 @pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
 @pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
-def test_linked_meshes(tmp_path, override, driven, front):
-    expected = save_library(tmp_path, driven, front)
+def test_linked_meshes(tmp_path, override, skinned, front):
+    expected = save_library(tmp_path, skinned, front)
     link(tmp_path, override)
     scenes.add_sinew(character(), "dq")
     assert_shapes(expected)
     assert not properties.of(character()).error
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
-    assert properties.is_driven(character())
+    assert properties.has_sinew(character())
     assert_shapes(expected)
-    if driven and override:
+    if skinned and override:
         with pytest.raises(SinewError, match="from its library"):
-            drive.remove(character())
+            attach.remove(character())
         properties.of(character()).enabled = False
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
         assert not properties.of(character()).enabled
-        assert len(drive.stand_ins(character())) == 1
+        assert len(attach.replaced_modifiers(character())) == 1
     else:
-        drive.remove(character())
+        attach.remove(character())
     obj = character()
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     assert obj.modifiers["Armature"].object is not None
     assert_shapes(expected)
-    if driven and override:
+    if skinned and override:
         return
     # A hierarchy of overrides takes in what the library's own character has of Sinew.
     local = [o for o in bpy.data.objects if o.library is None and o.override_library is None]
@@ -102,7 +102,7 @@ def test_linked_meshes(tmp_path, override, driven, front):
 
 def test_an_override_is_saved_as_a_blender_without_sinew_needs_it(tmp_path):
     """With settings that tell Sinew when an artist sets them."""
-    save_library(tmp_path, driven=True, front=False)
+    save_library(tmp_path, skinned=True, front=False)
     link(tmp_path, override=True)
     obj = character()
     properties.of(obj).leave_small = False
@@ -125,6 +125,6 @@ def test_settings_are_copied_whole():
     settings.scale_rule = BLENDER_3.name
     properties.copy(settings, properties.of(other))
     copied = properties.of(other)
-    assert [s.name for s in copied.stand_ins] == [s.name for s in settings.stand_ins]
+    assert [s.name for s in copied.replaced_modifiers] == [s.name for s in settings.replaced_modifiers]
     for name in ("method", "leave_small", "scale_rule", "enabled", "standing_in"):
         assert getattr(copied, name) == getattr(settings, name)

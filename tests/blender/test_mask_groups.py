@@ -6,9 +6,10 @@ from __future__ import annotations
 import bpy
 import pytest
 import scenes
-from sinew_addon.blender import handlers, properties, survey
-from sinew_addon.blender.diagnostics import diagnose
-from sinew_addon.blender.pages import measure
+from sinew_addon.attach import properties
+from sinew_addon.deform import handlers, survey
+from sinew_addon.features.diagnose import diagnose
+from sinew_addon.features.pages import measure
 
 GROUP = "a mask"
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import scenes
 import whole_file
-from sinew_addon.blender import drive, handlers, properties, safe_mode, small_meshes
-from sinew_addon.blender.plan import State
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import handlers, safe_mode, small_meshes
+from sinew_addon.deform.plan import State
 
 FRAMES = [1, 4, 7, 11]
 GROUP = "dq here"
@@ -153,10 +154,10 @@ def test_saved_copied_and_removed(tmp_path):
     copy = obj.copy()
     bpy.context.scene.collection.objects.link(copy)
     assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
-    drive.remove(copy)
+    attach.remove(copy)
     bpy.data.objects.remove(copy)
     bpy.context.scene.frame_set(1)
-    drive.remove(obj)
+    attach.remove(obj)
     bpy.context.view_layer.update()
     assert whole_file.differences(before, whole_file.of_open_file()) == []
     bpy.ops.wm.open_mainfile(filepath=str(path))

@@ -6,7 +6,8 @@ from __future__ import annotations
 import bpy
 import pytest
 import scenes
-from sinew_addon.blender import drive, handlers, properties, small_meshes
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import handlers, small_meshes
 
 FRAMES = [1, 6, 11]
 
@@ -57,10 +58,10 @@ def test_chained_modifiers_in_another_order(monkeypatch, is_used, volume, over_s
     put(obj, "Second", "Sinew" if over_sinew else "Armature")
     check(obj, swapped)
     assert names(obj) == ["Sinew", "Second", "Armature"]
-    assert [stand_in.name for stand_in in properties.of(obj).stand_ins] == ["Second", "Armature"]
+    assert [replaced.name for replaced in properties.of(obj).replaced_modifiers] == ["Second", "Armature"]
     put(obj, "Armature", "Sinew" if over_sinew else "Second")
     check(obj, before)
-    drive.remove(obj)
+    attach.remove(obj)
     handlers.refresh(bpy.context)
     assert names(obj) == ["Armature", "Second"]
     check(obj, before)
@@ -78,7 +79,7 @@ def test_one_of_two_deleted(monkeypatch, is_used, deleted):
     obj.modifiers.remove(obj.modifiers[deleted])
     bpy.context.view_layer.update()
     check(obj, expected)
-    assert len(properties.of(obj).stand_ins) == 1
+    assert len(properties.of(obj).replaced_modifiers) == 1
 
 
 def test_a_third_added():
@@ -89,7 +90,7 @@ def test_a_third_added():
     bpy.context.view_layer.update()
     got = scenes.shapes(obj, FRAMES)
     assert not third.show_viewport
-    drive.remove(obj)
+    attach.remove(obj)
     handlers.refresh(bpy.context)
     assert third.show_viewport
     assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
@@ -117,7 +118,7 @@ def test_something_moved_between(moved, place):
     got = scenes.shapes(obj, FRAMES)
     assert properties.of(obj).error == ""
     order = names(obj)
-    drive.remove(obj)
+    attach.remove(obj)
     handlers.refresh(bpy.context)
     assert names(obj) == [name for name in order if name != "Sinew"]
     expected = scenes.shapes(obj, FRAMES)
@@ -130,8 +131,8 @@ def test_what_is_kept_of_many_modifiers_is_of_each():
     obj, armature = scenes.make_arm()
     for number in range(20):
         obj.modifiers.new(f"More {number}", "ARMATURE").object = armature
-    pairs = drive.stand_ins(obj)
-    there = properties.of(obj).stand_ins
+    pairs = attach.replaced_modifiers(obj)
+    there = properties.of(obj).replaced_modifiers
     assert [kept.as_pointer() for _modifier, kept in pairs] == [kept.as_pointer() for kept in there]
     assert [kept.name for kept in there] == names(obj)
 
@@ -168,7 +169,7 @@ def test_a_keyed_modifier_is_renamed_while_it_is_off():
     scenes.add_sinew(obj, "lbs")
     modifier.name = "Other"
     handlers.refresh(bpy.context)
-    assert properties.is_driven(obj)
+    assert properties.has_sinew(obj)
     check(obj, expected)
 
 

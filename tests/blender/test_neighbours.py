@@ -10,10 +10,12 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import animation_paths, drive, driven, handlers, properties, safe_mode, stack
-from sinew_addon.blender.plan import State
-from sinew_addon.blender.updates import turn, updates_suspended
+from sinew_addon.attach import attach, properties, stack
+from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
+from sinew_addon.deform import handlers, safe_mode, skinned_object
+from sinew_addon.deform.plan import State
+from sinew_addon.io import animation_paths
 
 FRAMES = [1, 6, 11]
 
@@ -156,7 +158,7 @@ def test_applied(arm, frame):
         bpy.context.scene.frame_set(frame)
         assert np.array_equal(scenes.final_points(arm), shown)
     assert len(arm.modifiers) == 0
-    assert not properties.is_driven(arm)
+    assert not properties.has_sinew(arm)
     assert arm.animation_data is None
     assert not [each.name for each in arm.data.attributes if "sinew" in each.name]
     assert not [other.name for other in bpy.data.objects if properties.is_helper(other)]
@@ -169,7 +171,7 @@ def test_converted_to_a_mesh(arm):
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
         assert np.array_equal(scenes.final_points(converted), shown)
-    assert not properties.is_driven(converted)
+    assert not properties.has_sinew(converted)
 
 
 @pytest.mark.parametrize("frame", [1, 6])
@@ -182,7 +184,7 @@ def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame):
     arm.modifiers.remove(stack.sinew_modifier(arm))
     bpy.context.view_layer.update()
     assert [modifier.type for modifier in arm.modifiers] == ["ARMATURE"]
-    assert not properties.is_driven(arm)
+    assert not properties.has_sinew(arm)
     arm.modifiers["Armature"].use_deform_preserve_volume = True
     got = scenes.shapes(arm, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
@@ -200,7 +202,7 @@ def test_copied_modifiers_work(arm):
     bpy.context.view_layer.objects.active = arm
     bpy.ops.object.make_links_data(type="MODIFIERS")
     bpy.context.view_layer.update()
-    assert properties.is_driven(other)
+    assert properties.has_sinew(other)
     assert properties.of(other).method == "dq"
     assert properties.of(other).armature == properties.of(arm).armature
     assert_equals_modifier(other)
@@ -250,7 +252,7 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
     for frame in (7, 8, 9):
         bpy.context.scene.frame_set(frame)
     assert removed
-    assert not properties.is_driven(arm)
+    assert not properties.has_sinew(arm)
     own = arm.modifiers["Armature"]
     assert own.show_viewport
     assert own.object is not None
@@ -301,7 +303,7 @@ def test_an_artists_driver_stays(arm):
     scenes.shapes(arm, FRAMES)
     properties.of(arm).heat = True
     scenes.shapes(arm, FRAMES)
-    drive.remove(arm)
+    attach.remove(arm)
     assert [curve.data_path for curve in arm.animation_data.drivers] == ["location"]
 
 
@@ -313,7 +315,7 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
     def fail(*_args: object) -> None:
         raise RuntimeError("disk on fire")
 
-    monkeypatch.setattr(driven, "_deform_into", fail)
+    monkeypatch.setattr(skinned_object, "_deform_into", fail)
     got = scenes.shapes(obj, [2, 3, 4, 5])
     state = handlers.state_of(obj)
     assert state.failures > 0
@@ -322,7 +324,7 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
     assert "disk on fire" in state.plan.reason
     expected = scenes.modifier_shapes(obj, [2, 3, 4, 5], preserve_volume=True)
     monkeypatch.undo()
-    drive.remove(obj)
+    attach.remove(obj)
     expected = scenes.modifier_shapes(obj, [4, 5], preserve_volume=True)
     assert scenes.worst(got[2:], expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
@@ -335,7 +337,7 @@ def test_in_safe_mode_nothing_runs_within_the_evaluation(monkeypatch, how):
         monkeypatch.setenv(safe_mode.VARIABLE, "1")
     obj, _armature = scenes.make_arm()
     asked = []
-    monkeypatch.setattr(driven, "deform_evaluated", lambda *arguments: asked.append(arguments))
+    monkeypatch.setattr(skinned_object, "deform_evaluated", lambda *arguments: asked.append(arguments))
     scenes.add_sinew(obj, "dq")
     assert_equals_modifier(obj)
     assert asked == []
@@ -356,13 +358,13 @@ def test_suspended_by_two_threads_at_once():
         thread.start()
         entered.wait(10)
         thread.join(0.2)
-        with turn() as is_ours:
-            assert not is_ours
+        with reaction() as may_react:
+            assert not may_react
         order.append("this")
     thread.join(10)
     assert order == ["this", "other"]
-    with turn() as is_ours:
-        assert is_ours
+    with reaction() as may_react:
+        assert may_react
 
 
 def test_an_object_renamed_in_a_handler(arm, neighbour):
@@ -392,7 +394,7 @@ def test_tools_for_weights_see_the_bones_that_deform(arm):
     assert [m.name for m in arm.modifiers] == ["Sinew", "Armature"]
     assert not arm.modifiers["Armature"].show_viewport
     assert_equals_modifier(arm)
-    drive.remove(arm)
+    attach.remove(arm)
     assert arm.modifiers["Armature"].show_viewport
     assert arm.modifiers["Armature"].show_render
 
@@ -434,9 +436,9 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     bpy.context.scene.collection.objects.link(other)
     handlers.refresh(bpy.context)
     assert other.animation_data.action == obj.animation_data.action
-    drive.remove(obj)
+    attach.remove(obj)
     assert "sinew.method" in animation_paths.animated_paths(other)
-    drive.remove(other)
+    attach.remove(other)
     bpy.context.scene.frame_set(5)
     for each in (obj, other):
         assert not animation_paths.animated_paths(each)

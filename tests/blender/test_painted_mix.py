@@ -10,7 +10,8 @@ import pytest
 import scenes
 import sinew
 from conftest import REPOSITORY
-from sinew_addon.blender import drive, files
+from sinew_addon.attach import attach
+from sinew_addon.io import files
 
 GROUP = "Painted mix"
 
@@ -81,9 +82,9 @@ def assert_equal_to_blender(obj: bpy.types.Object, armature: bpy.types.Object) -
 @pytest.mark.parametrize(("name", "frame"), [("wrist", 20), ("shoulder", 25), ("tentacle", 30)])
 def test_own_rigs(name, frame):
     files.open_file(REPOSITORY / "blend_files" / f"{name}.blend")
-    (obj,) = drive.deformed_meshes(list(bpy.context.scene.objects))
+    (obj,) = attach.deformed_meshes(list(bpy.context.scene.objects))
     bpy.context.scene.frame_set(frame)
-    assert_equal_to_blender(obj, drive.armature_of(obj))
+    assert_equal_to_blender(obj, attach.armature_of(obj))
 
 
 def test_a_mesh_that_lies_elsewhere():

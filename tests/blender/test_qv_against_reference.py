@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 import scenes
 from conftest import REPOSITORY
-from sinew_addon.blender import drive, files
+from sinew_addon.attach import attach
+from sinew_addon.io import files
 
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import reference
@@ -17,7 +18,7 @@ import reference
 
 def assert_equal_to_reference(obj: bpy.types.Object, frame: int) -> None:
     """Reads pose and weights one by one, by no code of Sinew's."""
-    armature = drive.armature_of(obj)
+    armature = attach.armature_of(obj)
     scenes.add_sinew(obj, "qv")
     bpy.context.scene.frame_set(frame)
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -47,7 +48,7 @@ def assert_equal_to_reference(obj: bpy.types.Object, frame: int) -> None:
 def test_own_rigs():
     for name, frame in (("wrist", 20), ("shoulder", 25), ("tentacle", 30)):
         files.open_file(REPOSITORY / "blend_files" / f"{name}.blend")
-        (obj,) = drive.deformed_meshes(list(bpy.context.scene.objects))
+        (obj,) = attach.deformed_meshes(list(bpy.context.scene.objects))
         assert_equal_to_reference(obj, frame)
 
 
@@ -61,5 +62,5 @@ def test_a_mesh_that_lies_elsewhere():
 
 def test_a_real_rig(real_rig):
     files.open_file(real_rig("human.blend"))
-    (obj,) = drive.deformed_meshes(list(bpy.context.scene.objects))
+    (obj,) = attach.deformed_meshes(list(bpy.context.scene.objects))
     assert_equal_to_reference(obj, 16)

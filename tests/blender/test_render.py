@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scenes
 from mathutils import Matrix
-from sinew_addon.blender import properties
+from sinew_addon.attach import properties
 
 SIZE = 96
 

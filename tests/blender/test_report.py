@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY
 from PIL import Image
-from sinew_addon.blender.pages import render, report_figures
 from sinew_addon.core.report import meshes
+from sinew_addon.features.pages import render, report_figures
 
 SIZE = 96
 
@@ -67,7 +67,8 @@ def test_twist_of_linear_matrices_by_hand(figures):
 
 def test_the_first_picture_of_a_chain_is_the_pose_in_the_file():
     import bpy
-    from sinew_addon.blender import evaluate, files
+    from sinew_addon.deform import evaluate
+    from sinew_addon.io import files
 
     files.open_file(REPOSITORY / "blend_files" / report_figures.LINKS)
     scene = bpy.context.scene

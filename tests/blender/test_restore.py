@@ -12,7 +12,8 @@ import scenes
 import whole_file
 from conftest import REPOSITORY
 from program import run_sinew
-from sinew_addon.blender import files, properties
+from sinew_addon.attach import properties
+from sinew_addon.io import files
 
 FRAMES = [1, 6, 11]
 
@@ -141,7 +142,7 @@ def test_everything_comes_back(tmp_path):
     assert [path.read_bytes() for path in paths] == bytes_before
     for path in paths:
         files.open_file(tmp_path / "reskinned" / path.name)
-        assert [obj for obj in bpy.data.objects if properties.is_driven(obj)], path.name
+        assert [obj for obj in bpy.data.objects if properties.has_sinew(obj)], path.name
         before = content(path)
         assert whole_file.differences(before, content(tmp_path / "restored" / path.name)) == [], path.name
 
@@ -165,7 +166,7 @@ def test_a_real_character_comes_back(real_rig, tmp_path):
     run_sinew("reskin", path, "--method", "qv", "--out", tmp_path / "reskinned", "--no-pictures")
     run_sinew("restore", tmp_path / "reskinned", "--out", tmp_path / "restored")
     files.open_file(tmp_path / "reskinned" / path.name)
-    assert {obj.name for obj in bpy.data.objects if properties.is_driven(obj)} >= names
+    assert {obj.name for obj in bpy.data.objects if properties.has_sinew(obj)} >= names
     assert whole_file.differences(content(path), content(tmp_path / "restored" / path.name)) == []
 
 

@@ -13,17 +13,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import (
-    drive,
-    exporters,
-    handlers,
-    node_group,
-    note,
-    properties,
-    safe_mode,
-    small_meshes,
-    stack,
-)
+from sinew_addon.attach import attach, node_group, note, properties, stack
+from sinew_addon.deform import exporters, handlers, safe_mode, small_meshes
 
 FRAMES = [1, 6, 11]
 
@@ -105,7 +96,7 @@ def test_a_blender_without_sinew_plays_the_nearest_shape(
     obj = bpy.data.objects["Arm"]
     assert np.array_equal(scenes.shapes(obj, FRAMES), ours)
     assert not [text for text in bpy.data.texts if text.get(note.MARK)]
-    drive.remove(obj)
+    attach.remove(obj)
     assert obj.modifiers["Armature"].use_deform_preserve_volume is not preserve_volume
 
 
@@ -196,14 +187,14 @@ def test_one_character_costs_no_others_file(tmp_path, monkeypatch, what):
     monkeypatch.setattr(small_meshes, "is_used", False)
     properties.of(small).enabled = what != "off"
     scenes.add_sinew(obj, "dq")
-    prepare = drive.prepare_for_save
+    prepare = attach.prepare_for_save
 
     def throw(each: bpy.types.Object) -> bool:
         if each == small and what == "throws":
             raise RuntimeError("disk on fire")
         return prepare(each)
 
-    monkeypatch.setattr(drive, "prepare_for_save", throw)
+    monkeypatch.setattr(attach, "prepare_for_save", throw)
     save(tmp_path / "saved.blend")
     shapes, _facts = without_sinew(tmp_path / "saved.blend")
     assert np.array_equal(shapes, expected)

@@ -9,10 +9,11 @@ import pytest
 import scenes
 import whole_file
 from program import run_sinew
-from sinew_addon.blender import drive, events, handlers, properties, small_meshes, stack
-from sinew_addon.blender.heat import live
-from sinew_addon.blender.inbetween import inbetween_handlers
+from sinew_addon.attach import attach, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
+from sinew_addon.deform import events, handlers, small_meshes
+from sinew_addon.features.heat import live
+from sinew_addon.features.inbetween import inbetween_handlers
 
 FRAMES = [1, 6, 11]
 
@@ -38,7 +39,7 @@ def deformer(obj: bpy.types.Object) -> str:
     assert by_blender != by_sinew
     settings, state = properties.of(obj), handlers.state_of(obj)
     assert (settings.enabled, settings.error) == (True, "")
-    assert state.is_left == by_blender
+    assert state.uses_builtin == by_blender
     drivers = obj.animation_data.drivers if obj.animation_data else []
     assert (len(drivers) == 0) == by_blender
     for frame in FRAMES:
@@ -121,7 +122,7 @@ def test_something_in_front_is_taken_up(arm):
     mirror = obj.modifiers.new("Mirror", "MIRROR")
     obj.modifiers.move(2, 0)
     bpy.context.view_layer.update()
-    assert not handlers.state_of(obj).is_left
+    assert not handlers.state_of(obj).uses_builtin
     expected = scenes.final_points(obj)
     properties.of(obj).enabled = False
     assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5 * scenes.diagonal(obj)
@@ -178,7 +179,7 @@ def test_on_and_off_and_removed(tmp_path):
     properties.of(obj).enabled = True
     assert deformer(obj) == "blender"
     bpy.context.scene.frame_set(1)
-    drive.remove(obj)
+    attach.remove(obj)
     handlers.refresh(bpy.context)
     assert whole_file.differences(before, whole_file.of_open_file()) == []
 
@@ -186,7 +187,7 @@ def test_on_and_off_and_removed(tmp_path):
 def test_frames_cost_nothing_of_sinews(arm, monkeypatch):
     scenes.shapes(arm[0], FRAMES)
     looked_at = []
-    monkeypatch.setattr(handlers.driven, "update", lambda *arguments: looked_at.append(arguments))
+    monkeypatch.setattr(handlers.skinned, "update", lambda *arguments: looked_at.append(arguments))
     scenes.shapes(arm[0], FRAMES)
     assert looked_at == []
 
@@ -217,7 +218,7 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
     properties.of(obj).leave_small = leave
     scenes.shapes(obj, FRAMES)
     looked_at = []
-    monkeypatch.setattr(handlers.driven, "update", lambda *arguments: looked_at.append(arguments))
+    monkeypatch.setattr(handlers.skinned, "update", lambda *arguments: looked_at.append(arguments))
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
     assert looked_at == []
 
@@ -234,7 +235,7 @@ def test_blender_calls_at_frames_only_for_what_sinew_has_to_do(arm, tmp_path):
         return [function in functions for functions, function in ours]
 
     # Blender 4.2 does not tell of what comes from other files.
-    told = events.IMPORTS_ARE_TOLD
+    told = events.IMPORTS_ARE_ANNOUNCED
     assert heard() == [not told, False, True]
     properties.of(obj).method = "qv"
     assert heard() == [not told, True, True]
@@ -274,10 +275,10 @@ def test_chained_modifiers_each_by_its_own():
     second.object, second.use_deform_preserve_volume = armature, True
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj)
-    assert handlers.state_of(obj).is_left
+    assert handlers.state_of(obj).uses_builtin
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    properties.of(obj).stand_ins[1].method = "SAME"
-    assert not handlers.state_of(obj).is_left
+    properties.of(obj).replaced_modifiers[1].method = "SAME"
+    assert not handlers.state_of(obj).uses_builtin
 
 
 def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
@@ -312,7 +313,7 @@ def test_baked(arm, tmp_path, kind):
     expected = scenes.shapes(obj, FRAMES)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "arm.blend"))
     assert bpy.ops.sinew.bake(kind=kind, frames="1-11") == {"FINISHED"}
-    assert not properties.is_driven(obj)
+    assert not properties.has_sinew(obj)
     assert not any(m.show_viewport for m in obj.modifiers if m.type == "ARMATURE")
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
 

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.blender import pose_io, stepped
-from sinew_addon.blender.heat import heat_map, heat_panel, live, measures, worst_frames
 from sinew_addon.core.comparison import peaks
 from sinew_addon.core.metrics import METRICS
+from sinew_addon.features.heat import heat_map, heat_panel, live, measures, worst_frames
+from sinew_addon.io import pose_io
+from sinew_addon.ui import stepped
 
 
 def waving_arm() -> tuple[bpy.types.Object, bpy.types.Object]:

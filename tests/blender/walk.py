@@ -637,7 +637,7 @@ def main() -> int:
         without,
         args.episode,
         args.shrink,
-        args.looks,
+        args.object_state,
         lambda text: print(text, flush=True),
     )
     print(summarise(outcomes, time.monotonic() - started))

@@ -37,7 +37,7 @@ def make_engine(walker, points_of) -> type:
         def render(self, depsgraph) -> None:
             scene = depsgraph.scene
             for obj in depsgraph.objects:
-                if obj.type == "MESH" and not walker.side.is_ours(obj.original):
+                if obj.type == "MESH" and not walker.side.may_react(obj.original):
                     name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
                     walker.rendered[name] = points_of(obj)
             result = self.begin_result(0, 0, 4, 4)
@@ -167,7 +167,7 @@ class Child:
         another side can not know."""
         found, skipped = {}, []
         for obj in self.bpy.context.view_layer.objects:
-            if obj.type != "MESH" or self.side.is_ours(obj) or not obj.visible_get():
+            if obj.type != "MESH" or self.side.may_react(obj) or not obj.visible_get():
                 continue
             evaluated = obj.evaluated_get(depsgraph)
             found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
@@ -184,7 +184,7 @@ class Child:
         if obj.library is not None:
             # Saved as Sinew had it.
             return True
-        if not side.is_driven(obj):
+        if not side.has_sinew(obj):
             return False
         if side.is_method_keyed(obj):
             paths = {c.data_path for c in self.sides.curves_of(obj)}
@@ -276,7 +276,7 @@ class Child:
             "keys": [b.name for b in keys.key_blocks] if keys is not None else [],
             "parent": obj.parent.name_full if obj.parent is not None else "",
             "hidden": (obj.hide_viewport, obj.hide_render),
-            "driven": side.is_driven(obj),
+            "driven": side.has_sinew(obj),
         }
         found["modifiers"] = [(m.name, m.type) for m in self.walker.modifiers(obj)]
         if obj.mode == "OBJECT" and obj.override_library is None and not obj.data.is_editmode:
@@ -300,7 +300,7 @@ class Child:
                 }
                 for m in self.sides.armature_modifiers(obj)
             ]
-        if not side.is_driven(obj):
+        if not side.has_sinew(obj):
             found["parent type"] = obj.parent_type
         return found
 

@@ -66,7 +66,7 @@ class Walker:
         found = [
             o
             for o in bpy.data.objects
-            if (kind is None or o.type == kind) and not self.side.is_ours(o) and o.name != "Camera"
+            if (kind is None or o.type == kind) and not self.side.may_react(o) and o.name != "Camera"
         ]
         return sorted(found, key=lambda o: o.name_full)
 
@@ -130,8 +130,8 @@ class Walker:
     def skinned(self, r: random.Random) -> bpy.types.Object | None:
         return self.mesh(r, lambda o: bool(armature_modifiers(o)))
 
-    def driven(self, r: random.Random) -> bpy.types.Object | None:
-        return self.mesh(r, self.side.is_driven)
+    def with_sinew(self, r: random.Random) -> bpy.types.Object | None:
+        return self.mesh(r, self.side.has_sinew)
 
     def editable(self, r: random.Random) -> bpy.types.Object | None:
         """With a mesh that can be edited."""
@@ -297,7 +297,7 @@ def add(w: Walker, r: random.Random) -> str | None:
         r,
         lambda o: (
             o.parent_type != "ARMATURE"
-            and not w.side.is_driven(o)
+            and not w.side.has_sinew(o)
             and any(m.object for m in armature_modifiers(o))
         ),
     )
@@ -314,7 +314,7 @@ def add(w: Walker, r: random.Random) -> str | None:
 
 @operation(2)
 def remove(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
+    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None)
     if obj is None:
         return None
     w.object_mode()
@@ -327,7 +327,7 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
     w.object_mode()
     w.side.end_comparison()
     # What the current view layer does not have, too.
-    for obj in [o for o in w.objects("MESH") if w.side.is_driven(o) and o.library is None]:
+    for obj in [o for o in w.objects("MESH") if w.side.has_sinew(o) and o.library is None]:
         # What comes from a library with Sinew has it again when the file is loaded.
         if obj.override_library is None:
             w.side.remove(obj)
@@ -338,7 +338,7 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
 
 @operation(6)
 def method(w: Walker, r: random.Random) -> str | None:
-    obj, name = w.mesh(r, lambda o: w.side.is_driven(o) and not w.side.is_method_keyed(o)), r.choice(METHODS)
+    obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), r.choice(METHODS)
     if obj is None:
         return None
     w.side.set_method(obj, name)
@@ -347,7 +347,7 @@ def method(w: Walker, r: random.Random) -> str | None:
 
 @operation(4)
 def enabled(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    obj = w.with_sinew(r)
     if obj is None:
         return None
     on = not w.side.is_on(obj) or r.random() < 0.1
@@ -357,7 +357,7 @@ def enabled(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def rebind(w: Walker, r: random.Random) -> str | None:
-    obj = w.driven(r)
+    obj = w.with_sinew(r)
     if obj is None:
         return None
     w.side.rebind(obj)
@@ -366,7 +366,7 @@ def rebind(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def scale_rule(w: Walker, r: random.Random) -> str | None:
-    obj, number = w.driven(r), r.randrange(3)
+    obj, number = w.with_sinew(r), r.randrange(3)
     if obj is None:
         return None
     if w.side.is_sinew:
@@ -377,7 +377,7 @@ def scale_rule(w: Walker, r: random.Random) -> str | None:
 
 @operation(1.5)
 def leave_small(w: Walker, r: random.Random) -> str | None:
-    obj, on = w.driven(r), r.random() < 0.4
+    obj, on = w.with_sinew(r), r.random() < 0.4
     if obj is None:
         return None
     w.side.set_option(obj, "leave_small", on)
@@ -386,7 +386,7 @@ def leave_small(w: Walker, r: random.Random) -> str | None:
 
 @operation(2)
 def heat(w: Walker, r: random.Random) -> str | None:
-    obj, on, quantity = w.driven(r), r.random() < 0.5, r.choice(("stretch", "distance", "bulge"))
+    obj, on, quantity = w.with_sinew(r), r.random() < 0.5, r.choice(("stretch", "distance", "bulge"))
     if obj is None:
         return None
     w.side.set_heat(obj, on, quantity)
@@ -435,7 +435,7 @@ def restart(w: Walker, r: random.Random) -> str | None:
 @operation(0.3)
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
     # Blender's own button does not take what comes from a library off an override.
-    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.override_library is None)
+    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None)
     if obj is None or not w.side.is_on(obj):
         return None
     w.side.delete_part(obj, "modifier")
@@ -444,7 +444,7 @@ def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def delete_points(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: w.side.is_driven(o) and o.mode == "OBJECT" and o.data.library is None)
+    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.mode == "OBJECT" and o.data.library is None)
     if obj is None:
         return None
     if w.side.is_sinew:
@@ -457,7 +457,7 @@ def key_method(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(
         r,
         lambda o: (
-            w.side.is_driven(o)
+            w.side.has_sinew(o)
             and w.side.is_on(o)
             and o.override_library is None
             # Keys of the method are keys of something else on the other side.
@@ -475,7 +475,7 @@ def key_method(w: Walker, r: random.Random) -> str | None:
 @operation(1)
 def unkey_method(w: Walker, r: random.Random) -> str | None:
     obj, name = w.mesh(r, w.side.is_method_keyed), r.choice(METHODS[:2])
-    if obj is None or not w.side.is_driven(obj):
+    if obj is None or not w.side.has_sinew(obj):
         return None
     w.side.unkey_method(obj, name)
     return f"no keys on the method of {obj.name}, {name}"
@@ -655,7 +655,7 @@ def parent(w: Walker, r: random.Random) -> str | None:
     kind = r.choice(("none", "OBJECT", "OBJECT", "BONE", "ARMATURE"))
     if obj is None or rig is None or obj.override_library is not None:
         return None
-    if kind == "ARMATURE" and w.side.is_driven(obj) is False and w.side.is_sinew is None:
+    if kind == "ARMATURE" and w.side.has_sinew(obj) is False and w.side.is_sinew is None:
         return None
     obj.parent = None if kind == "none" else rig
     if kind == "none":
@@ -672,7 +672,7 @@ def parent(w: Walker, r: random.Random) -> str | None:
 def parent_as_artists_do(w: Walker, r: random.Random) -> str | None:
     """The command gives a mesh an Armature modifier where none of its own points to the armature, as those do
     not that Sinew has cleared."""
-    obj, rig = w.mesh(r, lambda o: not w.side.is_driven(o)), w.armature(r)
+    obj, rig = w.mesh(r, lambda o: not w.side.has_sinew(o)), w.armature(r)
     is_plain = obj is not None and obj.override_library is None and obj.parent_type != "ARMATURE"
     if not is_plain or rig is None or len(w.modifiers(obj)) > 5 or not w.select(obj, rig):
         return None
@@ -864,7 +864,7 @@ def share_mesh(w: Walker, r: random.Random) -> str | None:
 @operation(0.4)
 def join(w: Walker, r: random.Random) -> str | None:
     """An object that Sinew does not deform into any other."""
-    others = [o for o in w.meshes() if not w.side.is_driven(o) and o.override_library is None]
+    others = [o for o in w.meshes() if not w.side.has_sinew(o) and o.override_library is None]
     obj = w.mesh(r, lambda o: o.override_library is None and o.data.library is None)
     other = w.one(r, [o for o in others if o != obj and w.users(o.data) == 1])
     if obj is None or other is None or len(obj.data.vertices) > 200 or not w.select(other, obj):
@@ -876,7 +876,7 @@ def join(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def apply_transform(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: w.is_editable(o) and not (w.side.is_driven(o) and w.has_upstream(o)))
+    obj = w.mesh(r, lambda o: w.is_editable(o) and not (w.side.has_sinew(o) and w.has_upstream(o)))
     if obj is None or w.users(obj.data) > 1 or w.compared or not w.select(obj):
         return None
     bpy.ops.object.transform_apply()
@@ -1035,7 +1035,7 @@ def toggle_modifier(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r)
     if obj is None:
         return None
-    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE" or not w.side.is_driven(obj)])
+    modifier = w.one(r, [m for m in w.modifiers(obj) if m.type != "ARMATURE" or not w.side.has_sinew(obj)])
     if modifier is None:
         return None
     on = not modifier.show_viewport
@@ -1107,7 +1107,7 @@ def key_visibility(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def copy_modifiers(w: Walker, r: random.Random) -> str | None:
-    meshes = [o for o in w.meshes() if o.override_library is None and not w.side.is_driven(o)]
+    meshes = [o for o in w.meshes() if o.override_library is None and not w.side.has_sinew(o)]
     source = w.mesh(r, lambda o: o.override_library is None and not w.side.is_method_keyed(o))
     target = w.one(r, [o for o in meshes if o != source])
     if source is None or target is None or not w.select(target, source):
@@ -1308,7 +1308,7 @@ def delete_armature(w: Walker, r: random.Random) -> str | None:
         # A comparison's copies keep it in the file.
         return None
     # So does what Sinew is on, where the command does not take it out of the file by itself.
-    by_script |= any(w.side.is_driven(obj) for obj in w.objects("MESH"))
+    by_script |= any(w.side.has_sinew(obj) for obj in w.objects("MESH"))
     return _delete(w, rig, by_script)
 
 

@@ -75,7 +75,7 @@ class BlenderSide:
     def prepare(self, safe: bool) -> None:
         pass
 
-    def is_ours(self, obj: bpy.types.Object) -> bool:
+    def may_react(self, obj: bpy.types.Object) -> bool:
         return False
 
     def is_helper(self, obj: bpy.types.Object) -> bool:
@@ -84,7 +84,7 @@ class BlenderSide:
     def own_modifier(self, obj: bpy.types.Object) -> bpy.types.Modifier | None:
         return None
 
-    def is_driven(self, obj: bpy.types.Object) -> bool:
+    def has_sinew(self, obj: bpy.types.Object) -> bool:
         return bool(obj.pass_index & DRIVEN)
 
     def is_on(self, obj: bpy.types.Object) -> bool:
@@ -116,7 +116,7 @@ class BlenderSide:
 
     def add(self, obj: bpy.types.Object, method: str | None, leave_small: bool) -> None:
         first = next((m for m in armature_modifiers(obj) if m.object is not None), None)
-        if self.is_driven(obj) or first is None:
+        if self.has_sinew(obj) or first is None:
             return
         self._set(obj, ADOPTED, False)
         self._set(obj, DRIVEN, True)
@@ -124,7 +124,7 @@ class BlenderSide:
         self.set_method(obj, method or ("dq" if first.show_expanded else "lbs"))
 
     def remove(self, obj: bpy.types.Object) -> None:
-        if self.is_driven(obj):
+        if self.has_sinew(obj):
             self.unkey_method(obj, self.method(obj))
             obj.pass_index = 0
 
@@ -187,7 +187,7 @@ class BlenderSide:
 
     def delete_part(self, obj: bpy.types.Object, what: str) -> None:
         """The artist deletes a modifier that Sinew needs: it goes, or says so and is off."""
-        if what.endswith("modifier") and self.is_driven(obj):
+        if what.endswith("modifier") and self.has_sinew(obj):
             self._set(obj, ADOPTED, True)
 
     def copied_modifiers(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
@@ -217,7 +217,7 @@ class BlenderSide:
             run = claim["run"] if claim is not None else []
             if self.is_on(obj) and self.is_method_keyed(obj):
                 continue
-            on = self.is_driven(obj) and self.is_on(obj) and obj.mode not in OBJECT_MODES_OF_THE_MODIFIER
+            on = self.has_sinew(obj) and self.is_on(obj) and obj.mode not in OBJECT_MODES_OF_THE_MODIFIER
             for modifier in armature_modifiers(obj):
                 replaced = on and modifier.name in run
                 wanted = self.method(obj) == "dq" if replaced else modifier.show_expanded
@@ -235,7 +235,7 @@ class BlenderSide:
             if claim is not None:
                 self.set_method(obj, claim["method"])
             return []
-        if self.is_driven(obj) != (claim is not None):
+        if self.has_sinew(obj) != (claim is not None):
             return [f"{obj.name_full} is{'' if claim else ' not'} Sinew's, against the walk's list"]
         if claim is None:
             return []
@@ -282,18 +282,18 @@ class SinewSide:
         sinew_addon.register()
         self._is_safe = safe
         routes.force(routes.UPDATE if safe else routes.EVALUATION)
-        from sinew_addon.blender import small_meshes
+        from sinew_addon.deform import small_meshes
 
         # The walk says itself which are left to Blender.
         small_meshes.is_used = True
 
     @property
     def _properties(self):
-        from sinew_addon.blender import properties
+        from sinew_addon.attach import properties
 
         return properties
 
-    def is_ours(self, obj: bpy.types.Object) -> bool:
+    def may_react(self, obj: bpy.types.Object) -> bool:
         """Made by Sinew for another."""
         return self._properties.is_helper(obj) or self._properties.is_copy(obj)
 
@@ -301,15 +301,15 @@ class SinewSide:
         return self._properties.is_helper(obj)
 
     def own_modifier(self, obj: bpy.types.Object) -> bpy.types.Modifier | None:
-        from sinew_addon.blender import stack
+        from sinew_addon.attach import stack
 
         return stack.sinew_modifier(obj)
 
-    def is_driven(self, obj: bpy.types.Object) -> bool:
-        return self._properties.is_driven(obj)
+    def has_sinew(self, obj: bpy.types.Object) -> bool:
+        return self._properties.has_sinew(obj)
 
     def is_on(self, obj: bpy.types.Object) -> bool:
-        return self.is_driven(obj) and obj.sinew.enabled
+        return self.has_sinew(obj) and obj.sinew.enabled
 
     def has_qv(self, obj: bpy.types.Object) -> bool:
         return self.is_on(obj) and obj.sinew.method == "qv"
@@ -324,32 +324,34 @@ class SinewSide:
         modifier.use_deform_preserve_volume = on
 
     def add(self, obj: bpy.types.Object, method: str | None, leave_small: bool) -> None:
-        from sinew_addon.blender import drive, handlers
+        from sinew_addon.attach import attach
+        from sinew_addon.deform import handlers
 
-        if not self.is_driven(obj):
-            drive.add(obj, method)
+        if not self.has_sinew(obj):
+            attach.add(obj, method)
             obj.sinew.leave_small = leave_small
             # As the button does.
             handlers.session.forget()
             handlers.refresh(bpy.context)
 
     def remove(self, obj: bpy.types.Object) -> None:
-        from sinew_addon.blender import drive, handlers
+        from sinew_addon.attach import attach
+        from sinew_addon.deform import handlers
 
-        if self.is_driven(obj):
-            drive.remove(obj)
+        if self.has_sinew(obj):
+            attach.remove(obj)
             handlers.session.forget()
 
     def set_method(self, obj: bpy.types.Object, method: str) -> None:
-        from sinew_addon.blender import drive
+        from sinew_addon.attach import attach
 
-        drive.use_one_method(obj, method)
+        attach.use_one_method(obj, method)
 
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
         obj.sinew.enabled = on
 
     def rebind(self, obj: bpy.types.Object) -> None:
-        from sinew_addon.blender import handlers
+        from sinew_addon.deform import handlers
 
         handlers.rebind(obj, bpy.context)
 
@@ -362,7 +364,7 @@ class SinewSide:
         obj.sinew.heat = on
 
     def set_safe(self, on: bool) -> None:
-        from sinew_addon.blender import handlers, safe_mode
+        from sinew_addon.deform import handlers, safe_mode
 
         safe_mode.set_forced(on or self._is_safe)
         handlers.refresh(bpy.context)
@@ -380,17 +382,17 @@ class SinewSide:
 
     def start_comparison(self, meshes: list[bpy.types.Object], methods: list[str]) -> None:
         import numpy as np
-        from sinew_addon.blender.comparison import comparison
+        from sinew_addon.features.compare import comparison
 
         comparison.start(bpy.context, meshes, methods, np.array((1.0, 0.0, 0.0)))
 
     def end_comparison(self) -> None:
-        from sinew_addon.blender.comparison import comparison
+        from sinew_addon.features.compare import comparison
 
         comparison.end(bpy.context)
 
     def arrange_comparison(self, arrangement: str) -> None:
-        from sinew_addon.blender.comparison import comparison_state
+        from sinew_addon.features.compare import comparison_state
 
         state = comparison_state.of_scene(bpy.context.scene)
         if state is not None:
@@ -436,10 +438,10 @@ class SinewSide:
                 "method": obj.sinew.method,
                 "rule": obj.sinew.scale_rule,
                 "error": obj.sinew.error,
-                "run": [stand_in.name for stand_in in obj.sinew.stand_ins],
+                "run": [replaced.name for replaced in obj.sinew.replaced_modifiers],
             }
             for obj in bpy.data.objects
-            if self.is_driven(obj) and not self.is_ours(obj)
+            if self.has_sinew(obj) and not self.may_react(obj)
         }
 
     def copies(self) -> list[tuple[bpy.types.Object, str, str]]:
@@ -455,7 +457,7 @@ class SinewSide:
         # Without a user it is not saved, and was that of an object that was deleted.
         objects = [o for o in bpy.data.objects if o.library is None and o.users]
         used = {o.data for o in objects}
-        found = [f"object {o.name}" for o in objects if self.is_ours(o)]
+        found = [f"object {o.name}" for o in objects if self.may_react(o)]
         found += [f"settings of {o.name}" for o in objects if o.is_property_set("sinew")]
         for obj in bpy.data.objects:
             if obj.library is not None:

@@ -324,7 +324,8 @@ def apply(run: Run) -> Steps:
 
 def _check_forgotten(run: Run, obj: bpy.types.Object, when: str) -> None:
     run.check(
-        not (obj.is_property_set("sinew") and len(obj.sinew.stand_ins)), f"Sinew's settings stay {when}"
+        not (obj.is_property_set("sinew") and len(obj.sinew.replaced_modifiers)),
+        f"Sinew's settings stay {when}",
     )
     run.check(not any(m.type == "NODES" for m in obj.modifiers), f"a modifier of Sinew's stays {when}")
     ours = [a.name for a in obj.data.attributes if a.name.startswith("sinew")]

@@ -253,7 +253,7 @@ def _deforms(run: Run, when: str) -> None:
     depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
     shown = shown_points(hero(), depsgraph)
     by = {m: worst(shown, blender_points(hero(), rig(), m, depsgraph)) for m in ("dq", "lbs")}
-    told = bool(hero().sinew.error) or not hero().sinew.enabled or not len(hero().sinew.stand_ins)
+    told = bool(hero().sinew.error) or not hero().sinew.enabled or not len(hero().sinew.replaced_modifiers)
     near = {method: off <= window_scene.TOLERANCE for method, off in by.items()}
     off = f"off by {by['dq']:.4f} from dq and {by['lbs']:.4f} from lbs"
     run.check(near["dq"] or (near["lbs"] and told), f"Hero {when} is {off}; error: {hero().sinew.error!r}")

@@ -8,13 +8,13 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from sinew_addon.batch.inputs import plan_jobs
-from sinew_addon.batch.job_file import ObjectRule, Settings, read_job_file
-from sinew_addon.batch.job_schema import job_schema, markdown
-from sinew_addon.batch.journal import NAME, Journal, stamp
-from sinew_addon.batch.schema import rows
 from sinew_addon.core.errors import SinewError, WrongUse
 from sinew_addon.core.names import fits
+from sinew_addon.jobs.inputs import plan_jobs
+from sinew_addon.jobs.job_file import ObjectRule, Settings, read_job_file
+from sinew_addon.jobs.job_schema import job_schema, markdown
+from sinew_addon.jobs.journal import NAME, Journal, stamp
+from sinew_addon.jobs.schema import rows
 
 METHODS = ("lbs", "dq")
 

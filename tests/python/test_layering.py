@@ -168,7 +168,7 @@ def test_a_python_header_is_seen(header):
         "from ..blender.mesh_io import read",
         "from .. import blender",
         "from ... import other",
-        "import sinew_addon.blender.handlers",
+        "import sinew_addon.deform.handlers",
         "from addon.blender import panels",
     ],
 )

@@ -1,0 +1,365 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Puts Sinew in the place of an object's Armature modifiers, and takes it away again.
+
+While Sinew is at work, the Armature modifiers stay in the stack, switched off. A saved file is Blender's own:
+there they deform, and Sinew's modifier is off.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.errors import SinewError
+from ..features.heat import heat_view
+from ..io.animation_paths import animated_paths, is_visibility_animated
+from . import node_group, point_store, pose_driver, properties, setting_animation, stack, upstream_proxy
+from .stack import armature_modifier, sinew_modifier
+from .updates import updates_suspended
+
+# Tools of this mode look for the armature behind a modifier that is on.
+MODES_FOR_WEIGHTS = {"WEIGHT_PAINT"}
+
+
+def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
+    """The armature that deforms a mesh object, by Sinew, by its first Armature modifier or as its parent."""
+    if obj.type != "MESH":
+        return None
+    if properties.has_sinew(obj) and properties.of(obj).armature is not None:
+        return properties.of(obj).armature
+    modifier = armature_modifier(obj)
+    if modifier is not None:
+        return modifier.object
+    return obj.parent if stack.parent_deforms(obj) else None
+
+
+def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Those of `objects` that are meshes deformed by an armature, or driven by Sinew; a comparison's copies
+    are none."""
+    return [
+        o
+        for o in objects
+        if o.type == "MESH"
+        and not properties.is_helper(o)
+        and not properties.is_copy(o)
+        and (properties.has_sinew(o) or armature_of(o) is not None)
+    ]
+
+
+def not_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Those of `objects` that an armature deforms and that Sinew leaves to Blender, such as lattices."""
+    return [
+        o for o in objects if o.type != "MESH" and any(m.type == "ARMATURE" and m.object for m in o.modifiers)
+    ]
+
+
+def check_can_add(obj: bpy.types.Object) -> None:
+    """Raises SinewError that says why Sinew can not drive a mesh object, and what to do."""
+    if armature_of(obj) is None:
+        raise SinewError(f"{obj.name}: no Armature modifier with an armature; parent the mesh to one first")
+    if not obj.is_editable:
+        raise SinewError(
+            f"{obj.name} is linked from another file; make a library override of it first "
+            "(Object > Library Override > Make)"
+        )
+    if obj.mode == "EDIT":
+        raise SinewError(f"{obj.name} is in edit mode; leave it first")
+    upstream_proxy.check(obj)
+
+
+def add(obj: bpy.types.Object, method: str | None = None) -> None:
+    """Sinew takes over from the Armature modifiers, each with its method where none is given; with the next
+    handlers.refresh() it deforms.
+
+    Raises SinewError, and changes nothing, where that can not be done.
+    """
+    if properties.has_sinew(obj):
+        if method is not None:
+            use_one_method(obj, method)
+        return
+    check_can_add(obj)
+    with updates_suspended():
+        _add(obj, method)
+
+
+def _add(obj: bpy.types.Object, method: str | None) -> None:
+    settings = properties.of(obj)
+    active = obj.modifiers.active
+    if armature_modifier(obj) is None:
+        _make_modifier_of_parent(obj)
+    run = stack.armature_modifiers(obj)
+    nodes = obj.modifiers.new("Sinew", "NODES")
+    nodes.show_expanded = False
+    nodes.show_in_editmode = False
+    _show(nodes, False, False)
+    # Not the last one where the artist pinned others to the end.
+    modifiers = list(obj.modifiers)
+    obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[0]))
+    if active is not None:
+        obj.modifiers.active = active
+    settings.had_animation = obj.animation_data is not None
+    settings.method = method or method_of(run[0])
+    for modifier, replaced in replaced_modifiers(obj):
+        replaced.armature = modifier.object
+        if method is None and method_of(modifier) != settings.method:
+            replaced.method = method_of(modifier)
+
+
+def method_of(modifier: bpy.types.ArmatureModifier) -> str:
+    """The one that the modifier itself blends by."""
+    return "dq" if modifier.use_deform_preserve_volume else "lbs"
+
+
+def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
+    """Turns what the parent type Armature does, which no modifier in the stack shows, into a modifier."""
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
+    modifier.object = obj.parent
+    modifier.use_bone_envelopes = True
+    properties.of(obj).parent_type = obj.parent_type
+    obj.parent_type = "OBJECT"
+
+
+def use_one_method(obj: bpy.types.Object, method: str) -> None:
+    """All Armature modifiers that Sinew stands in for blend by `method`."""
+    settings = properties.of(obj)
+    for replaced in settings.replaced_modifiers:
+        if replaced.method != properties.SAME_METHOD:
+            replaced.method = properties.SAME_METHOD
+    settings.method = method
+
+
+def remove(obj: bpy.types.Object) -> None:
+    """As take_off(), for the artist.
+
+    Raises SinewError, and changes nothing, where Sinew would be there again once the file is loaded.
+    """
+    nodes = sinew_modifier(obj)
+    if obj.override_library is not None and nodes is not None and nodes.is_override_data:
+        # A script can remove it from the override; Blender loads it again, and the Armature modifier twice.
+        raise SinewError(
+            f"{obj.name}: Sinew comes with it from its library; switch it off here, or remove it there"
+        )
+    take_off(obj)
+
+
+def take_off(obj: bpy.types.Object) -> None:
+    """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
+    with updates_suspended():
+        _take_off(obj)
+    heat_view.tidy()
+
+
+def _take_off(obj: bpy.types.Object) -> None:
+    switch(obj, on=False)
+    resume_after_save(obj)
+    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    if settings.heat:
+        heat_view.take_off(obj)
+    if nodes is not None:
+        active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
+        obj.modifiers.remove(nodes)
+        if active is not None:
+            obj.modifiers.active = active
+    if settings.parent_type:
+        modifier = armature_modifier(obj)
+        if modifier is not None:
+            obj.modifiers.remove(modifier)
+        obj.parent_type = settings.parent_type
+    point_store.remove(obj)
+    setting_animation.remove(obj)
+    properties.clear(obj)
+
+
+def switch(obj: bpy.types.Object, on: bool) -> None:
+    """On: Sinew deforms. Off: the Armature modifiers do, as they were, and Sinew's modifier rests."""
+    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    resume_after_save(obj)
+    if on:
+        adopt_pointers(obj)
+        _switch_off(obj)
+        keyed = stack.visibility_is_animated(obj)
+        shown = [s for s in settings.replaced_modifiers if s.armature is not None]
+        viewport, render = (
+            any(getattr(s, f"show_{where}") for s in shown) for where in ("viewport", "render")
+        )
+        _show(nodes, viewport or keyed, render or keyed)
+    elif settings.replaces_modifiers:
+        restore_builtin(obj)
+        for modifier in stack.armature_modifiers(obj):
+            replaced = _replaced_modifier(obj, modifier)
+            # What an animation sets was left alone.
+            if not is_visibility_animated(obj, modifier):
+                _show(modifier, replaced.show_viewport, replaced.show_render)
+        _show(nodes, False, False)
+    properties.store(settings, "standing_in", on)
+
+
+def prepare_for_save(obj: bpy.types.Object) -> bool:
+    """Makes an object as a Blender without Sinew needs it: its Armature modifiers deform, by the shape that
+    is nearest to Sinew's. Whether it was Sinew that deformed it; switch() is the way back."""
+    settings, nodes = properties.of(obj), sinew_modifier(obj)
+    was_on = settings.replaces_modifiers
+    if not (was_on or settings.enabled):
+        return False
+    switch(obj, on=False)
+    if nodes is not None and nodes.node_group is not None:
+        node_group.set_inputs(nodes, {node_group.PRESENT: False})
+    for number, (modifier, replaced) in enumerate(replaced_modifiers(obj)):
+        properties.store(replaced, "preserve_volume", modifier.use_deform_preserve_volume)
+        method = properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
+        _preserve_volume(modifier, method == "dq")
+    properties.store(settings, "is_saved", True)
+    return was_on
+
+
+def resume_after_save(obj: bpy.types.Object) -> None:
+    """The Armature modifiers have the artist's own choices again, where a saved file had others."""
+    settings = properties.of(obj)
+    if settings.is_saved:
+        for modifier, replaced in replaced_modifiers(obj):
+            _preserve_volume(modifier, replaced.preserve_volume)
+        properties.store(settings, "is_saved", False)
+
+
+def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> None:
+    if modifier.use_deform_preserve_volume != preserve:
+        modifier.use_deform_preserve_volume = preserve
+
+
+def _switch_off(obj: bpy.types.Object) -> None:
+    """Also those that the artist added or switched on since."""
+    for modifier, replaced in replaced_modifiers(obj):
+        ours = ((False, False), (replaced.show_viewport, False))
+        flags = (modifier.show_viewport, modifier.show_render)
+        if not properties.of(obj).replaces_modifiers or flags not in ours:
+            properties.store(replaced, "show_viewport", modifier.show_viewport)
+            properties.store(replaced, "show_render", modifier.show_render)
+        # What an animation sets it would set again with the next frame, and tells Sinew until then.
+        if not is_visibility_animated(obj, modifier):
+            _show(modifier, keeps_modifiers_on(obj) and replaced.show_viewport, False)
+
+
+def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
+    for name, value in (("show_viewport", viewport), ("show_render", render)):
+        # Setting what is set has Blender evaluate the object, too.
+        if modifier is not None and getattr(modifier, name) != value:
+            setattr(modifier, name, value)
+
+
+def _replaced_modifier(
+    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier
+) -> properties.SinewReplacedModifier:
+    """What Sinew keeps of an Armature modifier, made where it is missing."""
+    replaced_modifiers, run = properties.of(obj).replaced_modifiers, stack.armature_modifiers(obj)
+    found = replaced_modifiers.get(modifier.name)
+    if found is None and run:
+        # Renamed: as many as there were, so this is the one that had its place.
+        names, place = [m.name for m in run], run.index(modifier)
+        if len(replaced_modifiers) == len(run) and replaced_modifiers[place].name not in names:
+            found = replaced_modifiers[place]
+            found.name = modifier.name
+    if found is None:
+        found = replaced_modifiers.add()
+        found.name = modifier.name
+        found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
+    return found
+
+
+def replaced_modifiers(
+    obj: bpy.types.Object,
+) -> list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]:
+    """The Armature modifiers that Sinew stands in for, in their order, and what it keeps of each."""
+    run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers
+    count = len(kept)
+    pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
+    if len(kept) != count:
+        # To add one has Blender move those before it in memory.
+        pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
+    return pairs
+
+
+def follow_stack(obj: bpy.types.Object) -> None:
+    """Brings Sinew's modifier and what it keeps of the Armature modifiers in line with how the artist moved,
+    renamed and deleted modifiers. Each keeps its method; one that no longer follows the first without a gap
+    deforms by itself again."""
+    settings = properties.of(obj)
+    _position_modifier(obj)
+    kept = settings.replaced_modifiers
+    names = [replaced.name for _modifier, replaced in replaced_modifiers(obj)]
+    if [replaced.name for replaced in kept] == names:
+        return
+    methods = _methods(settings)
+    for name in methods.keys() - set(names):
+        modifier = obj.modifiers.get(name)
+        if settings.replaces_modifiers and modifier is not None and modifier.type == "ARMATURE":
+            _restore_pointer(modifier, kept[name])
+            _show(modifier, kept[name].show_viewport, kept[name].show_render)
+        kept.remove(kept.find(name))
+    for place, name in enumerate(names):
+        kept.move(kept.find(name), place)
+    if "sinew.method" not in animated_paths(obj):
+        settings.method = methods[names[0]]
+    for name, method in _methods(settings).items():
+        if method != methods[name]:
+            kept[name].method = methods[name]
+
+
+def _position_modifier(obj: bpy.types.Object) -> None:
+    """In front of the Armature modifiers in whose place it stands; behind them where they can be on beside
+    it, as it moves each vertex to its point whatever came before."""
+    run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
+    own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
+    if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj):
+        if own != last + 1:
+            obj.modifiers.move(own, last if own < last else last + 1)
+    elif own + 1 != first:
+        obj.modifiers.move(own, first if own > first else first - 1)
+
+
+def keeps_modifiers_on(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifiers stay on in the viewport, in front of Sinew's: tools for weights look
+    there for the bones that deform."""
+    return obj.mode in MODES_FOR_WEIGHTS and not stack.visibility_is_animated(obj)
+
+
+def _methods(settings: properties.SinewSettings) -> dict[str, str]:
+    """What each Armature modifier that Sinew stands in for blends by, by its name."""
+    return {
+        replaced.name: properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
+        for number, replaced in enumerate(settings.replaced_modifiers)
+    }
+
+
+def adopt_pointers(obj: bpy.types.Object) -> None:
+    """Takes over armatures that the artist chose in the Armature modifiers."""
+    for modifier, replaced in replaced_modifiers(obj):
+        if modifier.object not in (None, replaced.armature):
+            replaced.armature = modifier.object
+
+
+def restore_pointers(obj: bpy.types.Object) -> None:
+    """The Armature modifiers point to their armatures again."""
+    for modifier, replaced in replaced_modifiers(obj):
+        _restore_pointer(modifier, replaced)
+
+
+def _restore_pointer(
+    modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
+) -> None:
+    armature = replaced.armature
+    if armature is not None and is_deleted(armature):
+        modifier.object = None
+    elif modifier.object is None and armature is not None:
+        modifier.object = armature
+
+
+def is_deleted(armature: bpy.types.Object) -> bool:
+    """Whether the user deleted it: that takes an object out of all collections, and Sinew's pointer alone
+    still keeps it in the file."""
+    return armature.library is None and not armature.users_collection
+
+
+def restore_builtin(obj: bpy.types.Object) -> None:
+    """The Armature modifiers point to their armatures again, and no driver of ours does."""
+    restore_pointers(obj)
+    pose_driver.remove(obj)

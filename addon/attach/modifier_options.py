@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an Armature modifier's options mean for Sinew, and which it does not reproduce."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.influences import GroupWeights, entries_of_bones
+from ..core.rig import Bones, Weighting
+from . import stack
+
+
+@dataclass(frozen=True)
+class ModifierOptions:
+    """The options that Sinew reproduces."""
+
+    use_vertex_groups: bool
+    use_envelopes: bool
+    mask: str
+    invert_mask: bool
+    multi: bool
+
+    @classmethod
+    def read(cls, modifier: bpy.types.ArmatureModifier | None) -> ModifierOptions:
+        """None stands for the parent type Armature, which has no modifier in the stack."""
+        if modifier is None:
+            return cls(True, True, "", False, False)
+        return cls(*cls.values(modifier))
+
+    @staticmethod
+    def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
+        """The same, in order, for a quick look."""
+        return (
+            modifier.use_vertex_groups,
+            modifier.use_bone_envelopes,
+            modifier.vertex_group,
+            modifier.invert_vertex_group,
+            modifier.use_multi_modifier,
+        )
+
+    def weighting(self, obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
+        """What deforms the mesh: its groups that have a bone, or none where the modifier leaves them."""
+        names = [group.name for group in obj.vertex_groups]
+        bone_of_group = bones.of_groups(names) if self.use_vertex_groups else np.full(len(names), -1)
+        return Weighting(bones, entries_of_bones(weights, bone_of_group), self.use_envelopes)
+
+    def mask_weights(self, obj: bpy.types.Object, weights: GroupWeights) -> np.ndarray | None:
+        """float32 [vertices], the share of the deformation each vertex takes; None for all of it.
+
+        A mask that names no group, or on a mesh without any weights, is ignored, as Blender does.
+        """
+        group = obj.vertex_groups.get(self.mask) if self.mask else None
+        if group is None or len(weights.groups) == 0:
+            return None
+        mask = weights.of_group(group.index)
+        return 1.0 - mask if self.invert_mask else mask
+
+
+def differences(obj: bpy.types.Object) -> list[str]:
+    """A sentence for each thing that the modifiers do and Sinew does not."""
+    found = []
+    skinned = stack.armature_modifiers(obj)
+    others = [m for m in obj.modifiers if m.type == "ARMATURE" and m not in skinned and m.object is not None]
+    if others:
+        found.append(
+            f"Armature modifiers apart from the first stay Blender's: {', '.join(m.name for m in others)}; "
+            "move them right behind it to have them driven"
+        )
+    return found

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Geometry Nodes group "Sinew": moves each vertex to the point that an attribute or a carrier holds for
+it."""
+
+from __future__ import annotations
+
+import bpy
+
+# A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
+# where the group finds the points.
+MARK = "sinew_node_group"
+ATTRIBUTE, POINT_BUFFER = 10, 11
+# An input that no node reads; pose_driver has its driver there.
+POSE = "Pose"
+# An input that is off in saved files: without Sinew the group then says what is missing.
+PRESENT = "Sinew Is There"
+MISSING = (
+    "The extension Sinew deforms this mesh, and is not there. Install it, or leave this modifier off: the "
+    "Armature modifier shows the nearest shape that Blender has."
+)
+
+POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points")
+PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
+
+
+def find(kind: int) -> bpy.types.NodeTree | None:
+    return next((g for g in bpy.data.node_groups if g.get(MARK) == kind and g.library is None), None)
+
+
+def get_or_make(kind: int) -> bpy.types.NodeTree:
+    """The group that takes points from an ATTRIBUTE or from a CARRIER."""
+    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
+    return find(kind) or make()
+
+
+def is_sinew(modifier: bpy.types.Modifier) -> bool:
+    return (
+        modifier.type == "NODES" and modifier.node_group is not None and bool(modifier.node_group.get(MARK))
+    )
+
+
+def remove_unused() -> None:
+    def unused() -> list[bpy.types.NodeTree]:
+        return [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and g.users == 0]
+
+    # One group can be all that uses another.
+    while groups := unused():
+        for group in groups:
+            bpy.data.node_groups.remove(group)
+
+
+def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
+    """Gives a Sinew modifier its inputs, by name; those that it has already are left alone, as every change
+    makes Blender evaluate the object."""
+    changed = [name for name, value in values.items() if get_input(modifier, name) != value]
+    for name in changed:
+        identifier = _identifier(modifier, name)
+        if hasattr(modifier, "properties"):  # Blender 5.2 moved the inputs
+            getattr(modifier.properties.inputs, identifier).value = values[name]
+        else:
+            modifier[identifier] = values[name]
+    if changed:
+        # An input by itself tells Blender nothing, nor of an object that is to be evaluated first.
+        modifier.node_group = modifier.node_group
+
+
+def get_input(modifier: bpy.types.Modifier, name: str) -> object:
+    """None where the modifier has no such input."""
+    identifier = _identifier(modifier, name)
+    if identifier is None:
+        return None
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, identifier).value
+    return modifier.get(identifier)
+
+
+def input_path(modifier: bpy.types.Modifier, name: str) -> str:
+    """The path of an input from the modifier's object, for a driver."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+    identifier = _identifier(modifier, name)
+    if hasattr(modifier, "properties"):
+        return f"{start}.properties.inputs.{identifier}.value"
+    return f'{start}["{identifier}"]'
+
+
+def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
+    if modifier.node_group is None:
+        return None
+    return next(
+        (
+            item.identifier
+            for item in modifier.node_group.interface.items_tree
+            if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+        ),
+        None,
+    )
+
+
+def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group[MARK] = kind
+    # Blender's menu of modifiers must not offer it: on other objects it does nothing.
+    group.is_modifier = False
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    for socket, (socket_type, description) in inputs.items():
+        made = group.interface.new_socket(socket, in_out="INPUT", socket_type=socket_type)
+        made.description = description
+        made.hide_in_modifier = True
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    return group
+
+
+def add_nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
+    nodes = [group.nodes.new(kind) for kind in kinds]
+    for column, node in enumerate(nodes):
+        node.location = (220 * column, 0)
+    return nodes
+
+
+def _make_for_attribute() -> bpy.types.NodeTree:
+    group = new_group(
+        "Sinew",
+        ATTRIBUTE,
+        {
+            "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
+            POSE: POSE_SOCKET,
+            PRESENT: PRESENT_SOCKET,
+        },
+    )
+    source, named, place, remove, result = add_nodes(
+        group,
+        "NodeGroupInput",
+        "GeometryNodeInputNamedAttribute",
+        "GeometryNodeSetPosition",
+        "GeometryNodeRemoveAttribute",
+        "NodeGroupOutput",
+    )
+    named.data_type = "FLOAT_VECTOR"
+    group.links.new(source.outputs["Points"], named.inputs["Name"])
+    group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
+    group.links.new(named.outputs["Attribute"], place.inputs["Position"])
+    # A mesh without the attribute keeps its shape instead of falling into the origin.
+    group.links.new(named.outputs["Exists"], place.inputs["Selection"])
+    # Else a subdivision behind would work it out for each of its vertices, and exports would have it.
+    group.links.new(source.outputs["Points"], remove.inputs["Name"])
+    group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
+    group.links.new(
+        _say_what_is_missing(group, source, remove.outputs["Geometry"]), result.inputs["Geometry"]
+    )
+    return group
+
+
+def _make_for_carrier() -> bpy.types.NodeTree:
+    group = new_group(
+        "Sinew Carrier",
+        POINT_BUFFER,
+        {
+            "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
+            "Front": (
+                "NodeSocketObject",
+                "Object that has the modifiers in front, to be evaluated with this one",
+            ),
+            POSE: POSE_SOCKET,
+            PRESENT: PRESENT_SOCKET,
+        },
+    )
+    source, info, index, position, sample, place, result = add_nodes(
+        group,
+        "NodeGroupInput",
+        "GeometryNodeObjectInfo",
+        "GeometryNodeInputIndex",
+        "GeometryNodeInputPosition",
+        "GeometryNodeSampleIndex",
+        "GeometryNodeSetPosition",
+        "NodeGroupOutput",
+    )
+    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
+    link = group.links.new
+    link(source.outputs["Points"], info.inputs["Object"])
+    link(info.outputs["Geometry"], sample.inputs["Geometry"])
+    link(position.outputs["Position"], enabled_socket(sample.inputs, "Value"))
+    link(index.outputs["Index"], sample.inputs["Index"])
+    link(enabled_socket(sample.outputs, "Value"), place.inputs["Position"])
+    link(source.outputs["Geometry"], place.inputs["Geometry"])
+    # Where the numbers of vertices differ, as before the first points are written, the shape is left alone.
+    link(same_count(group, source.outputs["Geometry"], info.outputs["Geometry"]), place.inputs["Selection"])
+    # Never taken: naming the object in a node is what makes Blender evaluate it.
+    upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
+    choice.input_type = "GEOMETRY"
+    link(source.outputs["Front"], upstream_proxy.inputs["Object"])
+    link(place.outputs["Geometry"], choice.inputs["False"])
+    link(upstream_proxy.outputs["Geometry"], choice.inputs["True"])
+    link(_say_what_is_missing(group, source, choice.outputs["Output"]), result.inputs["Geometry"])
+    return group
+
+
+def _say_what_is_missing(
+    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """For those who open the file without Sinew: a frame in the node editor and, from Blender 4.3 on, a
+    warning at the modifier. Returns what the group is to give."""
+    frame = group.nodes.new("NodeFrame")
+    frame.label, frame.label_size = MISSING, 20
+    frame.location = (0, 300)
+    if not hasattr(bpy.types, "GeometryNodeWarning"):
+        return geometry
+    missing, warning, choice = add_nodes(
+        group, "FunctionNodeBooleanMath", "GeometryNodeWarning", "GeometryNodeSwitch"
+    )
+    missing.operation, choice.input_type = "NOT", "GEOMETRY"
+    warning.inputs["Message"].default_value = MISSING
+    link = group.links.new
+    link(source.outputs[PRESENT], missing.inputs[0])
+    link(missing.outputs[0], warning.inputs["Show"])
+    # A warning that nothing reads is not evaluated.
+    link(warning.outputs["Show"], choice.inputs["Switch"])
+    link(geometry, choice.inputs["False"])
+    link(geometry, choice.inputs["True"])
+    return choice.outputs["Output"]
+
+
+def same_count(
+    group: bpy.types.NodeTree, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """Whether two meshes have the same number of vertices."""
+    first, second, equal = add_nodes(
+        group, "GeometryNodeAttributeDomainSize", "GeometryNodeAttributeDomainSize", "FunctionNodeCompare"
+    )
+    equal.data_type, equal.operation = "INT", "EQUAL"
+    for size, geometry, term in ((first, a, "A"), (second, b, "B")):
+        size.component = "MESH"
+        group.links.new(geometry, size.inputs["Geometry"])
+        group.links.new(size.outputs["Point Count"], enabled_socket(equal.inputs, term))
+    return equal.outputs["Result"]
+
+
+def enabled_socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
+    """A socket of a node that has one of that name for each type of data."""
+    return next(socket for socket in sockets if socket.name == name and socket.enabled)

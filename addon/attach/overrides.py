@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings on library overrides, which Blender does not keep with the file where the library has none.
+
+The modifier that Sinew adds is kept, and the carrier that it names is local: that holds a copy of them.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from . import node_group, properties, stack
+
+
+def keep(obj: bpy.types.Object) -> None:
+    """Copies the settings of a driven override to its carrier."""
+    settings = properties.of(obj)
+    if obj.override_library is not None and settings.point_buffer is not None:
+        properties.copy(settings, properties.of(settings.point_buffer))
+        properties.of(settings.point_buffer).helper = True
+
+
+def take_back() -> None:
+    """Gives all overrides whose settings are gone those that their carriers hold."""
+    for obj in bpy.data.objects:
+        if obj.type != "MESH" or obj.override_library is None or properties.has_sinew(obj):
+            continue
+        nodes = stack.sinew_modifier(obj)
+        point_buffer = node_group.get_input(nodes, "Points") if nodes is not None else None
+        if isinstance(point_buffer, bpy.types.Object) and len(properties.of(point_buffer).replaced_modifiers):
+            properties.copy(properties.of(point_buffer), properties.of(obj))
+            properties.of(obj).helper = False

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the deformed points of a driven object are held, for Sinew's modifier to read: in an attribute of the
+mesh, or in a carrier where the mesh is not the object's own or not what is deformed. Within Blender's
+evaluation they are written to the evaluated attribute or carrier, so no frame of Sinew's touches a mesh."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..features.heat import heat_nodes
+from ..io import mesh_io
+from . import node_group, point_buffer, pose_driver, properties, stack, upstream_proxy
+
+ATTRIBUTE = "sinew_points"
+
+
+def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
+    """Makes what holds the points of a driven object, a carrier or an attribute, and tells Sinew's modifier
+    of it.
+
+    Raises SinewError where what stands in front can not be evaluated apart.
+    """
+    settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
+    if in_buffer:
+        made = upstream_proxy.ensure(obj)
+        if settings.attribute:
+            remove_attributes(obj)
+            settings.attribute = ""
+        kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Front": made}
+    else:
+        upstream_proxy.remove(obj)
+        point_buffer.remove(obj)
+        _ensure_attribute(obj)
+        kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
+    group = heat_nodes.get_or_make() if settings.heat else node_group.get_or_make(kind)
+    if nodes.node_group != group:
+        # It can be on an input that another group does not have.
+        pose_driver.remove(obj)
+        nodes.node_group = group
+        node_group.remove_unused()
+    node_group.set_inputs(nodes, {**inputs, node_group.PRESENT: True})
+
+
+def _ensure_attribute(obj: bpy.types.Object) -> None:
+    settings, mesh = properties.of(obj), obj.data
+    if not settings.attribute:
+        settings.attribute = _free_attribute_name(mesh)
+    attribute = mesh.attributes.get(settings.attribute)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+        # What an evaluation shows that Sinew could not answer.
+        rest = mesh_io.read_points(mesh)
+        mesh_io.write_vectors(mesh, settings.attribute, _marked(rest, rest))
+
+
+def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
+    """Stores float32 [vertices, 3], object space, in the carrier, and has Blender evaluate it.
+
+    rest  the points as the mesh comes with them
+    """
+    point_buffer.write(properties.of(obj).point_buffer, _marked(points, rest))
+
+
+def set_rest_points(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
+    """Gives the carrier the rest points, for an evaluation to move: where their number differs, or anew."""
+    if anew or not are_written(obj, len(rest)):
+        write(obj, rest, rest)
+
+
+def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
+    """_differing_from() in place."""
+    if np.array_equal(shown[:1], rest[:1]) and np.array_equal(shown, rest):
+        shown[:] = _marked(shown, rest)
+
+
+def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
+    """Stores float32 [vertices, 3], linear, in the carrier, and has Blender evaluate it."""
+    mesh = properties.of(obj).point_buffer.data
+    mesh_io.write_vectors(mesh, heat_nodes.COLOURS, colours)
+    mesh.update_tag()
+
+
+def has_colours(obj: bpy.types.Object) -> bool:
+    point_buffer = properties.of(obj).point_buffer
+    return point_buffer is not None and heat_nodes.COLOURS in point_buffer.data.attributes
+
+
+def remove_colours(obj: bpy.types.Object) -> None:
+    if has_colours(obj):
+        mesh_io.remove_attribute(properties.of(obj).point_buffer.data, heat_nodes.COLOURS)
+
+
+def are_written(obj: bpy.types.Object, count: int) -> bool:
+    """Whether the carrier holds points of as many vertices."""
+    point_buffer = properties.of(obj).point_buffer
+    return point_buffer is not None and len(point_buffer.data.vertices) == count
+
+
+def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> bool:
+    """Whether a mesh that has lost Sinew's modifier has its shape itself, as the modifier was applied: then
+    the attribute is gone, too.
+
+    rest, shown  float32 [vertices, 3], points as they were bound and as they were last; None where unknown
+    """
+    settings, own = properties.of(obj), mesh_io.read_points(obj.data)
+    if not settings.replaces_modifiers:
+        return False
+    if settings.point_buffer is None:
+        is_gone = bool(settings.attribute) and settings.attribute not in obj.data.attributes
+        return is_gone and (shown is None or np.array_equal(shown, own))
+    if rest is None or shown is None or rest.shape != own.shape or np.array_equal(rest, own):
+        return False
+    return np.array_equal(_marked(shown, rest), own)
+
+
+def _marked(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """The points; where they are the rest points to the last bit, one of them off by a rounding. So a mesh
+    that Sinew's modifier was applied to is told from one that it was deleted from, and points that Sinew
+    wrote from those that a mesh comes with."""
+    if not np.array_equal(points, rest):
+        return points
+    other = points.copy()
+    other[:1] = np.nextafter(other[:1], np.inf)
+    return other
+
+
+def remove_point_attributes(obj: bpy.types.Object) -> None:
+    """Takes them off the mesh while Sinew rests: a subdivision would work them out for each of its vertices,
+    and exports would have them."""
+    if not obj.data.is_editmode:
+        remove_attributes(obj)
+        if properties.of(obj).attribute:
+            properties.of(obj).attribute = ""
+
+
+def remove(obj: bpy.types.Object) -> None:
+    """Takes away all that held points."""
+    upstream_proxy.remove(obj)
+    point_buffer.remove(obj)
+    remove_point_attributes(obj)
+
+
+def unshare(objects: list[bpy.types.Object]) -> None:
+    """Gives each driven object a carrier and a front of its own where two share them, as copies of an object
+    do: arrange() makes them."""
+    taken: set[str] = set()
+    for obj in objects:
+        settings = properties.of(obj)
+        held = {
+            helper.name_full
+            for helper in (settings.point_buffer, settings.upstream_proxy)
+            if helper is not None
+        }
+        if held & taken and obj.is_editable:
+            settings.point_buffer = settings.upstream_proxy = None
+            settings.upstream_signature = ""
+        taken |= held
+
+
+def _free_attribute_name(mesh: bpy.types.Mesh) -> str:
+    name, number = ATTRIBUTE, 0
+    while name in mesh.attributes:
+        number += 1
+        name = f"{ATTRIBUTE}.{number:03d}"
+    return name
+
+
+def remove_attributes(obj: bpy.types.Object) -> None:
+    """Takes all attributes of ours off the mesh: one that was copied, or saved by an earlier Sinew, can have
+    more than one."""
+    mesh = obj.data
+    if not mesh.is_editable:
+        return
+    for name in [attribute.name for attribute in mesh.attributes]:
+        if name.startswith((ATTRIBUTE, heat_nodes.COLOURS)):
+            mesh_io.remove_attribute(mesh, name)

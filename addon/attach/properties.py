@@ -1,0 +1,347 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Sinew stores of an object, in the .blend file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+import sinew
+
+from ..core import inbetween
+from ..core.scale_rule import SCALE_RULES
+from . import stage_settings
+from .stage_settings import OFF
+
+METHODS = {method.name: method for method in sinew.methods()}
+# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
+BLENDER = "blender"
+
+
+def method_label(name: str) -> str:
+    return "Armature modifier" if name == BLENDER else METHODS[name].label
+
+
+@dataclass
+class Listeners:
+    """Who hears of changed settings; set on registration, as what reacts to settings also reads them."""
+
+    method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    inbetween_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+    object_requested: Callable[[bpy.types.Object], None] | None = None
+    mesh_requested: Callable[[bpy.types.Mesh], None] | None = None
+    heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+
+
+listeners = Listeners()
+
+
+def _method_changed(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    if listeners.method_changed is not None:
+        listeners.method_changed(settings.id_data, context)
+
+
+def _enabled_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+    if listeners.enabled_changed is not None:
+        listeners.enabled_changed(settings.id_data, context)
+
+
+def _object_requested(settings: SinewSettings) -> float:
+    if listeners.object_requested is not None:
+        listeners.object_requested(settings.id_data)
+    return 0.0
+
+
+def _mesh_requested(mesh: bpy.types.Mesh) -> float:
+    if listeners.mesh_requested is not None:
+        listeners.mesh_requested(mesh)
+    return 0.0
+
+
+def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
+    if listeners.heat_changed is not None:
+        listeners.heat_changed(settings.id_data, context)
+
+
+# On a library override, only what is marked so is kept with the file.
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
+SAME_METHOD = "SAME"
+
+
+def method_of_modifier(method: str, own: str, is_first: bool) -> str:
+    """What one of an object's Armature modifiers blends by; the first has the object's.
+
+    method  the object's
+    own     the stand-in's
+    """
+    return method if is_first or own == SAME_METHOD else own
+
+
+class SinewReplacedModifier(bpy.types.PropertyGroup):
+    """What Sinew keeps of an Armature modifier that it stands in for, called `name`."""
+
+    armature: bpy.props.PointerProperty(
+        name="Armature",
+        description="The armature that deforms this mesh",
+        type=bpy.types.Object,
+        poll=lambda _self, obj: obj.type == "ARMATURE",
+        override=OVERRIDABLE,
+    )
+    # The Armature modifier's own flags, given back on removal.
+    show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    preserve_volume: bpy.props.BoolProperty(
+        description="The Armature modifier's own choice, while a saved file has the one nearest to Sinew's",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How this modifier blends, where several chained Armature modifiers deform the mesh",
+        items=[
+            (SAME_METHOD, "Same Method", "The method that is chosen for the object", 0),
+            *((m.name, m.label, m.description, m.number + 1) for m in METHODS.values()),
+        ],
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
+
+
+STAGE_GROUPS = stage_settings.groups(_method_changed)
+
+
+class SinewSettings(bpy.types.PropertyGroup):
+    """How Sinew drives this object: in the place of the Armature modifiers of `stand_ins`. Without any, the
+    object is not driven."""
+
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How the bones' motions are blended at each vertex",
+        items=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
+    scale_rule: bpy.props.EnumProperty(
+        name="Scale",
+        description="What becomes of bones' scale under methods that blend rigid motions",
+        items=[(r.name, r.label, r.description, r.number) for r in SCALE_RULES],
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
+    enabled: bpy.props.BoolProperty(
+        name="On",
+        description="Deform with Sinew; off: with Blender's Armature modifier, to compare the two",
+        default=True,
+        options=set(),
+        update=_enabled_changed,
+        override=OVERRIDABLE,
+    )
+    heat: bpy.props.BoolProperty(
+        name="Heat Map",
+        description="Show a measure of the deformation as colours of the mesh",
+        options=set(),
+        update=_heat_changed,
+        override=OVERRIDABLE,
+    )
+    leave_small: bpy.props.BoolProperty(
+        name="Leave to Blender Where Faster",
+        description="Have the Armature modifier deform this mesh where it gives the same shape and, as the "
+        "mesh is small, takes less time",
+        default=True,
+        options=set(),
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
+    replaced_modifiers: bpy.props.CollectionProperty(
+        type=SinewReplacedModifier, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
+    )
+    replaces_modifiers: bpy.props.BoolProperty(
+        description="The Armature modifiers are switched off for Sinew's; not so while some of Blender's "
+        "tools need them",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    is_saved: bpy.props.BoolProperty(
+        description="As saved files have it: the Armature modifiers deform, by their nearest shape",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    parent_type: bpy.props.StringProperty(
+        description="The object's parent type before Sinew made an Armature modifier of it",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    attribute: bpy.props.StringProperty(
+        description="Attribute that holds the points; empty where the carrier does",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    point_buffer: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
+    upstream_proxy: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
+    upstream_signature: bpy.props.StringProperty(options={"HIDDEN"})
+    helper: bpy.props.BoolProperty(
+        description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
+    )
+    copied: bpy.props.PointerProperty(
+        description="The object that this one is a comparison's copy of",
+        type=bpy.types.Object,
+        options={"HIDDEN"},
+    )
+    copied_for: bpy.props.StringProperty(
+        description="The method that this copy is there to show; empty for all but copies", options={"HIDDEN"}
+    )
+    had_animation: bpy.props.BoolProperty(
+        description="The object had animation data, be it empty, before Sinew",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    mix: bpy.props.PointerProperty(type=STAGE_GROUPS["mix"])
+    pose: bpy.props.FloatProperty(
+        options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
+    )
+    asked: bpy.props.FloatProperty(
+        get=_object_requested,
+        options={"HIDDEN"},
+        description="Read by pose_driver's driver, to ask for points",
+    )
+    error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @property
+    def mixed_method(self) -> str:
+        """The method that the mix has for its second; empty where it is off."""
+        return "" if self.mix.method == OFF else self.mix.method
+
+    @property
+    def armature(self) -> bpy.types.Object | None:
+        """The armature of the first modifier that Sinew stands in for."""
+        return self.replaced_modifiers[0].armature if self.replaced_modifiers else None
+
+    @property
+    def armatures(self) -> list[bpy.types.Object]:
+        """All that deform the object, each once."""
+        return list(dict.fromkeys(s.armature for s in self.replaced_modifiers if s.armature is not None))
+
+
+def of(obj: bpy.types.Object) -> SinewSettings:
+    return obj.sinew
+
+
+def has_sinew(obj: bpy.types.Object) -> bool:
+    # Asking for the settings of an object that has none would leave an empty group in the file.
+    if obj.type != "MESH" or not obj.is_property_set("sinew"):
+        return False
+    return len(obj.sinew.replaced_modifiers) > 0 and not obj.sinew.helper
+
+
+def is_helper(obj: bpy.types.Object) -> bool:
+    """Whether Sinew made this object for another one."""
+    return obj.is_property_set("sinew") and obj.sinew.helper
+
+
+def is_copy(obj: bpy.types.Object) -> bool:
+    """Whether a comparison made this object, to show a method beside the original."""
+    return obj.is_property_set("sinew") and bool(obj.sinew.copied_for)
+
+
+def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+    """Gives a group of settings the values of another, without telling the listeners."""
+    for name, prop in source.bl_rna.properties.items():
+        if name == "rna_type":
+            continue
+        if prop.type == "COLLECTION":
+            getattr(target, name).clear()
+            for item in getattr(source, name):
+                copy(item, getattr(target, name).add())
+        elif prop.type == "POINTER" and isinstance(getattr(source, name), bpy.types.PropertyGroup):
+            if source.is_property_set(name):
+                copy(getattr(source, name), getattr(target, name))
+        elif not prop.is_readonly and source.is_property_set(name):
+            value = getattr(source, name)
+            # By key: assigning to the property itself calls the listeners.
+            if prop.type == "ENUM":
+                target[name] = next(i.value for i in prop.enum_items if i.identifier == value)
+            elif prop.type == "BOOLEAN":
+                target[name] = value
+            else:
+                setattr(target, name, value)
+
+
+def store(group: bpy.types.PropertyGroup, name: str, value: bool) -> None:
+    """Sets what Sinew keeps for itself: telling Blender would touch the object's mesh, as its weights' change
+    does."""
+    if getattr(group, name) != value:
+        group[name] = value
+
+
+def clear(obj: bpy.types.Object) -> None:
+    """Takes Sinew's settings out of the object, as if they had never been."""
+    obj.property_unset("sinew")
+
+
+def _inbetween_changed(armature: bpy.types.Object, context: bpy.types.Context) -> None:
+    if listeners.inbetween_changed is not None:
+        listeners.inbetween_changed(armature, context)
+
+
+class SinewActionHold(bpy.types.PropertyGroup):
+    """A slot of an action whose bones Sinew plays; its name is the slot's handle, 0 where there are none."""
+
+    muted: bpy.props.StringProperty(description="The curves that the artist had muted")
+
+    def muted_by_artist(self) -> set[tuple[str, int]]:
+        return {(path, index) for path, index in json.loads(self.muted or "[]")}
+
+    def set_muted_by_artist(self, curves: set[tuple[str, int]]) -> None:
+        text = json.dumps(sorted(curves)) if curves else ""
+        if self.muted != text:
+            self.muted = text
+
+
+CLASSES = (SinewReplacedModifier, *STAGE_GROUPS.values(), SinewSettings, SinewActionHold)
+
+# A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
+MESH_REQUEST = bpy.props.FloatProperty(
+    get=_mesh_requested, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
+)
+
+# Properties of objects themselves, as a group that the linked file does not have is lost from a library
+# override on saving (Blender 5.0 and 5.2).
+INBETWEEN = {
+    "sinew_inbetween": bpy.props.EnumProperty(
+        name="In-betweens",
+        description="How the bones move between the keyed poses of the action",
+        items=[
+            (inbetween.BLENDER, "Blender's Curves", "Each channel by its own curve, as without Sinew", 0),
+            *((m.name, m.label, m.description, m.number) for m in inbetween.METHODS.values()),
+        ],
+        default=inbetween.BLENDER,
+        options=set(),
+        override=OVERRIDABLE,
+        update=_inbetween_changed,
+    ),
+    "sinew_inbetween_path": bpy.props.EnumProperty(
+        name="Path",
+        description="Which keyed poses shape the way from one to the next",
+        items=[
+            (
+                inbetween.STRAIGHT,
+                "Key to Key",
+                "The two neighbours, at the pace of the keys' own interpolation",
+                0,
+            ),
+            (
+                inbetween.SPLINE,
+                "Spline",
+                "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace",
+                1,
+            ),
+        ],
+        default=inbetween.STRAIGHT,
+        options=set(),
+        override=OVERRIDABLE,
+        update=_inbetween_changed,
+    ),
+}

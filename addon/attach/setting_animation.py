@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys and drivers of Sinew's own settings."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..io import actions
+from ..io.animation_paths import players
+from . import pose_driver, properties
+
+
+def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
+    """Takes keys of Sinew's settings off the object, unless another that Sinew is on plays them, too."""
+    animation = obj.animation_data
+    if animation is None:
+        return
+    for player in players(animation):
+        action = player.action
+        if action is None or (action.users > 1 and _others_need(obj, player)):
+            continue
+        removed = 0
+        for curves in actions.curve_lists(action, actions.slot_of(player)):
+            for curve in [c for c in curves if c.data_path.startswith(path)]:
+                curves.remove(curve)
+                removed += 1
+        left = actions.curve_lists(action, actions.slot_of(player))
+        if removed and player is animation and not any(len(curves) for curves in left):
+            animation.action = None
+            if not action.users:
+                bpy.data.actions.remove(action)
+
+
+def _others_need(obj: bpy.types.Object, player: bpy.types.AnimData | bpy.types.NlaStrip) -> bool:
+    """Whether another object that Sinew is on plays the same curves, as a linked duplicate does."""
+    played = (player.action, actions.slot_of(player))
+    others = (o for o in bpy.data.objects if o != obj and o.animation_data and properties.has_sinew(o))
+    return any((p.action, actions.slot_of(p)) == played for o in others for p in players(o.animation_data))
+
+
+def remove(obj: bpy.types.Object) -> None:
+    """Takes keys and drivers of Sinew's settings off the object, and its animation data if they were all."""
+    remove_keys(obj)
+    animation = obj.animation_data
+    if animation is None:
+        return
+    for driver in [d for d in animation.drivers if d.data_path.startswith("sinew.")]:
+        animation.drivers.remove(driver)
+    pose_driver.remove_empty_animation(obj)

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose modifiers stand where in an object's stack. Changes nothing."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..io.animation_paths import is_visibility_animated
+from . import node_group, properties
+
+# Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
+HARMLESS_UPSTREAM = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
+
+
+def is_on(modifier: bpy.types.Modifier) -> bool:
+    return modifier.show_viewport or modifier.show_render
+
+
+def _can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+    """Whether it is on, or an animation may switch it on."""
+    return is_on(modifier) or is_visibility_animated(obj, modifier)
+
+
+def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    """Sinew's own modifier; one that has lost its node group is known by its name."""
+    nodes = [m for m in obj.modifiers if m.type == "NODES"]
+    lost = (m for m in nodes if m.node_group is None and m.name.startswith("Sinew"))
+    return next((m for m in nodes if node_group.is_sinew(m)), None) or next(lost, None)
+
+
+def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:
+    """The first Armature modifier that Sinew stands in for, or would."""
+    return next(iter(armature_modifiers(obj)), None)
+
+
+def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
+    """The Armature modifiers that Sinew stands in for, or would: the first and those right behind it, which
+    Blender may chain as Multi Modifiers."""
+    own, run = sinew_modifier(obj), []
+    for modifier in list(obj.modifiers)[_start(obj) :]:
+        if modifier.type == "ARMATURE":
+            run.append(modifier)
+        elif modifier != own:
+            break
+    return run
+
+
+def _start(obj: bpy.types.Object) -> int:
+    """The place of the first Armature modifier that Sinew stands in for; of the first one with an armature,
+    those that are switched off last, where it would."""
+    modifiers = list(obj.modifiers)
+    if not properties.has_sinew(obj):
+        candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
+        return _index(obj, min(candidates, key=lambda m: not _can_be_on(obj, m), default=None))
+    behind_own = _index(obj, sinew_modifier(obj)) + 1
+    names = {replaced.name for replaced in properties.of(obj).replaced_modifiers}
+    known = [i for i, m in enumerate(modifiers) if m.type == "ARMATURE" and m.name in names]
+    start = next(iter(known), behind_own)
+    # Renamed, or new: between our own modifier and the first that is known.
+    between = modifiers[behind_own:start]
+    if between and all(m.type == "ARMATURE" for m in between):
+        start = behind_own
+    # New, right in front of ours or of the first.
+    ahead = min(start, len(modifiers)) - 1
+    if ahead >= 0 and modifiers[ahead] == sinew_modifier(obj):
+        ahead -= 1
+    # Or renamed, where Sinew is behind them: Sinew has switched those off.
+    while ahead >= 0 and (_deforms(modifiers[ahead]) or (not known and modifiers[ahead].type == "ARMATURE")):
+        start, ahead = ahead, ahead - 1
+    return start
+
+
+def _deforms(modifier: bpy.types.Modifier) -> bool:
+    return modifier.type == "ARMATURE" and modifier.object is not None and is_on(modifier)
+
+
+def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
+    return next((i for i, m in enumerate(obj.modifiers) if m == modifier), len(obj.modifiers))
+
+
+def visibility_is_animated(obj: bpy.types.Object) -> bool:
+    """Whether an animation decides when one of the Armature modifiers is on."""
+    return any(is_visibility_animated(obj, modifier) for modifier in armature_modifiers(obj))
+
+
+def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The modifiers ahead of those that Sinew stands in for, without Sinew's own."""
+    # Also while it has no node group yet.
+    own = sinew_modifier(obj)
+    ahead = list(obj.modifiers)[: _index(obj, armature_modifier(obj))]
+    return [m for m in ahead if m != own and not node_group.is_sinew(m)]
+
+
+def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Those ahead that are on and change positions, topology or weights."""
+    return [m for m in upstream(obj) if _can_be_on(obj, m) and m.type not in HARMLESS_UPSTREAM]
+
+
+def parent_deforms(obj: bpy.types.Object) -> bool:
+    """Whether the object's parent deforms it ahead of all modifiers (parent type Armature)."""
+    return obj.parent is not None and obj.parent_type == "ARMATURE" and obj.parent.type == "ARMATURE"

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mesh as it comes to the Armature modifier, where something in front of it changes the mesh.
+
+A copy of the object, in no scene, has the modifiers in front and no others. Sinew's own modifier names it,
+so Blender evaluates it along with the object, and its evaluated mesh is what Sinew deforms.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.errors import SinewError
+from ..io.animation_paths import animated_paths
+from . import properties, stack
+
+# A copy would run a simulation of its own, with a cache of its own.
+SIMULATIONS = {
+    "CLOTH",
+    "SOFT_BODY",
+    "FLUID",
+    "DYNAMIC_PAINT",
+    "PARTICLE_SYSTEM",
+    "PARTICLE_INSTANCE",
+    "EXPLODE",
+}
+
+# These can change weights from one frame to the next, or which vertices there are without changing how many.
+WEIGHT_CHANGERS = {
+    "BOOLEAN",
+    "DECIMATE",
+    "REMESH",
+    "WELD",
+    "VERTEX_WEIGHT_EDIT",
+    "VERTEX_WEIGHT_MIX",
+    "VERTEX_WEIGHT_PROXIMITY",
+    "DATA_TRANSFER",
+    "NODES",
+}
+
+
+def is_needed(obj: bpy.types.Object) -> bool:
+    """Whether what comes to the Armature modifier is anything but the mesh and its relative shape keys."""
+    keys = obj.data.shape_keys
+    absolute = keys is not None and not keys.use_relative
+    return absolute or stack.parent_deforms(obj) or bool(stack.upstream_changes(obj))
+
+
+def check(obj: bpy.types.Object) -> None:
+    """Raises SinewError where what stands in front can not be evaluated apart."""
+    first = stack.armature_modifier(obj)
+    if first is not None and first.use_multi_modifier and stack.parent_deforms(obj):
+        raise SinewError(
+            f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
+            "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
+        )
+    for modifier in stack.upstream_changes(obj):
+        if modifier.type in SIMULATIONS:
+            raise SinewError(
+                f"{obj.name}: modifier {modifier.name} in front of {stack.armature_modifier(obj).name} is a "
+                "simulation, which Sinew can not run twice; apply it or move it behind"
+            )
+
+
+def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
+    """The copy, made anew where the modifiers in front are others than those that it has."""
+    settings = properties.of(obj)
+    if not is_needed(obj):
+        remove(obj)
+        return None
+    check(obj)
+    wanted = signature(obj)
+    if (
+        settings.upstream_proxy is None
+        or settings.upstream_proxy.data != obj.data
+        or settings.upstream_signature != wanted
+    ):
+        # Before the old one goes: at its address, Blender would take the new one for evaluated already.
+        made = _make(obj)
+        remove(obj)
+        settings.upstream_proxy, settings.upstream_signature = made, wanted
+        made.name = f"{obj.name} Sinew front"
+    return settings.upstream_proxy
+
+
+def remove(obj: bpy.types.Object) -> None:
+    settings = properties.of(obj)
+    copy, settings.upstream_proxy, settings.upstream_signature = settings.upstream_proxy, None, ""
+    if copy is not None and copy.library is None:
+        bpy.data.objects.remove(copy)
+
+
+def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
+    """The mesh that comes to the Armature modifier; None as long as Blender has not evaluated it."""
+    evaluated = properties.of(obj).upstream_proxy.evaluated_get(depsgraph)
+    return evaluated.data if evaluated.is_evaluated else None
+
+
+def changes_weights(obj: bpy.types.Object) -> bool:
+    """Whether weights can differ from frame to frame."""
+    return any(m.type in WEIGHT_CHANGERS for m in stack.upstream_changes(obj))
+
+
+def _make(obj: bpy.types.Object) -> bpy.types.Object:
+    copy = obj.copy()
+    if copy.override_library is not None:
+        copy.make_local(clear_liboverride=True)
+    properties.clear(copy)
+    properties.of(copy).helper = True
+    wanted = {m.name for m in stack.upstream(obj)}
+    for modifier in [m for m in copy.modifiers if m.name not in wanted]:
+        copy.modifiers.remove(modifier)
+    # Follows the object whatever moves that.
+    for constraint in list(copy.constraints):
+        copy.constraints.remove(constraint)
+    copy.constraints.new("COPY_TRANSFORMS").target = obj
+    _keep_animation_of_modifiers(copy)
+    return copy
+
+
+def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
+    animation = copy.animation_data
+    if animation is None:
+        return
+    for driver in [d for d in animation.drivers if not d.data_path.startswith("modifiers[")]:
+        animation.drivers.remove(driver)
+    if not copy.modifiers:
+        copy.animation_data_clear()
+
+
+def signature(obj: bpy.types.Object) -> str:
+    """Differs where the copy would: by the settings of what stands in front, and the pinned shape key."""
+    pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
+    animation = obj.animation_data
+    action = animation.action.session_uid if animation is not None and animation.action is not None else 0
+    animated = tuple(path for path in animated_paths(obj) if path.startswith("modifiers["))
+    modifiers = [_modifier_values(modifier, animated) for modifier in stack.upstream(obj)]
+    parent = (obj.parent_type, obj.parent and obj.parent.session_uid, obj.parent_bone)
+    return repr((pinned, action, parent, modifiers))
+
+
+def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) -> list:
+    """What the artist set; what an animation sets comes to the copy by itself."""
+    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+    return [
+        (name, value)
+        for name, value in _values(modifier, depth=3)
+        if not any(path.startswith((f"{start}.{name}", f"{start}{name}")) for path in animated)
+    ]
+
+
+# How a modifier is shown, not what it does.
+_INTERFACE = {"rna_type", "show_expanded", "is_active", "execution_time", "persistent_uid"}
+
+
+def _values(struct: bpy.types.bpy_struct, depth: int) -> list:
+    """All that a modifier's settings hold, nested; data blocks by their identity."""
+    values = [(f'["{key}"]', _id_property(value)) for key, value in _id_properties(struct)]
+    for name, prop in struct.bl_rna.properties.items():
+        if name in _INTERFACE:
+            continue
+        value = getattr(struct, name)
+        if isinstance(value, bpy.types.ID):
+            value = value.session_uid
+        elif prop.type == "POINTER":
+            value = _values(value, depth - 1) if value is not None and depth else None
+        elif prop.type == "COLLECTION":
+            value = [_values(item, depth - 1) for item in value] if depth else None
+        elif getattr(prop, "is_array", False):
+            value = tuple(value)
+        values.append((name, value))
+    return values
+
+
+def _id_properties(struct: bpy.types.bpy_struct) -> list:
+    try:
+        return sorted(struct.items())
+    except TypeError:
+        return []
+
+
+def _id_property(value: object) -> object:
+    if isinstance(value, bpy.types.ID):
+        return value.session_uid
+    return value.to_list() if hasattr(value, "to_list") else value

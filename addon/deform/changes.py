@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender says changed in an update."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import bpy
+
+
+@dataclass
+class Changes:
+    """The data touched since the last update, by session_uid.
+
+    touched    objects, meshes and shape keys that were touched in any way
+    objects    whose geometry was touched
+    moved      that were moved
+    meshes     whose own geometry was touched: points, weights, topology, shape keys; not those that only
+               follow their shape keys' animation
+    armatures  whose bones may differ
+    edited     the objects themselves that were touched so, and not by a change of frame
+    structure  objects may have come, gone or been hidden
+    frame      this is a change of frame
+    complete   whatever is not listed is as it was at the last update; else all may have changed
+    """
+
+    touched: set[int] = field(default_factory=set)
+    objects: set[int] = field(default_factory=set)
+    moved: set[int] = field(default_factory=set)
+    meshes: set[int] = field(default_factory=set)
+    armatures: set[int] = field(default_factory=set)
+    edited: list[bpy.types.Object] = field(default_factory=list)
+    structure: bool = False
+    frame: bool = False
+    complete: bool = False
+
+    @staticmethod
+    def are_of_meshes_only(depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether nothing changed but meshes, and what animation moves: all that an artist changes of an
+        object or of its data makes Blender list the mesh, the armature or the scene, too (seen on 4.2 and
+        5.2)."""
+        changed = depsgraph.id_type_updated
+        return not (changed("ARMATURE") or changed("SCENE") or changed("COLLECTION"))
+
+    @staticmethod
+    def are_motion_only(depsgraph: bpy.types.Depsgraph) -> bool:
+        return not depsgraph.id_type_updated("MESH") and Changes.are_of_meshes_only(depsgraph)
+
+    @staticmethod
+    def meshes_in(depsgraph: bpy.types.Depsgraph) -> set[int] | None:
+        """As `meshes`, without reading all the rest; None where no mesh was touched in any way."""
+        if not depsgraph.id_type_updated("MESH"):
+            return None
+        return _changed_meshes(depsgraph.updates)
+
+    @classmethod
+    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:
+        updates = depsgraph.updates
+        changes = cls(frame=frame, complete=complete, meshes=_changed_meshes(updates))
+        for update in updates:
+            what = update.id
+            if isinstance(what, bpy.types.Object):
+                uid = what.original.session_uid
+                changes.touched.add(uid)
+                if update.is_updated_geometry:
+                    changes.objects.add(uid)
+                    if not frame:
+                        changes.edited.append(what.original)
+                if update.is_updated_transform:
+                    changes.moved.add(uid)
+            elif isinstance(what, bpy.types.Mesh | bpy.types.Key):
+                changes.touched.add(what.original.session_uid)
+            elif isinstance(what, bpy.types.Armature):
+                changes.armatures.add(what.original.session_uid)
+            elif isinstance(what, bpy.types.Scene | bpy.types.Collection):
+                changes.structure = True
+        return changes
+
+    def add(self, other: Changes) -> None:
+        """Makes these the changes of both evaluations."""
+        self.touched |= other.touched
+        self.objects |= other.objects
+        self.moved |= other.moved
+        self.meshes |= other.meshes
+        self.armatures |= other.armatures
+        self.edited += other.edited
+        self.structure |= other.structure
+        self.complete &= other.complete
+
+
+def names_of_changed_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:
+    """The full name of each mesh of Changes.meshes, from evaluated data alone: the originals may be gone by
+    now, as handlers deleted them."""
+    if not depsgraph.id_type_updated("MESH"):
+        return set()
+    return _changed_meshes(depsgraph.updates, lambda evaluated: evaluated.name_full)
+
+
+def _uid(evaluated: bpy.types.ID) -> int:
+    return evaluated.original.session_uid
+
+
+def _changed_meshes(updates: bpy.types.bpy_prop_collection, identity: Callable = _uid) -> set:
+    """Shape keys that an animation sets touch the geometry of their mesh, and nothing else of it; so does
+    little that an artist does, and then the keys are not listed (seen on 4.2 and 5.2)."""
+    keys, meshes = set(), []
+    for update in updates:
+        if isinstance(update.id, bpy.types.Key):
+            keys.add(identity(update.id))
+        elif isinstance(update.id, bpy.types.Mesh) and update.is_updated_geometry:
+            meshes.append((update.id, update.is_updated_shading or update.is_updated_transform))
+    return {
+        identity(mesh)
+        for mesh, whole in meshes
+        if whole or mesh.shape_keys is None or identity(mesh.shape_keys) not in keys
+    }

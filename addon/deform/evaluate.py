@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Final points of evaluated meshes, and the method they are deformed with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from types import MappingProxyType
+
+import bpy
+import numpy as np
+
+from ..attach import attach, properties, setting_animation, stage_settings
+from ..attach.properties import BLENDER
+from ..core import interrupt, parameters
+from ..core.errors import SinewError, WrongUse
+from ..core.parameters import Value
+from ..core.spaces import transformed_axes
+from ..core.views import View, of_one_size, seen_extent, whole_view
+from ..io import mesh_io
+from . import handlers
+
+
+def method_names() -> list[str]:
+    return [*properties.METHODS, BLENDER]
+
+
+def check_methods(names: Iterable[str]) -> None:
+    for name in names:
+        if name not in method_names():
+            raise WrongUse(f"method: expected one of {', '.join(method_names())}, got {name!r}")
+
+
+def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy.types.Object]:
+    """The scene's meshes that an armature deforms, all or the one called `name`; visible from now on, for
+    Blender does not evaluate what is hidden. Raises SinewError where there are none."""
+    meshes = attach.deformed_meshes(list(scene.objects))
+    if name is not None:
+        meshes = [obj for obj in meshes if obj.name == name]
+    if not meshes:
+        what = (
+            f"no mesh called {name!r} that an armature deforms"
+            if name
+            else "no mesh is deformed by an armature"
+        )
+        raise SinewError(what)
+    show(meshes)
+    return meshes
+
+
+def show(meshes: list[bpy.types.Object]) -> None:
+    """Makes meshes of the scene visible, with the collections that they are in."""
+    _show_layers(bpy.context.view_layer.layer_collection)
+    for obj in meshes:
+        obj.hide_viewport = False
+        obj.hide_render = False
+        if obj.name in bpy.context.view_layer.objects:
+            obj.hide_set(False)
+    # Their collection is shown with all others.
+    for copy in filter(properties.is_copy, bpy.context.scene.objects):
+        copy.hide_viewport = copy.hide_render = True
+
+
+@contextmanager
+def shown(meshes: list[bpy.types.Object]) -> Iterator[None]:
+    """Makes meshes of the scene visible as show() does, and as they were afterwards."""
+    layers = list(_layers(bpy.context.view_layer.layer_collection))
+    flags = [
+        *((layer, name, getattr(layer, name)) for layer in layers for name in ("exclude", "hide_viewport")),
+        *(
+            (owner, name, getattr(owner, name))
+            for owner in (*(layer.collection for layer in layers), *meshes)
+            for name in ("hide_viewport", "hide_render")
+        ),
+    ]
+    hidden = [obj for obj in meshes if obj.hide_get()]
+    show(meshes)
+    try:
+        yield
+    finally:
+        for obj in hidden:
+            obj.hide_set(True)
+        for owner, name, value in flags:
+            if getattr(owner, name) != value:
+                setattr(owner, name, value)
+
+
+def use_method(obj: bpy.types.Object, method: str) -> None:
+    """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not drive it."""
+    error = use_methods([(obj, method)])[0]
+    if error is not None:
+        raise error
+
+
+def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
+    """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
+    return _use_methods(wanted, handlers.changing)
+
+
+def use_methods_for_file(
+    wanted: Sequence[tuple[bpy.types.Object, str]],
+    scales: Mapping[bpy.types.Object, str | None],
+    values: Mapping[bpy.types.Object, Mapping[str, Value]],
+) -> list[SinewError | None]:
+    """The same for a file that was opened to be saved so (see handlers.changing_for_file), and with the names
+    of their scale rules, where None leaves an object its own, and their parameters."""
+    return _use_methods(wanted, handlers.changing_for_file, scales, values)
+
+
+def set_parameters(values: Mapping[str, Value]) -> None:
+    """From now on every mesh on which a method is put has these, as of core.parameters.parse()."""
+    _values_of_all.clear()
+    _values_of_all.update(values)
+
+
+_values_of_all: dict[str, Value] = {}
+
+
+def _use_methods(
+    wanted: Sequence[tuple[bpy.types.Object, str]],
+    changing: Callable[[bpy.types.Context], AbstractContextManager[None]],
+    scales: Mapping[bpy.types.Object, str | None] = MappingProxyType({}),
+    values: Mapping[bpy.types.Object, Mapping[str, Value]] = MappingProxyType({}),
+) -> list[SinewError | None]:
+    errors: list[SinewError | None] = []
+    with changing(bpy.context):
+        for obj, method in wanted:
+            try:
+                _choose(obj, method, values.get(obj, _values_of_all))
+                if scales.get(obj) is not None:
+                    # As of the method: what is asked for wins over keys in the file.
+                    setting_animation.remove_keys(obj, "sinew.scale_rule")
+                    properties.of(obj).scale_rule = scales[obj]
+                errors.append(None)
+            except SinewError as error:
+                errors.append(error)
+    for index, (obj, method) in enumerate(wanted):
+        if errors[index] is None and method != BLENDER and properties.of(obj).error:
+            errors[index] = SinewError(properties.of(obj).error)
+    return errors
+
+
+def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> None:
+    if method == BLENDER:
+        if properties.has_sinew(obj):
+            properties.of(obj).enabled = False
+        return
+    _check_groups(values)
+    attach.add(obj, method)
+    # What is asked for wins over keys in the file.
+    setting_animation.remove_keys(obj, "sinew.method")
+    attach.use_one_method(obj, method)
+    for name, value in values.items():
+        owner, _dot, own_name = name.partition(".")
+        setting_animation.remove_keys(obj, f"sinew.{name}")
+        setattr(getattr(properties.of(obj), owner), own_name, stage_settings.as_stored(value))
+    if not properties.of(obj).enabled:
+        properties.of(obj).enabled = True
+
+
+def _check_groups(values: Mapping[str, Value]) -> None:
+    """Raises SinewError for a vertex group that no mesh of the file has; single ones may lack it."""
+    known = parameters.named()
+    for name, value in values.items():
+        if known[name].kind == "vertex_group" and value:
+            meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+            if not any(value in mesh.vertex_groups for mesh in meshes):
+                raise SinewError(f"{name}: no mesh has a vertex group {value!r}")
+
+
+def use_method_on(meshes: Iterable[bpy.types.Object], method: str) -> None:
+    for error in use_methods([(obj, method) for obj in meshes]):
+        if error is not None:
+            raise error
+
+
+def drivable_meshes(
+    scene: bpy.types.Scene, path: Path, methods: Iterable[str], name: str | None = None
+) -> tuple[list[bpy.types.Object], list[str]]:
+    """Those of deformed_meshes that take all `methods`, and a sentence for each of the others.
+
+    Raises SinewError that names the file `path` where none is left.
+    """
+    try:
+        meshes = deformed_meshes(scene, name)
+    except SinewError as error:
+        raise SinewError(f"{path}: {error}") from None
+    taken, reasons = [], []
+    for obj in meshes:
+        try:
+            for method in methods:
+                use_method(obj, method)
+            taken.append(obj)
+        except SinewError as error:
+            reasons.append(str(error))
+    if not taken:
+        raise SinewError(f"{path}: no mesh that Sinew can drive: {reasons[0]}")
+    return taken, reasons
+
+
+def length_unit(scene: bpy.types.Scene) -> str:
+    """What one unit of Blender is called in the file: "m", or "units" where it is no metre."""
+    units = scene.unit_settings
+    return "m" if units.system != "NONE" and units.scale_length == 1.0 else "units"
+
+
+def set_frame(scene: bpy.types.Scene, frame: float) -> None:
+    whole = int(np.floor(frame))
+    scene.frame_set(whole, subframe=float(frame - whole))
+    interrupt.check()
+
+
+def whole_views(
+    meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
+) -> list[View]:
+    """For each frame a view that holds the final meshes under all methods; all of one size."""
+    extents: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
+    for method in methods:
+        use_method_on(meshes, method)
+        for frame, own in extents.items():
+            set_frame(bpy.context.scene, frame)
+            own.append(seen_extent(world_points(meshes)))
+    return of_one_size([whole_view(own) for own in extents.values()])
+
+
+def final_points(obj: bpy.types.Object) -> np.ndarray:
+    """Vertices of the final evaluated mesh, object space, float32 [vertices, 3]."""
+    return mesh_io.read_points(_evaluated_mesh(obj))
+
+
+def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
+    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]; in memory
+    axis by axis, as measuring wants them."""
+    parts = []
+    for obj in objects:
+        matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+        parts.append(transformed_axes(final_points(obj), matrix))
+    return np.concatenate(parts, axis=1).T
+
+
+def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def _show_layers(layer: bpy.types.LayerCollection) -> None:
+    for each in _layers(layer):
+        each.exclude = False
+        each.hide_viewport = False
+        each.collection.hide_viewport = False
+        each.collection.hide_render = False
+
+
+def _layers(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:
+    """The layer and all below it, parents first."""
+    yield layer
+    for child in layer.children:
+        yield from _layers(child)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender calls at its events: the lists of bpy.app.handlers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import bpy
+
+# Blender 4.2 does not tell that objects came from another file: there each frame has to be looked at.
+IMPORTS_ARE_ANNOUNCED = hasattr(bpy.app.handlers, "blend_import_post")
+
+
+_OURS = __package__.rpartition(".")[0]
+
+# At these others can change meshes while Sinew works.
+_CHANGING_EVENTS = (
+    "depsgraph_update_pre",
+    "depsgraph_update_post",
+    "frame_change_pre",
+    "frame_change_post",
+    "save_pre",
+    "save_post",
+)
+
+
+def others_are_subscribed() -> bool:
+    """Whether Blender calls others than Sinew while Sinew changes settings or the file is saved."""
+    return any(
+        not _is_ours(function) for event in _CHANGING_EVENTS for function in getattr(bpy.app.handlers, event)
+    )
+
+
+def others_follow(event: str, function: Callable) -> bool:
+    """Whether Blender calls others than Sinew after one of its functions."""
+    functions = getattr(bpy.app.handlers, event)
+    if function not in functions:
+        return False
+    return any(not _is_ours(each) for each in functions[functions.index(function) + 1 :])
+
+
+def _is_ours(function: Callable) -> bool:
+    return (getattr(function, "__module__", None) or "").startswith(_OURS)
+
+
+def subscribe(event: str, function: Callable) -> None:
+    """Has Blender call the function; once, however often this is."""
+    functions = getattr(bpy.app.handlers, event)
+    if function not in functions:
+        functions.append(function)
+
+
+def is_last(event: str, function: Callable) -> bool:
+    functions = getattr(bpy.app.handlers, event)
+    return bool(functions) and functions[-1] is function
+
+
+def unsubscribe(event: str, function: Callable) -> None:
+    """Not to be called while Blender goes through the event's functions: it would leave one out."""
+    functions = getattr(bpy.app.handlers, event)
+    if function in functions:
+        functions.remove(function)
+
+
+def subscribe_all(handlers: Mapping[str, Callable]) -> None:
+    for event, function in handlers.items():
+        subscribe(event, function)
+
+
+def unsubscribe_all(handlers: Mapping[str, Callable]) -> None:
+    for event, function in handlers.items():
+        unsubscribe(event, function)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which vertex groups have another use than to weigh a bone: a group that is a mask is no fault."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+import bpy
+
+from ..attach import properties
+
+
+def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
+    """Those of the mesh object's groups `names` that something uses: a modifier (the Armature modifier's mask
+    too), a shape key, Sinew's mix, a constraint to the group, or a bone of another of the object's
+    armatures."""
+    left = set(names)
+    found: set[str] = set()
+    all_uses = (_in_modifiers, _in_shape_keys, _in_mix, _bones_of_all_armatures, _in_constraints)
+    for uses in all_uses:
+        if not left:
+            break
+        now = left.intersection(uses(obj))
+        found |= now
+        left -= now
+    return found
+
+
+def _in_modifiers(obj: bpy.types.Object) -> Iterator[str]:
+    for modifier in obj.modifiers:
+        yield from _texts(modifier)
+        if modifier.type == "NODES" and not hasattr(modifier, "properties"):  # before Blender 5.2
+            yield from (value for _key, value in modifier.items() if isinstance(value, str))
+        elif modifier.type == "PARTICLE_SYSTEM":
+            yield from _texts(modifier.particle_system, depth=0)
+        elif modifier.type == "DYNAMIC_PAINT" and modifier.canvas_settings is not None:
+            for surface in modifier.canvas_settings.canvas_surfaces:
+                yield from (surface.output_name_a, surface.output_name_b)
+
+
+def _texts(of: bpy.types.bpy_struct, depth: int = 3) -> Iterator[str]:
+    """The texts that are set in a modifier and in what it is made of: each kind names its groups otherwise,
+    and Geometry Nodes have them among their inputs."""
+    for name, prop in of.bl_rna.properties.items():
+        if prop.type == "STRING" and name != "name":
+            yield getattr(of, name)
+        elif prop.type == "POINTER" and depth and name != "rna_type":
+            inner = getattr(of, name)
+            # No other data-block: that has groups of its own.
+            if inner is not None and not isinstance(inner, bpy.types.ID):
+                yield from _texts(inner, depth - 1)
+
+
+def _in_shape_keys(obj: bpy.types.Object) -> Iterator[str]:
+    keys = obj.data.shape_keys
+    yield from (key.vertex_group for key in keys.key_blocks) if keys is not None else ()
+
+
+def _in_mix(obj: bpy.types.Object) -> Iterator[str]:
+    if properties.has_sinew(obj):
+        yield properties.of(obj).mix.group
+
+
+def _bones_of_all_armatures(obj: bpy.types.Object) -> Iterator[str]:
+    armatures = {modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE"}
+    for armature in armatures - {None}:
+        yield from (bone.name for bone in armature.data.bones)
+
+
+def _in_constraints(obj: bpy.types.Object) -> Iterator[str]:
+    for other in bpy.data.objects:
+        owners = [other, *(other.pose.bones if other.pose is not None else ())]
+        for owner in owners:
+            for constraint in owner.constraints:
+                if getattr(constraint, "target", None) == obj:
+                    yield getattr(constraint, "subtarget", "")

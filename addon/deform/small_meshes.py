@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small meshes, which are left to their Armature modifiers where those give the same shape as Sinew: for few
+vertices they take less time than asking Sinew for points does by itself.
+
+Sinew stays on, with all that it measures, bakes and compares; only who deforms from frame to frame differs.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach import attach, pose_driver, properties, upstream_proxy
+from ..core.scale_rule import BLENDER_4
+from ..io.animation_paths import animated_paths
+
+# Below as many vertices an Armature modifier is the faster one (bench/README.md), by method.
+VERTICES = {"lbs": 10_000, "dq": 6_000}
+# Commands compare Sinew with the modifier, and save files in which Sinew is at work.
+is_used = True
+
+
+def is_builtin_faster(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifiers of a driven object, as they are set, have its shape in less time."""
+    settings = properties.of(obj)
+    return (
+        is_used
+        and settings.leave_small
+        and len(obj.data.vertices) < VERTICES.get(settings.method, 0)
+        and settings.scale_rule == BLENDER_4.name
+        and not settings.mixed_method
+        # Its colours need the points.
+        and not settings.heat
+        and _blend_alike(obj)
+        and not upstream_proxy.is_needed(obj)
+        and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animated_paths(obj))
+    )
+
+
+def fingerprint(obj: bpy.types.Object) -> list[str]:
+    """Of what decides that, what scripts and animation can set between two frames without any other event."""
+    settings = properties.of(obj)
+    modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
+    methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
+    return [settings.method, settings.mixed_method, settings.scale_rule, *methods]
+
+
+def _blend_alike(obj: bpy.types.Object) -> bool:
+    """Whether each Armature modifier by itself blends as Sinew does in its place."""
+    method = properties.of(obj).method
+    return all(
+        attach.method_of(modifier)
+        == properties.method_of_modifier(method, replaced.method, is_first=number == 0)
+        for number, (modifier, replaced) in enumerate(attach.replaced_modifiers(obj))
+    )

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What comes to an object's first Armature modifier: rest points and weights, as they are read from its mesh,
+or from what the modifiers in front make of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..attach import properties, upstream_proxy
+from ..core.influences import GroupWeights
+from ..core.shape_keys import ShapeKeys
+from ..io import mesh_io
+from .changes import Changes
+
+
+@dataclass
+class Source:
+    """Read once, and again when it may be out of date.
+
+    points            float32 [vertices, 3], object space, without shape keys
+    from_front        read from what the modifiers in front make of the mesh
+    key_values        of the shape keys that are mixed in mixed_points
+    known_key_values  of those when changes were looked at last
+    """
+
+    group_names: list[str]
+    weights: GroupWeights
+    points: np.ndarray
+    shape_keys: ShapeKeys | None
+    from_front: bool = False
+    key_values: np.ndarray | None = None
+    known_key_values: np.ndarray | None = None
+    mixed_points: np.ndarray | None = None
+
+    def equals(self, other: Source) -> bool:
+        if self is other:
+            return True
+        keys, known = self.shape_keys, other.shape_keys
+        if (keys is None) != (known is None) or not self.equals_but_for_points(other):
+            return False
+        has_same_keys = keys is None or keys.equals(known)
+        return has_same_keys and np.array_equal(self.points, other.points)
+
+    def equals_but_for_points(self, other: Source) -> bool:
+        return self.group_names == other.group_names and self.weights.equals(other.weights)
+
+
+def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
+    """False as long as Blender has not evaluated what stands in front: it was just made, or Sinew was off and
+    nothing needed it."""
+    if properties.of(obj).upstream_proxy is None:
+        return True
+    return was_on and upstream_proxy.evaluated_mesh(obj, depsgraph) is not None
+
+
+def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
+    """Requires is_ready."""
+    names = [group.name for group in obj.vertex_groups]
+    if properties.of(obj).upstream_proxy is not None:
+        mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
+        points = mesh_io.read_points(mesh)
+        return Source(names, mesh_io.read_group_weights(mesh), points, None, from_front=True)
+    weights = mesh_io.read_group_weights(obj.data)
+    points = mesh_io.read_points(obj.data)
+    return Source(names, weights, points, mesh_io.read_shape_keys(obj, weights))
+
+
+def has_changed(
+    obj: bpy.types.Object,
+    source: Source,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    touched: bool,
+) -> bool:
+    """Whether points, weights, groups or shape keys may differ from those read, but for key values and for
+    what moves points in front.
+
+    touched  the object itself may have changed
+    """
+    if touched and [g.name for g in obj.vertex_groups] != source.group_names:
+        return True
+    helper = properties.of(obj).upstream_proxy
+    if (helper is not None) != source.from_front:
+        return True
+    if helper is not None:
+        mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
+        evaluated = helper.session_uid in changes.objects
+        if len(mesh.vertices) != len(source.points) or obj.data.session_uid in changes.meshes:
+            return True
+        return evaluated and (not changes.frame or upstream_proxy.changes_weights(obj))
+    mesh, keys, known = obj.data, obj.data.shape_keys, source.shape_keys
+    if len(mesh.vertices) != len(source.points) or (keys is None) != (known is None):
+        return True
+    if keys is not None and tuple(block.name for block in keys.key_blocks) != known.names:
+        return True
+    return mesh.session_uid in changes.meshes
+
+
+def is_slider_moved(
+    obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether the values of shape keys differ from those known: setting one touches the mesh as a change of
+    weights does, and reading them at each step of a slider would cost more than the frame."""
+    keys = obj.data.shape_keys
+    if keys is None or source.from_front or obj.data.session_uid not in changes.meshes:
+        return False
+    values = mesh_io.read_key_values(keys.evaluated_get(depsgraph))
+    known = source.known_key_values
+    return known is not None and not np.array_equal(values, known)
+
+
+def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """float32 [vertices, 3] at this evaluation; the same array as before where nothing changed.
+
+    Requires is_ready.
+    """
+    if properties.of(obj).upstream_proxy is not None:
+        return _upstream_points(upstream_proxy.evaluated_mesh(obj, depsgraph), source)
+    return _keyed_points(obj.evaluated_get(depsgraph), obj.data.evaluated_get(depsgraph), source)
+
+
+def evaluated_points(
+    evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source
+) -> np.ndarray | None:
+    """The same from evaluated data alone; None where there are others than those read."""
+    if not source.from_front:
+        return _keyed_points(evaluated, evaluated_mesh, source)
+    upstream = evaluated.sinew.upstream_proxy
+    if upstream is None or not upstream.is_evaluated or len(upstream.data.vertices) != len(source.points):
+        return None
+    return _upstream_points(upstream.data, source)
+
+
+def _upstream_points(mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
+    points = mesh_io.read_points(mesh)
+    if not np.array_equal(points, source.points):
+        source.points = points
+    return source.points
+
+
+def _keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
+    if source.shape_keys is None:
+        return source.points
+    values = mesh_io.read_key_values(evaluated_mesh.shape_keys)
+    if source.mixed_points is None or not np.array_equal(values, source.key_values):
+        source.key_values = values
+        source.mixed_points = source.shape_keys.mix(values)
+    if evaluated.show_only_shape_key:
+        pinned = mesh_io.read_pinned_points(evaluated_mesh.shape_keys, evaluated.active_shape_key_index)
+        if not np.array_equal(pinned, source.mixed_points):
+            source.mixed_points = pinned
+            # Whatever the values are, leaving the pin mixes again.
+            source.key_values = np.full_like(values, np.nan)
+    return source.mixed_points

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist should know of a mesh that an armature deforms."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..attach import attach, properties, stack
+from ..attach.modifier_options import ModifierOptions, differences
+from ..core.errors import SinewError
+from ..core.rig import RigFacts, Weighting, describe_rig
+from ..core.spaces import transformed
+from ..io import armature_io, mesh_io
+from . import group_uses
+
+
+def describe(
+    obj: bpy.types.Object,
+    armature: bpy.types.Object,
+    weighting: Weighting,
+    points: np.ndarray,
+    depsgraph: bpy.types.Depsgraph,
+) -> RigFacts:
+    """Counts, and warnings of what is missing in the rig or not reproduced.
+
+    points  [vertices, 3], rest points in object space
+    """
+    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    if space is not None and weighting.depends_on_points:
+        points = transformed(points, space)
+    boneless = weighting.bones.without_one([group.name for group in obj.vertex_groups])
+    masks = group_uses.used(obj, boneless)
+    facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
+    return facts.with_warnings([*differences(obj), *_missing_mix_group(obj)])
+
+
+def _missing_mix_group(obj: bpy.types.Object) -> list[str]:
+    if not properties.has_sinew(obj):
+        return []
+    settings = properties.of(obj)
+    if not settings.mixed_method or settings.mix.group in obj.vertex_groups:
+        return []
+    name = f"no vertex group {settings.mix.group}" if settings.mix.group else "no vertex group is chosen"
+    return [f"{name} for the mix: nothing is mixed"]
+
+
+def describe_undriven(obj: bpy.types.Object) -> RigFacts:
+    """The same of a mesh object as it lies in the file, and what would keep Sinew from driving it."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    armature = attach.armature_of(obj)
+    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+    weights = mesh_io.read_group_weights(obj.data)
+    options = ModifierOptions.read(stack.armature_modifier(obj))
+    weighting = options.weighting(obj, weights, bones)
+    points = mesh_io.read_points(obj.data)
+    return describe(obj, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
+
+
+def _obstacles(obj: bpy.types.Object) -> list[str]:
+    """What keeps Sinew from driving the mesh: nothing, or one sentence."""
+    if properties.has_sinew(obj):
+        return []
+    try:
+        attach.check_can_add(obj)
+    except SinewError as error:
+        return [str(error)]
+    return []

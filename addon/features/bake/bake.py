@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew's deformation as data that plays without Sinew: shape keys, point caches and exported files.
+
+A bake goes in steps, so that a window stays alive between them and it can be stopped anywhere: sample() reads
+the frames, place() puts the result into the stack, publish() gives files their names, discard() takes back
+what was written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...attach import attach, properties, stack, upstream_proxy
+from ...core import bake
+from ...core.errors import SinewError
+from ...deform import evaluate, handlers, skinned_object
+from ...io import files
+from ...io.animation_paths import curves_of
+from . import bake_export, shape_animation
+
+SHAPE_KEYS = "shape-keys"
+
+
+def points_of(obj: bpy.types.Object) -> np.ndarray:
+    """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
+    # As it was evaluated with the frame: what Sinew wrote since would be evaluated for nothing.
+    pairs = handlers.states_of([obj], bpy.context.view_layer.depsgraph)
+    if not pairs or obj.mode in skinned_object.MODES_OF_THE_MODIFIER:
+        raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
+    return pairs[0][1].points
+
+
+class ShapeKeys:
+    """One shape key a frame, in the place of the mesh's own keys, which what Sinew shows has in it."""
+
+    def __init__(self, obj: bpy.types.Object, frames: Sequence[float]) -> None:
+        if obj.override_library is not None:
+            raise SinewError(
+                f"{obj.name}: a library override can not have shape keys of its own; bake a cache"
+            )
+        if upstream_proxy.is_needed(obj):
+            names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
+            raise SinewError(
+                f"{obj.name}: {names} changes the mesh ahead of the armature, where shape keys can not "
+                "follow; bake to mdd or pc2"
+            )
+        bake.check_space(Path(bpy.data.filepath or ".").parent, 12 * len(obj.data.vertices) * len(frames))
+        self.obj, self.frames = obj, frames
+        self.samples: list[np.ndarray] = []
+
+    def take(self, points: np.ndarray) -> None:
+        self.samples.append(points.copy())
+
+    def end(self) -> None:
+        """Nothing is in files."""
+
+    def place(self) -> None:
+        obj, shapes = self.obj, self.samples
+        _take_off(obj)
+        mesh = obj.data.copy()
+        # The mesh without the bake stays in the file for the way back.
+        if obj.data.is_editable:
+            obj.data.use_fake_user = True
+        obj.data = mesh
+        obj.show_only_shape_key = False
+        if mesh.shape_keys is not None:
+            obj.shape_key_clear()
+        shape_animation.add(obj, self.frames, shapes)
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        return []
+
+    def discard(self) -> None:
+        self.samples.clear()
+
+
+class Cache:
+    """A point cache, and a Mesh Cache modifier in the place of Sinew's that plays it."""
+
+    def __init__(self, obj: bpy.types.Object, frames: Sequence[float], path: Path, kind: str) -> None:
+        vertices = len(points_of(obj))
+        bake.check_space(path.parent, 12 * vertices * len(frames))
+        render = bpy.context.scene.render
+        self.obj, self.frames, self.kind, self.vertices = obj, frames, kind, vertices
+        self.file = bake.PointCache(path, kind, frames, vertices, render.fps / render.fps_base)
+
+    def take(self, points: np.ndarray) -> None:
+        if len(points) != self.vertices:
+            raise SinewError(
+                f"{self.obj.name}: {self.vertices:,} vertices come to the armature at first and "
+                f"{len(points):,} later; a point cache needs one number, bake to alembic or usd"
+            )
+        self.file.write(points)
+
+    def end(self) -> None:
+        self.file.close()
+
+    def place(self) -> None:
+        obj = self.obj
+        place = list(obj.modifiers).index(stack.sinew_modifier(obj))
+        shown = [(m.show_viewport, m.show_render) for m in obj.modifiers][place]
+        _take_off(obj)
+        modifier = obj.modifiers.new("Sinew Cache", "MESH_CACHE")
+        obj.modifiers.move(len(obj.modifiers) - 1, place)
+        modifier.show_viewport, modifier.show_render = shown
+        modifier.cache_format = self.kind.upper()
+        modifier.filepath = _beside(self.file.path)
+        modifier.interpolation, modifier.deform_mode, modifier.time_mode = "LINEAR", "OVERWRITE", "FRAME"
+        # Blender's own axes, which is no conversion at all.
+        modifier.forward_axis, modifier.up_axis = "POS_Y", "POS_Z"
+        times = shape_animation.key_times(self.frames)
+        if bake.is_even(times, 1):
+            modifier.frame_start = times[0]
+            return
+        modifier.play_mode = "CUSTOM"
+        path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].eval_frame'
+        for sample, time in enumerate(times):
+            modifier.eval_frame = sample
+            obj.keyframe_insert(path, frame=time)
+        shape_animation.make_straight(obj, path)
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        return [(self.file.unfinished, self.file.path)]
+
+    def discard(self) -> None:
+        self.file.discard()
+
+
+class Bake:
+    """Several meshes at once, so that every frame is evaluated once."""
+
+    def __init__(
+        self,
+        meshes: list[bpy.types.Object],
+        kind: str,
+        frames: Sequence[float],
+        folder: Path,
+        overwrite: bool,
+    ) -> None:
+        self.frames, self.folder, self.made_folder = frames, folder, not folder.exists()
+        self.bakes: list[ShapeKeys | Cache] = []
+        scene = bpy.context.scene
+        before = scene.frame_float
+        evaluate.set_frame(scene, frames[0])
+        names: set[str] = set()
+        try:
+            for obj in meshes:
+                points_of(obj)
+                if kind == SHAPE_KEYS:
+                    self.bakes.append(ShapeKeys(obj, frames))
+                else:
+                    path = folder / f"{_file_name(obj, names)}.{kind}"
+                    files.check_free(path, overwrite)
+                    self.bakes.append(Cache(obj, frames, path, kind))
+        except BaseException:
+            self.discard()
+            raise
+        finally:
+            evaluate.set_frame(scene, before)
+
+    @property
+    def what(self) -> str:
+        return ", ".join(one.obj.name for one in self.bakes)
+
+    def sample(self) -> Generator[float, None, None]:
+        """Goes through the frames; how much is done, 0 to 1, after each."""
+        scene = bpy.context.scene
+        before = scene.frame_float
+        try:
+            for number, frame in enumerate(self.frames):
+                evaluate.set_frame(scene, frame)
+                for one in self.bakes:
+                    one.take(points_of(one.obj))
+                if number == len(self.frames) - 1:
+                    for one in self.bakes:
+                        one.end()
+                yield (number + 1) / len(self.frames)
+        except BaseException:
+            self.discard()
+            raise
+        finally:
+            evaluate.set_frame(scene, before)
+
+    def place(self) -> None:
+        try:
+            for one in self.bakes:
+                # The place in the stack is that of Sinew at work, not left to Blender.
+                attach.switch(one.obj, on=True)
+                one.place()
+        except BaseException:
+            self.discard()
+            raise
+        handlers.session.forget()
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        """Each that is written, with the name that publish() gives it."""
+        return [pair for one in self.bakes for pair in one.files]
+
+    def publish(self) -> None:
+        for unfinished, path in self.files:
+            bake.publish(unfinished, path)
+
+    def discard(self) -> None:
+        for one in self.bakes:
+            one.discard()
+        if self.made_folder and self.folder.exists() and not any(self.folder.iterdir()):
+            self.folder.rmdir()
+
+
+Started = Bake | bake_export.SceneExport | bake_export.MorphExport
+
+
+def suffix_of(kind: str) -> str:
+    """How the file ends that a bake is for."""
+    return bake.EXPORTS.get(kind, ".blend")
+
+
+def start(
+    meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], target: Path, overwrite: bool
+) -> Started:
+    """A bake of driven meshes; caches go to a folder beside `target`, exports to itself.
+
+    frames     in rising order
+    overwrite  whether files that are there already may be replaced
+    Raises SinewError where it can not be done.
+    """
+    if kind in bake.EXPORTS:
+        files.check_free(target, overwrite)
+    if kind in bake_export.SCENES:
+        return bake_export.SceneExport(meshes, kind, frames, target, overwrite)
+    if kind == bake_export.GLTF:
+        return bake_export.MorphExport(meshes, frames, target)
+    return Bake(meshes, kind, frames, target.with_name(f"{target.stem}_cache"), overwrite)
+
+
+def _take_off(obj: bpy.types.Object) -> None:
+    """Takes Sinew off; the Armature modifiers stay, switched off, with their armatures for the way back."""
+    # A parent that deforms would do so on top of the bake.
+    properties.of(obj).parent_type = ""
+    run = [modifier.name for modifier in stack.armature_modifiers(obj)]
+    attach.take_off(obj)
+    for name in run:
+        modifier = obj.modifiers[name]
+        modifier.show_viewport = modifier.show_render = False
+        if not _mute(obj, f'modifiers["{bpy.utils.escape_identifier(name)}"].show_'):
+            modifier.object = None
+
+
+def _mute(obj: bpy.types.Object, start: str) -> bool:
+    """Whether nothing sets those paths any more: curves of a linked action do."""
+    found = [curve for curve in curves_of(obj) if curve.data_path.startswith(start)]
+    for curve in found:
+        if curve.id_data.library is None:
+            curve.mute = True
+    return all(curve.mute for curve in found)
+
+
+def _file_name(obj: bpy.types.Object, taken: set[str]) -> str:
+    """A name for an object's file, another one for each object."""
+    start = name = bpy.path.clean_name(obj.name)
+    number = 1
+    while name.lower() in taken:
+        number += 1
+        name = f"{start}_{number}"
+    taken.add(name.lower())
+    return name
+
+
+def _beside(path: Path) -> str:
+    """As Blender writes a path, from the folder of the open file where it has one."""
+    try:
+        return bpy.path.relpath(str(path.resolve())) if bpy.data.filepath else str(path.resolve())
+    except ValueError:
+        # Another drive.
+        return str(path.resolve())

@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes by Blender's own exporters: the final meshes, with UVs and materials.
+
+Like bake.Bake they go in steps: sample(), place(), publish(), discard().
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...core import bake as core
+from ...core.errors import SinewError
+from ...core.output import remove, writing
+from ...core.spaces import transformed
+from ...deform import evaluate
+from ...io import files
+from . import shape_animation, usd_textures
+
+
+def _alembic(path: str, first: int, last: int) -> None:
+    bpy.ops.wm.alembic_export(
+        filepath=path,
+        check_existing=False,
+        start=first,
+        end=last,
+        selected=True,
+        uvs=True,
+        face_sets=True,
+        export_hair=False,
+        export_particles=False,
+        as_background_job=False,
+    )
+
+
+def _usd(path: str, _first: int, _last: int) -> None:
+    # The final points: neither the armature nor the shape keys, which know nothing of Sinew.
+    bpy.ops.wm.usd_export(
+        filepath=path,
+        check_existing=False,
+        selected_objects_only=True,
+        export_animation=True,
+        export_uvmaps=True,
+        export_materials=True,
+        export_armatures=False,
+        export_shapekeys=False,
+        export_hair=False,
+        export_subdivision="TESSELLATE",
+        **usd_textures.LEFT_WHERE_THEY_ARE,
+    )
+
+
+SCENES: dict[str, Callable[[str, int, int], None]] = {"alembic": _alembic, "usd": _usd}
+GLTF = "gltf"
+# The share of a glTF export that is done when its frames are read.
+SAMPLED = 0.5
+
+
+class _Export:
+    """What ends as one file: written at `unfinished` first, then moved to `path`."""
+
+    kind: str
+    meshes: list[bpy.types.Object]
+    frames: Sequence[float]
+    path: Path
+    unfinished: Path
+
+    def told(self, share: float) -> None:
+        """Called with how much is done, 0 to 1, where sample() can not yield: within an exporter's one call.
+        Whoever wants to know puts a function here; it must not raise, as Blender goes on all the same."""
+
+    @contextmanager
+    def whole_in_a_copy(self) -> Iterator[None]:
+        """What is saved inside has all that the export takes."""
+        yield
+
+    @property
+    def what(self) -> str:
+        return str(self.path)
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        """Each that is written, with the name that publish() gives it."""
+        return [(self.unfinished, self.path)]
+
+    def place(self) -> None:
+        """The open file stays as it is."""
+
+    def publish(self) -> None:
+        for unfinished, path in self.files:
+            core.publish(unfinished, path)
+
+    def discard(self) -> None:
+        remove(self.unfinished)
+
+
+class SceneExport(_Export):
+    """Alembic and USD. The exporter goes through the frames itself, and Sinew follows as in a render."""
+
+    def __init__(
+        self,
+        meshes: list[bpy.types.Object],
+        kind: str,
+        frames: Sequence[float],
+        path: Path,
+        overwrite: bool,
+    ) -> None:
+        if not getattr(bpy.app, kind).supported:
+            raise SinewError(f"This Blender is built without {kind}; bake to another kind")
+        core.check_frames(kind, frames)
+        self.meshes, self.kind, self.frames, self.path = meshes, kind, frames, path
+        self.first, self.last = int(frames[0]), int(frames[-1])
+        self.textures = usd_textures.Textures(meshes if kind == "usd" else (), path, overwrite)
+        self.unfinished = _prepare(meshes, frames, path)
+
+    def sample(self) -> Generator[float, None, None]:
+        scene = bpy.context.scene
+        before = scene.frame_float, scene.frame_start, scene.frame_end
+        try:
+            with _selected(self.meshes), self.textures.on_disk():
+                scene.frame_start, scene.frame_end = self.first, self.last
+                with _told_frames(self, 0.0):
+                    _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
+            for obj in self.meshes:
+                _check_driven(obj)
+            yield 1.0
+        except BaseException:
+            self.discard()
+            raise
+        finally:
+            scene.frame_start, scene.frame_end = before[1:]
+            evaluate.set_frame(scene, before[0])
+
+    def whole_in_a_copy(self) -> AbstractContextManager[None]:
+        return self.textures.on_disk()
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        # Textures have their names before the export that looks for them.
+        return [*((path, path) for path in self.textures.written), *super().files]
+
+    def discard(self) -> None:
+        super().discard()
+        self.textures.discard()
+
+
+class MorphExport(_Export):
+    """glTF: the final meshes of the first frame, and the others' points as morph targets."""
+
+    def __init__(self, meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> None:
+        core.check_frames(GLTF, frames)
+        self.meshes, self.kind, self.frames, self.path = meshes, GLTF, frames, path
+        self.unfinished = _prepare(meshes, frames, path)
+        self.made: list[bpy.types.Object] = []
+        self.samples: dict[bpy.types.Object, list[np.ndarray]] = {obj: [] for obj in meshes}
+        self.spaces: dict[bpy.types.Object, Matrix] = {}
+
+    def sample(self) -> Generator[float, None, None]:
+        scene = bpy.context.scene
+        before = scene.frame_float
+        try:
+            for number, frame in enumerate(self.frames):
+                evaluate.set_frame(scene, frame)
+                for obj, samples in self.samples.items():
+                    _check_driven(obj)
+                    points = self._in_first_space(obj)
+                    if samples and len(points) != len(samples[0]):
+                        raise SinewError(
+                            f"{obj.name}: {len(samples[0]):,} vertices at first and {len(points):,} at frame "
+                            f"{frame:g}; morph targets need one number, bake to alembic or usd"
+                        )
+                    samples.append(points)
+                yield SAMPLED * (number + 1) / len(self.frames)
+            evaluate.set_frame(scene, self.frames[0])
+            self._make()
+            with _unstretched(scene), _selected(self.made):
+                self._animate()
+                first, last = scene.frame_start, scene.frame_end
+                scene.frame_start, scene.frame_end = int(self.frames[0]), int(self.frames[-1])
+                try:
+                    with _told_frames(self, SAMPLED):
+                        _export(self._write, self)
+                finally:
+                    scene.frame_start, scene.frame_end = first, last
+        except BaseException:
+            self.discard()
+            raise
+        finally:
+            self._remove()
+            evaluate.set_frame(scene, before)
+        yield 1.0
+
+    def _in_first_space(self, obj: bpy.types.Object) -> np.ndarray:
+        """The final points in the object's space of the first frame: targets are all that moves."""
+        points = evaluate.final_points(obj)
+        world = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
+        first = self.spaces.setdefault(obj, world)
+        if world == first:
+            return points
+        if not first.determinant():
+            raise SinewError(
+                f"{obj.name} is scaled to nothing at the first frame, and not later; begin at another frame"
+            )
+        first_from_now = np.linalg.inv(np.array(first, dtype=np.float64)) @ np.array(world, dtype=np.float64)
+        return transformed(points, first_from_now).astype(np.float32)
+
+    def _make(self) -> None:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for obj in self.samples:
+            evaluated = obj.evaluated_get(depsgraph)
+            mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
+            mesh.name = f"{obj.data.name} baked"
+            made = bpy.data.objects.new(f"{obj.name} baked", mesh)
+            made.matrix_world = self.spaces[obj]
+            bpy.context.scene.collection.objects.link(made)
+            self.made.append(made)
+
+    def _animate(self) -> None:
+        for made, samples in zip(self.made, self.samples.values(), strict=True):
+            shape_animation.add(made, self.frames, samples)
+
+    def _write(self) -> None:
+        bpy.ops.export_scene.gltf(
+            filepath=str(self.unfinished),
+            check_existing=False,
+            export_format="GLB",
+            use_selection=True,
+            # Others have selections of their own.
+            use_active_scene=True,
+            export_animations=True,
+            # All meshes in one animation, which is what players play.
+            export_animation_mode="ACTIVE_ACTIONS",
+            export_morph=True,
+            export_morph_animation=True,
+            export_skins=False,
+            export_frame_range=True,
+        )
+
+    def _remove(self) -> None:
+        for made in self.made:
+            keys = made.data.shape_keys
+            action = keys.animation_data.action if keys is not None and keys.animation_data else None
+            bpy.data.meshes.remove(made.data)
+            if action is not None:
+                bpy.data.actions.remove(action)
+        self.made.clear()
+
+
+def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> Path:
+    """Where the export goes at first; raises SinewError where there is no room for it."""
+    for obj in meshes:
+        _check_driven(obj)
+    vertices = sum(len(evaluate.final_points(obj)) for obj in meshes)
+    # Points and normals.
+    core.check_space(path.parent, 24 * vertices * len(frames))
+    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    remove(unfinished)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Known before the frames are read, and not from an exporter's traceback.
+        unfinished.touch()
+        unfinished.unlink()
+    return unfinished
+
+
+def _check_driven(obj: bpy.types.Object) -> None:
+    if not obj.sinew.enabled:
+        raise SinewError(obj.sinew.error or f"{obj.name}: switch Sinew on to bake what it shows")
+
+
+def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> None:
+    try:
+        write()
+    except RuntimeError as error:
+        raise SinewError(f"{export.path}: can not be written: {files.telling_line(error)}") from None
+    if not export.unfinished.exists():
+        raise SinewError(f"{export.path}: can not be written: Blender's exporter made no file")
+    with writing(export.path):
+        if not core.is_whole(export.unfinished, export.kind):
+            raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
+
+
+@contextmanager
+def _told_frames(export: SceneExport | MorphExport, start: float) -> Iterator[None]:
+    """Tells of each frame that an exporter goes to inside, from the share `start` on."""
+    done = 0
+
+    def on_frame(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+        nonlocal done
+        # At its end an exporter goes back to the frame that it came from.
+        done = min(done + 1, len(export.frames))
+        export.told(start + (1.0 - start) * done / len(export.frames))
+
+    bpy.app.handlers.frame_change_post.append(on_frame)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.frame_change_post.remove(on_frame)
+
+
+@contextmanager
+def _unstretched(scene: bpy.types.Scene) -> Iterator[None]:
+    """Without the scene's time remapping, of which glTF's exporter knows nothing."""
+    render = scene.render
+    before = render.frame_map_old, render.frame_map_new
+    render.frame_map_old = render.frame_map_new = 100
+    try:
+        yield
+    finally:
+        render.frame_map_old, render.frame_map_new = before
+
+
+@contextmanager
+def _selected(objects: list[bpy.types.Object]) -> Iterator[None]:
+    """Selects these alone, and what was selected afterwards."""
+    layer = bpy.context.view_layer
+    before, active = [o for o in layer.objects if o.select_get()], layer.objects.active
+    _select(objects)
+    try:
+        yield
+    finally:
+        _select(before)
+        layer.objects.active = active
+
+
+def _select(objects: list[bpy.types.Object]) -> None:
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in objects)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel's button Bake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+from ...core.bake import EXPORTS
+from ...core.errors import SinewError
+from ...core.frames import parse_frames
+from ...ui import stepped
+from ...ui.operators import OnSinewObjects, sinew_targets
+from . import bake, bake_apart
+
+
+class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
+    bl_idname = "sinew.bake"
+    bl_label = "Bake"
+    bl_description = "Write what Sinew deforms as data that plays without it"
+    bl_options = {"REGISTER", "UNDO"}
+    saying = "Sinew bakes"
+    stopped = "Bake stopped; nothing was written"
+
+    kind: bpy.props.EnumProperty(
+        name="To",
+        items=[
+            ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
+            ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
+            ("pc2", "PC2 Cache", "A point cache and a Mesh Cache modifier, in this file"),
+            ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
+            ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
+            ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),
+        ],
+    )
+    frames: bpy.props.StringProperty(
+        name="Frames", description="Such as 1,12,40-48; empty: the scene's frames", default=""
+    )
+    step: bpy.props.IntProperty(
+        name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
+    )
+    folder: bpy.props.StringProperty(
+        name="Folder",
+        description="Where files go; // is beside this file",
+        default="//",
+        subtype="DIR_PATH",
+        # Without it, newer versions warn of "//"; older ones do not know it.
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
+    )
+    overwrite: bpy.props.BoolProperty(
+        name="Overwrite", description="Replace files that are there already", default=False
+    )
+    in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.in_steps:
+            self.asked = True
+            return context.window_manager.invoke_props_dialog(self)
+        return super().invoke(context, event)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        # Of the dialog there is nothing to end.
+        if self.in_steps:
+            super().cancel(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if getattr(self, "asked", False):
+            # A dialog's operator can not go on in steps itself.
+            names = ("kind", "frames", "step", "folder", "overwrite")
+            bpy.ops.sinew.bake(
+                "INVOKE_DEFAULT", in_steps=True, **{name: getattr(self, name) for name in names}
+            )
+            return {"CANCELLED"}
+        return super().execute(context)
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        self.started = self._start(context)
+        # In the window, where an exporter of Blender's would not let go.
+        is_apart = self.in_steps and self.kind in EXPORTS
+        yield from bake_apart.sample(self.started) if is_apart else self.started.sample()
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        try:
+            self.started.publish()
+            self.started.place()
+        except BaseException:
+            self.started.discard()
+            raise
+        self.report({"INFO"}, f"Baked {self.started.what}")
+        return {"FINISHED"}
+
+    def _start(self, context: bpy.types.Context) -> bake.Started:
+        scene, name = context.scene, Path(bpy.data.filepath).stem
+        if self.kind != bake.SHAPE_KEYS and self.folder.startswith("//") and not name:
+            raise SinewError("Save the file first, or choose a folder that is not beside it")
+        frames = sorted(set(parse_frames(self.frames))) if self.frames.strip() else None
+        frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
+        suffix = bake.suffix_of(self.kind)
+        target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
+        return bake.start(sinew_targets(context), self.kind, frames[:: self.step], target, self.overwrite)
+
+
+CLASSES = (SINEW_OT_bake,)

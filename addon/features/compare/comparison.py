@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live copies of a character beside it, one for each method; all of it taken away again.
+
+A copy shares the original's mesh, follows its transform and has its modifiers. It is shown elsewhere by a
+modifier behind all others. What a copy needs is in objects and actions of its own, so that nothing of the
+original changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ...attach import attach, node_group, point_buffer, properties, stack, upstream_proxy
+from ...attach.updates import updates_suspended
+from ...core import side_by_side
+from ...core.errors import SinewError
+from ...core.spaces import transformed
+from ...deform import evaluate, handlers
+from ...io import actions
+from . import comparison_state, offset_nodes
+
+# Of a colour-blind-safe set (Okabe and Ito, 2008), in the order of the methods.
+COLOURS = (
+    (0.90, 0.60, 0.00),
+    (0.34, 0.71, 0.91),
+    (0.00, 0.62, 0.45),
+    (0.94, 0.89, 0.26),
+    (0.84, 0.37, 0.00),
+    (0.80, 0.47, 0.65),
+    (0.00, 0.45, 0.70),
+)
+# A copy would run them a second time, with caches of its own, or push other simulations about.
+LEFT_OUT = upstream_proxy.SIMULATIONS | {"COLLISION", "SURFACE"}
+ACTION_MARK = "sinew_comparison"
+
+
+def start(
+    context: bpy.types.Context, meshes: Sequence[bpy.types.Object], methods: Sequence[str], right: np.ndarray
+) -> list[str]:
+    """Compares what is to be seen of a character under `methods` of evaluate.method_names(), in the context's
+    scene and instead of what is compared now; a sentence for each mesh that can not be, and for each method
+    that fails on one.
+
+    right  [3], the direction of the screen's right in the world; the copies stand along the nearest axis
+
+    Raises SinewError, with no comparison on, where no mesh can be compared.
+    """
+    scene = context.scene
+    before = comparison_state.of_scene(scene)
+    arrangement = before.arrangement if before is not None else comparison_state.SIDE_BY_SIDE
+    end(context)
+    taken, problems = _comparable(meshes)
+    # Before there are copies: what the scene shows now needs no other evaluation.
+    axis = side_by_side.row_axis(right)
+    depsgraph = context.evaluated_depsgraph_get()
+    points = np.concatenate([corners(obj.evaluated_get(depsgraph)) for obj in taken])
+    collection = bpy.data.collections.new("Sinew Comparison")
+    collection.hide_render = True
+    scene.collection.children.link(collection)
+    state = scene.sinew_comparison
+    state.collection = collection
+    try:
+        with updates_suspended():
+            for obj in taken:
+                for method in methods:
+                    collection.objects.link(_copy(obj, method))
+            state.axis = axis
+            state.spacing = side_by_side.spacing(points, axis)
+            state.first, state.second = methods[0], _other_than(methods[0], methods)
+            state.arrangement = arrangement
+    except BaseException:
+        end(context)
+        raise
+    handlers.refresh(context)
+    return [*problems, *(e for e in (properties.of(copy).error for copy in collection.objects) if e)]
+
+
+def _other_than(first: str, methods: Sequence[str]) -> str:
+    """What to flip to: the last of Sinew's own methods, if that is another."""
+    others = [method for method in methods if method != first]
+    return next((m for m in reversed(others) if m != evaluate.BLENDER), others[-1] if others else first)
+
+
+def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Object], list[str]]:
+    """Those that can be copied, and a sentence for each of the others; SinewError where none can."""
+    taken, problems = [], []
+    for obj in meshes:
+        try:
+            if obj.data.is_editmode:
+                raise SinewError(f"{obj.name} is in edit mode; leave it first")
+            if attach.armature_of(obj) is not None:
+                upstream_proxy.check(obj)
+            taken.append(obj)
+        except SinewError as error:
+            problems.append(str(error))
+    if not taken:
+        raise SinewError(problems[0])
+    return taken, problems
+
+
+def is_on() -> bool:
+    """Whether any scene of the file itself shows a comparison."""
+    scenes = [scene for scene in bpy.data.scenes if scene.library is None]
+    return any(comparison_state.of_scene(scene) is not None for scene in scenes)
+
+
+def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]:
+    """What is compared; without what the artist deleted meanwhile."""
+    found = {properties.of(copy).copied: None for copy in comparison_state.copies_of(state)}
+    return [obj for obj in found if obj is not None and obj.users_collection]
+
+
+def end(context: bpy.types.Context) -> None:
+    """Takes away all that any comparison made in the open file, whatever became of it since."""
+    copies = [obj for obj in bpy.data.objects if properties.is_copy(obj) and obj.library is None]
+    if not is_on() and not copies:
+        return
+    collections = []
+    for scene in bpy.data.scenes:
+        state = comparison_state.of_scene(scene)
+        if state is not None and scene.library is None:
+            collections += [(scene, state.collection)] if state.collection is not None else []
+            scene.property_unset("sinew_comparison")
+    compared = {properties.of(copy).copied for copy in copies} - {None}
+    _remove_copies(copies)
+    for scene, collection in collections:
+        _remove_collection(scene, collection)
+    # What the artist deleted was kept in the file by its copies alone.
+    for obj in compared:
+        if obj.users == 0:
+            bpy.data.objects.remove(obj)
+    _remove_left_over()
+    handlers.refresh(context)
+
+
+def _remove_copies(copies: list[bpy.types.Object]) -> None:
+    for copy in copies:
+        upstream_proxy.remove(copy)
+        point_buffer.remove(copy)
+    bpy.data.batch_remove(copies)
+
+
+def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
+    """What the artist put into it stays in the scene."""
+    for obj in collection.objects:
+        if len(obj.users_collection) == 1:
+            scene.collection.objects.link(obj)
+    for child in collection.children:
+        if child.name not in scene.collection.children:
+            scene.collection.children.link(child)
+    bpy.data.collections.remove(collection)
+
+
+def _remove_left_over() -> None:
+    """What belonged to copies that were deleted by hand."""
+    helpers = {obj for obj in bpy.data.objects if properties.is_helper(obj) and obj.library is None}
+    # Not by their counts of users, as Blender does not lower those when it deletes what has our settings.
+    for helper in [h for h, users in bpy.data.user_map(subset=helpers).items() if not users]:
+        mesh = helper.data
+        bpy.data.objects.remove(helper)
+        if mesh.users == 0:
+            bpy.data.meshes.remove(mesh)
+    for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
+        bpy.data.actions.remove(action)
+    offset_nodes.remove_unused()
+    node_group.remove_unused()
+
+
+def corners(evaluated: bpy.types.Object) -> np.ndarray:
+    """float64 [8, 3]: of the box around an evaluated object, in the world."""
+    matrix = np.array(evaluated.matrix_world)
+    return transformed(np.array([tuple(corner) for corner in evaluated.bound_box]), matrix)
+
+
+def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
+    """A copy that `method` deforms where an armature does, in no collection yet."""
+    copy = obj.copy()
+    if copy.override_library is not None:
+        copy.make_local(clear_liboverride=True)
+    copy.name = f"{obj.name} {properties.method_label(method)}"
+    scale_rule = properties.of(obj).scale_rule if properties.has_sinew(obj) else None
+    _take_sinew_off(copy)
+    for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
+        copy.modifiers.remove(modifier)
+    # As the original stands, whatever moves that.
+    for constraint in list(copy.constraints):
+        copy.constraints.remove(constraint)
+    copy.constraints.new("COPY_TRANSFORMS").target = obj
+    if copy.field is not None:
+        copy.field.type = "NONE"
+    copy.hide_select = True
+    copy.color = (*COLOURS[evaluate.method_names().index(method) % len(COLOURS)], 1.0)
+    settings = properties.of(copy)
+    settings.copied, settings.copied_for = obj, method
+    if method != evaluate.BLENDER and attach.armature_of(copy) is not None:
+        attach.add(copy, method)
+        if scale_rule is not None:
+            settings.scale_rule = scale_rule
+    offset_nodes.add(copy)
+    return copy
+
+
+def _take_sinew_off(copy: bpy.types.Object) -> None:
+    """Leaves a copy as its original was before Sinew."""
+    if not properties.has_sinew(copy):
+        return
+    _use_own_actions(copy)
+    # Those that it names are the original's.
+    settings = properties.of(copy)
+    settings.point_buffer = settings.upstream_proxy = None
+    settings.attribute = ""
+    # Blender 5.2 goes on counting them as used by a modifier that is removed.
+    nodes = stack.sinew_modifier(copy)
+    for name in ("Points", "Front") if nodes is not None else ():
+        if isinstance(node_group.get_input(nodes, name), bpy.types.Object):
+            node_group.set_inputs(nodes, {name: None})
+    attach.take_off(copy)
+
+
+def _use_own_actions(copy: bpy.types.Object) -> None:
+    """So that keys of Sinew's settings can be taken off the copy: each copy keeps to its method."""
+    animation = copy.animation_data
+    if animation is None:
+        return
+    for player in (animation, *(strip for track in animation.nla_tracks for strip in track.strips)):
+        curves = actions.all_curves(player.action, actions.slot_of(player))
+        if any(curve.data_path.startswith("sinew.") for curve in curves):
+            slot = actions.slot_of(player)
+            player.action = player.action.copy()
+            player.action[ACTION_MARK] = True
+            if slot is not None:
+                player.action_slot = player.action.slots[slot.identifier]

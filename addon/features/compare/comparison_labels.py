@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The methods' names over a comparison's characters, drawn in the 3D views; nothing of it is in the file."""
+
+from __future__ import annotations
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from gpu_extras.batch import batch_for_shader
+from mathutils import Vector
+
+from ...attach import properties
+from ...deform import evaluate, handlers
+from . import comparison, comparison_state
+
+FONT = 0
+# Points at scale 1.
+SIZE, PADDING, STRIPE, ABOVE = 13, 6, 3, 16
+# Room for the headers and for some labels above each other.
+BELOW_TOP = 150
+BACKGROUND = (0.05, 0.05, 0.05, 0.75)
+
+_handle: object | None = None
+
+
+def register() -> None:
+    global _handle
+    _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
+
+
+def unregister() -> None:
+    global _handle
+    if _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+        _handle = None
+
+
+def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, float], Vector]]:
+    """The text, the colour, and the place in the world of each label: in the middle above a method's copies
+    that are shown, or above the originals."""
+    state = comparison_state.of_scene(context.scene)
+    if state is None:
+        return []
+    groups: dict[str, list[bpy.types.Object]] = {}
+    for copy in comparison_state.copies_of(state):
+        groups.setdefault(properties.of(copy).copied_for, []).append(copy)
+    found = []
+    originals = comparison.originals(state)
+    if originals:
+        found.append((f"Original: {_method_label(originals[0])}", (1.0, 1.0, 1.0), originals))
+    for method in comparison_state.shown_methods(state):
+        copies = groups.get(method, [])
+        if copies:
+            found.append((properties.method_label(method), tuple(copies[0].color[:3]), copies))
+    depsgraph = context.evaluated_depsgraph_get()
+    placed = [(text, colour, _top(objects, context, depsgraph)) for text, colour, objects in found]
+    return [label for label in placed if label[2] is not None]
+
+
+def _method_label(obj: bpy.types.Object) -> str:
+    settings = properties.of(obj)
+    by_sinew = settings.enabled and handlers.state_of(obj) is not None
+    return properties.method_label(settings.method if by_sinew else evaluate.BLENDER)
+
+
+def _top(
+    objects: list[bpy.types.Object], context: bpy.types.Context, depsgraph: bpy.types.Depsgraph
+) -> Vector | None:
+    """None where nothing of the objects is visible."""
+    visible = [obj for obj in objects if obj.visible_get(viewport=context.space_data)]
+    if not visible:
+        return None
+    points = np.concatenate([comparison.corners(obj.evaluated_get(depsgraph)) for obj in visible])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return Vector(((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2]))
+
+
+def _draw() -> None:
+    context = bpy.context
+    if context.space_data.type != "VIEW_3D" or not context.space_data.overlay.show_overlays:
+        return
+    scale = context.preferences.system.ui_scale
+    blf.size(FONT, SIZE * scale)
+    line = (0.75 * SIZE + 2 * PADDING + STRIPE + 2) * scale
+    lowest: dict[tuple[int, int], int] = {}
+    for text, colour, place in labels(context):
+        point = location_3d_to_region_2d(context.region, context.region_data, place)
+        if point is None:
+            continue
+        # Close up, the label stays in sight.
+        point.y = min(point.y, context.region.height - BELOW_TOP * scale)
+        # Those of copies that lie over each other stand above each other.
+        width = blf.dimensions(FONT, text)[0]
+        spot = next((known for known in lowest if abs(known[0] - point.x) < 4 * line), None)
+        spot = spot or (round(point.x), round(point.y))
+        row = lowest.get(spot, 0)
+        lowest[spot] = row + 1
+        _draw_label(text, colour, point.x - width / 2, spot[1] + ABOVE * scale + row * line, width, scale)
+
+
+def _draw_label(
+    text: str, colour: tuple[float, float, float], x: float, y: float, width: float, scale: float
+) -> None:
+    """White on dark, which is legible on any view, over a stripe of the colour."""
+    padding = PADDING * scale
+    left, right = x - padding, x + width + padding
+    bottom, top = y - padding, y + SIZE * scale * 0.75 + padding
+    gpu.state.blend_set("ALPHA")
+    _draw_rectangle(left, bottom, right, top, BACKGROUND)
+    _draw_rectangle(left, bottom - STRIPE * scale, right, bottom, (*colour, 1.0))
+    gpu.state.blend_set("NONE")
+    blf.color(FONT, 1.0, 1.0, 1.0, 1.0)
+    blf.position(FONT, x, y, 0.0)
+    blf.draw(FONT, text)
+
+
+def _draw_rectangle(
+    left: float, bottom: float, right: float, top: float, colour: tuple[float, float, float, float]
+) -> None:
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+    shader.uniform_float("color", colour)
+    batch_for_shader(shader, "TRIS", {"pos": corners}, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons of a comparison: poll, gather, one call, report."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...attach import attach, properties
+from ...core.comparison import USUAL_METHODS
+from ...core.errors import SinewError
+from ...deform import evaluate
+from ...ui import operators
+from . import comparison, comparison_state
+
+
+def character(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The visible meshes that the armatures meant deform, and those that hang on their bones: clothes and
+    eyes belong to the body that is selected. None where nothing is deformed."""
+    armatures, viewport = operators.armatures(context), _viewport(context)
+    visible = [
+        obj
+        for obj in context.scene.objects
+        if obj.type == "MESH" and not properties.is_copy(obj) and obj.visible_get(viewport=viewport)
+    ]
+    deformed = [obj for obj in attach.deformed_meshes(visible) if attach.armature_of(obj) in armatures]
+    attached = [obj for obj in visible if attach.armature_of(obj) is None and _hangs_on(obj, armatures)]
+    return [*deformed, *attached] if deformed else []
+
+
+def _hangs_on(obj: bpy.types.Object, armatures: list[bpy.types.Object]) -> bool:
+    parent = obj.parent
+    while parent is not None and parent not in armatures:
+        parent = parent.parent
+    return parent is not None
+
+
+def _viewport(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
+    space = context.space_data
+    return space if space is not None and space.type == "VIEW_3D" else None
+
+
+def _compared(context: bpy.types.Context) -> list[bpy.types.Object]:
+    state = comparison_state.of_scene(context.scene)
+    return comparison.originals(state) if state is not None else []
+
+
+class SINEW_OT_compare(bpy.types.Operator):
+    bl_idname = "sinew.compare"
+    bl_label = "Compare"
+    bl_description = (
+        "Show live copies of the character beside it, one for each method, until End Comparison takes them "
+        "away; renders leave them out"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    methods: bpy.props.EnumProperty(
+        name="Methods",
+        items=[
+            *((m.name, m.label, m.description) for m in properties.METHODS.values()),
+            (
+                evaluate.BLENDER,
+                properties.method_label(evaluate.BLENDER),
+                "As it stands in the stack, without Sinew",
+            ),
+        ],
+        options={"ENUM_FLAG"},
+        default=set(USUAL_METHODS),
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode.startswith("EDIT"):
+            cls.poll_message_set("Leave edit mode first")
+            return False
+        if operators.armatures(context) or _compared(context):
+            return operators.can_change(cls)
+        cls.poll_message_set("Select a mesh that an armature deforms, or the armature")
+        return False
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        state = comparison_state.of_scene(context.scene)
+        if state is not None and comparison_state.methods_of(state):
+            self.methods = set(comparison_state.methods_of(state))
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.column().prop(self, "methods")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        methods = [name for name in evaluate.method_names() if name in self.methods]
+        meshes = character(context) or _compared(context)
+        try:
+            if not methods:
+                raise SinewError("Choose at least one method to compare")
+            if not meshes:
+                raise SinewError("The armature deforms no mesh that is visible; show one first")
+            problems = comparison.start(context, meshes, methods, _right_of_view(context))
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        viewport = _viewport(context)
+        if viewport is not None and viewport.local_view is not None:
+            for copy in comparison_state.copies_of(comparison_state.of_scene(context.scene)):
+                copy.local_view_set(viewport, True)
+        for problem in problems:
+            self.report({"WARNING"}, problem)
+        return {"FINISHED"}
+
+
+def _right_of_view(context: bpy.types.Context) -> np.ndarray:
+    """[3], the direction of the screen's right in the world; +X where there is no 3D view."""
+    region = context.region_data
+    return np.array(region.view_matrix)[0, :3] if region is not None else np.array([1.0, 0.0, 0.0])
+
+
+class _WhileComparing:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if comparison_state.of_scene(context.scene) is not None:
+            return True
+        cls.poll_message_set("Compare methods first")
+        return False
+
+
+class SINEW_OT_flip_comparison(_WhileComparing, bpy.types.Operator):
+    bl_idname = "sinew.flip_comparison"
+    bl_label = "Flip Comparison"
+    bl_description = "Show the other of the two copies that are compared, at the same place"
+    # A view of the comparison: a step of undo for each flip would push out the artist's own, and take longer
+    # than the flip.
+    bl_options = {"REGISTER"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        state = comparison_state.of_scene(context.scene)
+        if state.arrangement != comparison_state.ONE_OF_TWO:
+            state.arrangement = comparison_state.ONE_OF_TWO
+        else:
+            state.shows_second = not state.shows_second
+        (shown,) = comparison_state.shown_methods(state)
+        self.report({"INFO"}, properties.method_label(shown))
+        return {"FINISHED"}
+
+
+class SINEW_OT_end_comparison(bpy.types.Operator):
+    bl_idname = "sinew.end_comparison"
+    bl_label = "End Comparison"
+    bl_description = "Take the copies away, and all that was made for them"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if comparison.is_on():
+            return operators.can_change(cls)
+        cls.poll_message_set("There is no comparison")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        comparison.end(context)
+        return {"FINISHED"}
+
+
+CLASSES = (SINEW_OT_compare, SINEW_OT_flip_comparison, SINEW_OT_end_comparison)

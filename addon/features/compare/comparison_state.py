@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a scene holds of a comparison, and where its copies are shown."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...attach import properties
+from ...deform import evaluate
+from . import offset_nodes
+
+SIDE_BY_SIDE, OVERLAID, ONE_OF_TWO = "SIDE", "OVERLAY", "FLIP"
+
+
+def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
+    arrange(state)
+
+
+def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
+    names = evaluate.method_names()
+    return [
+        (name, properties.method_label(name), "", "NONE", names.index(name)) for name in methods_of(state)
+    ]
+
+
+class SinewComparison(bpy.types.PropertyGroup):
+    """Set while the scene shows a comparison."""
+
+    collection: bpy.props.PointerProperty(type=bpy.types.Collection, options={"HIDDEN"})
+    axis: bpy.props.FloatVectorProperty(
+        description="The direction of the row in the world",
+        size=3,
+        default=(1.0, 0.0, 0.0),
+        options={"HIDDEN"},
+    )
+    spacing: bpy.props.FloatProperty(
+        name="Spacing",
+        description="From one character to the next",
+        subtype="DISTANCE",
+        default=1.0,
+        options=set(),
+        update=_changed,
+    )
+    arrangement: bpy.props.EnumProperty(
+        name="Arrangement",
+        items=[
+            (SIDE_BY_SIDE, "Side by Side", "Each copy at a place of its own"),
+            (OVERLAID, "Overlay", "All copies at the first place beside the original"),
+            (ONE_OF_TWO, "Flip", "One of two copies at a time, at the first place beside the original"),
+        ],
+        options=set(),
+        update=_changed,
+    )
+    first: bpy.props.EnumProperty(name="First", items=_compared_methods, options=set(), update=_changed)
+    second: bpy.props.EnumProperty(name="Second", items=_compared_methods, options=set(), update=_changed)
+    shows_second: bpy.props.BoolProperty(options={"HIDDEN"}, update=_changed)
+
+
+CLASSES = (SinewComparison,)
+
+
+def of_scene(scene: bpy.types.Scene) -> SinewComparison | None:
+    """None where the scene shows no comparison."""
+    # Asking for what is not set would leave an empty group in the file.
+    return scene.sinew_comparison if scene.is_property_set("sinew_comparison") else None
+
+
+def copies_of(state: SinewComparison) -> list[bpy.types.Object]:
+    """Those that are still in the comparison's collection."""
+    if state.collection is None:
+        return []
+    return [obj for obj in state.collection.all_objects if properties.is_copy(obj)]
+
+
+def methods_of(state: SinewComparison) -> list[str]:
+    """Those that there are copies for, in the table's order."""
+    there = {properties.of(obj).copied_for for obj in copies_of(state)}
+    return [name for name in evaluate.method_names() if name in there]
+
+
+def arrange(state: SinewComparison) -> None:
+    """Puts all copies where the arrangement has them."""
+    methods = methods_of(state)
+    shown = shown_methods(state)
+    for copy in copies_of(state):
+        method = properties.of(copy).copied_for
+        place = 1 + methods.index(method) if state.arrangement == SIDE_BY_SIDE else 1
+        offset_nodes.set_offset(copy, tuple(place * state.spacing * x for x in state.axis))
+        # Hidden so, and not by their own flag, which would make Blender build its depsgraph anew.
+        for layer in state.id_data.view_layers:
+            if copy.name in layer.objects:
+                copy.hide_set(method not in shown, view_layer=layer)
+
+
+def shown_methods(state: SinewComparison) -> list[str]:
+    """The methods whose copies are shown now."""
+    if state.arrangement != ONE_OF_TWO:
+        return methods_of(state)
+    return [state.second if state.shows_second else state.first]

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Geometry Nodes group "Sinew Offset": moves what an object shows, in the world's axes, and leaves the
+object where it is: the bones' motions are relative to that."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...attach import node_group
+
+# A custom property on the group, so that a renamed one is still known as ours.
+MARK = "sinew_offset"
+
+
+def find(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    return next((m for m in obj.modifiers if m.type == "NODES" and _is_ours(m.node_group)), None)
+
+
+def add(obj: bpy.types.Object) -> None:
+    """Behind all modifiers of the object but Subdivision at the very end: that gives the same shape when it
+    comes after, and Blender does it on the graphics card only there."""
+    last = _last_place(obj)
+    behind = list(obj.modifiers)[last:]
+    modifier = obj.modifiers.new("Offset", "NODES")
+    modifier.node_group = next((g for g in bpy.data.node_groups if _is_ours(g)), None) or _make()
+    modifier.show_expanded = False
+    # Modifiers that are pinned stand behind all that are not.
+    modifier.use_pin_to_last = all(m.use_pin_to_last for m in behind)
+    obj.modifiers.move(list(obj.modifiers).index(modifier), last)
+
+
+def _last_place(obj: bpy.types.Object) -> int:
+    modifiers = list(obj.modifiers)
+    while modifiers and modifiers[-1].type == "SUBSURF":
+        modifiers.pop()
+    return len(modifiers)
+
+
+def set_offset(obj: bpy.types.Object, offset: tuple[float, float, float]) -> None:
+    """Of an object that add() was called for; `offset` in world space."""
+    modifier = find(obj)
+    if modifier is None or np.allclose(node_group.get_input(modifier, "Offset"), offset, 1e-6, 0.0):
+        # Nothing would move, and Blender would evaluate it again.
+        return
+    node_group.set_inputs(modifier, {"Offset": offset})
+    obj.update_tag(refresh={"DATA"})
+
+
+def remove_unused() -> None:
+    for group in [g for g in bpy.data.node_groups if _is_ours(g) and g.users == 0]:
+        bpy.data.node_groups.remove(group)
+
+
+def _is_ours(group: bpy.types.NodeTree | None) -> bool:
+    return group is not None and group.library is None and bool(group.get(MARK))
+
+
+def _make() -> bpy.types.NodeTree:
+    group = bpy.data.node_groups.new("Sinew Offset", "GeometryNodeTree")
+    group[MARK] = True
+    group.is_modifier = True
+    socket = group.interface.new_socket
+    socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    offset = socket("Offset", in_out="INPUT", socket_type="NodeSocketVector")
+    offset.subtype = "TRANSLATION"
+    offset.description = "In the world's axes"
+    socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    kinds = (
+        "NodeGroupInput",
+        "GeometryNodeSelfObject",
+        "GeometryNodeObjectInfo",
+        "FunctionNodeInvertMatrix",
+        "FunctionNodeTransformDirection",
+        "GeometryNodeTransform",
+        "NodeGroupOutput",
+    )
+    nodes = [group.nodes.new(kind) for kind in kinds]
+    for column, node in enumerate(nodes):
+        node.location = (220 * column, 0)
+    source, own, info, inverse, turn, move, result = nodes
+    info.transform_space = "ORIGINAL"
+    link = group.links.new
+    link(own.outputs["Self Object"], info.inputs["Object"])
+    link(info.outputs["Transform"], inverse.inputs["Matrix"])
+    link(source.outputs["Offset"], turn.inputs["Direction"])
+    link(inverse.outputs["Matrix"], turn.inputs["Transform"])
+    link(source.outputs["Geometry"], move.inputs["Geometry"])
+    link(turn.outputs["Direction"], move.inputs["Translation"])
+    link(move.outputs["Geometry"], result.inputs["Geometry"])
+    return group

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks a mesh's weights and poses, on the mesh as it is edited, and remembers what was found until the
+weights change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import bmesh
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...attach import attach
+from ...core.diagnostics import Finding, PoseCheck, check_weights
+from ...core.errors import SinewError
+from ...core.influences import GroupWeights
+from ...core.rig import Bones, Weighting
+from ...core.rotations import rotations_of
+from ...deform import evaluate, events, group_uses, handlers
+from ...io import armature_io, mesh_io
+from ...ui import stepped
+from ..pages import measure
+
+
+@dataclass
+class Check:
+    """What was found on an object, and of what.
+
+    mesh     the session_uid of the mesh
+    frames   which poses were looked at, in words
+    suspect  the mesh was touched since
+    stale    weights, groups or bones are known to be others than those that were checked
+    """
+
+    findings: list[Finding]
+    frames: str
+    mesh: int
+    weights: GroupWeights
+    groups: tuple[str, ...]
+    bones: Bones
+    suspect: bool = False
+    stale: bool = False
+
+
+# By the session_uid of the object.
+_checks: dict[int, Check] = {}
+
+
+@dataclass
+class _Reading:
+    """A mesh as it is edited, and its poses so far."""
+
+    obj: bpy.types.Object
+    weighting: Weighting
+    weights: GroupWeights
+    points: np.ndarray
+    poses: PoseCheck
+
+    def look(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
+        armature = attach.armature_of(self.obj).evaluated_get(depsgraph)
+        bones = self.weighting.bones
+        pose = armature_io.read_pose(armature, bones).astype(np.float64)
+        # A bone of no size turns nothing.
+        motions = pose[:, :3, :3] @ np.linalg.pinv(bones.rest[:, :3, :3].astype(np.float64))
+        self.poses.look(rotations_of(motions), frame)
+
+
+def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int) -> None:
+    """Checks weights, and the pose of now. Raises SinewError that says why an object can not be checked."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    readings = [_read(obj, depsgraph) for obj in objects]
+    for reading in readings:
+        reading.look(scene.frame_current, depsgraph)
+        _keep(reading, most_influences, f"pose of frame {scene.frame_current}")
+
+
+def check_frames(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int, over: str
+) -> Iterator[float]:
+    """Checks weights, and the poses of all frames; yields the share that is done."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    readings = [_read(obj, depsgraph) for obj in objects]
+    armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in objects))
+    frames = stepped.frames_over(scene, armatures, over)
+    with stepped.kept_frame(scene, armatures):
+        for number, frame in enumerate(frames):
+            evaluate.set_frame(scene, frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            for reading in readings:
+                reading.look(frame, depsgraph)
+            yield (number + 1) / len(frames)
+    for reading in readings:
+        _keep(reading, most_influences, f"poses of frames {frames[0]} to {frames[-1]}")
+
+
+def of(obj: bpy.types.Object) -> Check | None:
+    """What was found on an object; its `stale` is of now."""
+    found = _checks.get(obj.session_uid)
+    if found is not None and not found.stale:
+        groups = tuple(group.name for group in obj.vertex_groups)
+        found.stale = groups != found.groups or obj.data.session_uid != found.mesh
+        found.stale = found.stale or (found.suspect and not _weights_equal(obj, found.weights))
+        found.suspect = False
+    return found
+
+
+def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
+    """Enters edit mode with exactly the vertices of a finding selected; how many they are.
+
+    Raises SinewError where that can not be done.
+    """
+    found = of(obj)
+    finding = next((f for f in found.findings if f.name == name), None) if found is not None else None
+    if finding is None:
+        raise SinewError(f"{obj.name}: no such fault is known; press Check again")
+    if len(found.weights.counts) != _vertex_count(obj):
+        raise SinewError(f"{obj.name}: its vertices are others than those checked; press Check again")
+    if not obj.data.is_editable:
+        raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")
+    if obj.name not in context.view_layer.objects or not obj.visible_get():
+        raise SinewError(f"{obj.name} is hidden; show it to edit it")
+    active = context.view_layer.objects.active
+    if active is not None and active.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    # All selected meshes would come along into edit mode, with selections of their own.
+    for other in context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+    mesh = obj.data
+    chosen = np.zeros(len(mesh.vertices), dtype=bool)
+    chosen[finding.vertices] = True
+    hidden = np.empty(len(mesh.vertices), dtype=bool)
+    mesh.vertices.foreach_get("hide", hidden)
+    # What is hidden can not be selected.
+    mesh.vertices.foreach_set("hide", hidden & ~chosen)
+    # Not of the context: asked for that, Blender 4.2 keeps the scene with the context and crashes without it.
+    context.scene.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.ops.object.mode_set(mode="EDIT")
+    # Not by foreach_set before that: Blender 5.0 crashed in it, on edges or faces of a mesh with hidden ones.
+    edited = bmesh.from_edit_mesh(mesh)
+    for elements in (edited.faces, edited.edges, edited.verts):
+        for element in elements:
+            element.select = False
+    edited.verts.ensure_lookup_table()
+    for index in finding.vertices:
+        edited.verts[index].select = True
+    edited.select_flush_mode()
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
+    return len(finding.vertices)
+
+
+def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:
+    armature = attach.armature_of(obj)
+    if armature is None:
+        raise SinewError(f"{obj.name}: no armature deforms it; there are no weights to check")
+    if armature.mode == "EDIT":
+        raise SinewError(f"{armature.name} is in edit mode; leave it first")
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+    weighting, weights, points = measure.read_edited(obj, depsgraph)
+    return _Reading(obj, weighting, weights, points, PoseCheck(weighting.influences_over_joints(points)))
+
+
+def _keep(reading: _Reading, most_influences: int, frames: str) -> None:
+    obj = reading.obj
+    groups = tuple(group.name for group in obj.vertex_groups)
+    masks = group_uses.used(obj, reading.weighting.bones.without_one(groups))
+    found = check_weights(reading.weighting, reading.points, reading.weights, groups, most_influences, masks)
+    _checks[obj.session_uid] = Check(
+        [*found, *reading.poses.findings()],
+        frames,
+        obj.data.session_uid,
+        reading.weights,
+        groups,
+        reading.weighting.bones,
+    )
+
+
+def _vertex_count(obj: bpy.types.Object) -> int:
+    if obj.mode == "EDIT":
+        return len(bmesh.from_edit_mesh(obj.data).verts)
+    return len(obj.data.vertices)
+
+
+def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
+    if _vertex_count(obj) != len(weights.counts):
+        return False
+    if obj.mode == "EDIT":
+        return _edited_weights(obj.data).equals(weights)
+    state = handlers.state_of(obj)
+    if state is not None and not state.source.from_front:
+        # Read already, as Sinew follows them.
+        return state.source.weights.equals(weights)
+    return mesh_io.read_group_weights(obj.data).equals(weights)
+
+
+def _edited_weights(mesh: bpy.types.Mesh) -> GroupWeights:
+    """Of the mesh in edit mode, before anything is written back from it."""
+    vertices = bmesh.from_edit_mesh(mesh).verts
+    layer = vertices.layers.deform.active
+    entries = [vertex[layer].items() if layer is not None else [] for vertex in vertices]
+    flat = [entry for own in entries for entry in own]
+    return GroupWeights(
+        np.array([len(own) for own in entries], dtype=np.int32),
+        np.array([group for group, _weight in flat], dtype=np.int32),
+        np.array([weight for _group, weight in flat], dtype=np.float32),
+    )
+
+
+@persistent
+def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if not _checks:
+        return
+    touched, armatures = set(), set()
+    for update in depsgraph.updates:
+        if isinstance(update.id, bpy.types.Mesh) and update.is_updated_geometry:
+            touched.add(update.id.original.session_uid)
+        elif isinstance(update.id, bpy.types.Armature):
+            armatures.add(update.id.original.name_full)
+    for found in _checks.values():
+        found.suspect |= found.mesh in touched
+    if armatures:
+        _compare_bones(armatures, depsgraph)
+
+
+def _compare_bones(armatures: set[str], depsgraph: bpy.types.Depsgraph) -> None:
+    for obj in bpy.data.objects:
+        found = _checks.get(obj.session_uid)
+        armature = attach.armature_of(obj) if found is not None else None
+        if armature is None or armature.data.name_full not in armatures or armature.mode == "EDIT":
+            continue
+        bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+        found.stale |= not bones.equals(found.bones)
+
+
+@persistent
+def on_undone(*_args: object) -> None:
+    for found in _checks.values():
+        found.suspect = True
+
+
+@persistent
+def on_loaded(*_args: object) -> None:
+    _checks.clear()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": on_depsgraph_update,
+    "undo_post": on_undone,
+    "redo_post": on_undone,
+    "load_pre": on_loaded,
+}
+
+
+def register() -> None:
+    events.subscribe_all(_HANDLERS)
+
+
+def unregister() -> None:
+    events.unsubscribe_all(_HANDLERS)
+    _checks.clear()

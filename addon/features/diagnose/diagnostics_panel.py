@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar's diagnostics: what is wrong in weights and poses, what to do about it, and where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...attach import attach, stack
+from ...core.diagnostics import Finding
+from ...core.errors import SinewError
+from ...ui import operators, stepped
+from ...ui.sidebar import Sidebar, draw_text
+from . import diagnose
+
+NAMES_SHOWN = 5
+
+
+class _OnDeformed:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if _checkable(context):
+            return True
+        cls.poll_message_set("Select a mesh that an armature deforms, or the armature")
+        return False
+
+
+def _checkable(context: bpy.types.Context) -> list[bpy.types.Object]:
+    return [obj for obj in operators.targets(context) if attach.armature_of(obj) is not None]
+
+
+class SINEW_OT_check(_OnDeformed, bpy.types.Operator):
+    bl_idname = "sinew.check"
+    bl_label = "Check"
+    bl_description = "Look for faults in the weights, and for what dual quaternions do in the pose of now"
+    bl_options = {"REGISTER"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        try:
+            diagnose.check(scene, _checkable(context), scene.sinew_most_influences)
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return _tell(self, context)
+
+
+class SINEW_OT_check_frames(_OnDeformed, stepped.Stepped, bpy.types.Operator):
+    bl_idname = "sinew.check_frames"
+    bl_label = "Check over Frames"
+    bl_description = (
+        "Look for faults in the weights, and for what dual quaternions do in the poses of all frames"
+    )
+    bl_options = {"REGISTER"}
+
+    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="ACTION")
+    saying = "Sinew checks poses"
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        scene = context.scene
+        return diagnose.check_frames(scene, _checkable(context), scene.sinew_most_influences, self.over)
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        return _tell(self, context)
+
+
+def _tell(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+    kinds = sum(len(diagnose.of(obj).findings) for obj in _checkable(context))
+    operator.report({"INFO"}, f"{kinds} kinds of faults" if kinds else "Nothing found")
+    return {"FINISHED"}
+
+
+class SINEW_OT_select_finding(bpy.types.Operator):
+    bl_idname = "sinew.select_finding"
+    bl_label = "Select"
+    bl_description = "Enter edit mode with exactly these vertices selected; hidden ones are shown"
+    bl_options = {"REGISTER", "UNDO"}
+
+    object: bpy.props.StringProperty(options={"HIDDEN"})
+    finding: bpy.props.StringProperty(options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.scene.objects.get(self.object)
+        if obj is None:
+            self.report({"ERROR"}, f"{self.object} is not in this scene any more; press Check again")
+            return {"CANCELLED"}
+        try:
+            count = diagnose.select(obj, self.finding, context)
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Selected {_vertices(count)}")
+        return {"FINISHED"}
+
+
+class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
+    bl_label = "Diagnostics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(_checkable(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.prop(context.scene, "sinew_most_influences")
+        row = layout.row(align=True)
+        row.operator("sinew.check", icon="CHECKMARK")
+        row.operator_menu_enum("sinew.check_frames", "over", text="Over Frames")
+        for obj in _checkable(context):
+            found = diagnose.of(obj)
+            if found is not None:
+                _draw_check(layout.box(), context, obj, found)
+
+
+def _draw_check(
+    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, found: diagnose.Check
+) -> None:
+    layout.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    if found.stale:
+        text = "Weights, groups or bones have changed since: press Check again"
+        draw_text(layout, context, text, icon="FILE_REFRESH", alert=True)
+    column = layout.column()
+    column.active = not found.stale
+    for finding in found.findings:
+        _draw_finding(column, context, obj, finding)
+    if not found.findings:
+        column.label(text="Nothing found", icon="CHECKMARK")
+    draw_text(column, context, f"Checked: weights, {found.frames}")
+    upstream_proxy = [modifier.name for modifier in stack.upstream_changes(obj)]
+    if upstream_proxy:
+        text = f"What {', '.join(upstream_proxy)} in front makes of the mesh is not checked: it has no vertices to select"
+        draw_text(column, context, text, icon="INFO")
+
+
+def _draw_finding(
+    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, finding: Finding
+) -> None:
+    draw_text(layout, context, f"{finding.title}: {finding.count:,}", icon="ERROR")
+    if finding.groups:
+        more = len(finding.groups) - NAMES_SHOWN
+        names = ", ".join(finding.groups[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")
+        draw_text(layout, context, names)
+    draw_text(layout, context, finding.advice)
+    if len(finding.vertices):
+        text = f"Select {_vertices(len(finding.vertices)).title()}"
+        button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
+        button.object, button.finding = obj.name, finding.name
+    layout.separator(factor=0.5)
+
+
+def _vertices(count: int) -> str:
+    return f"{count:,} vert{'ices' if count != 1 else 'ex'}"
+
+
+CLASSES = (SINEW_OT_check, SINEW_OT_check_frames, SINEW_OT_select_finding, SINEW_PT_diagnostics)
+
+
+def register() -> None:
+    diagnose.register()
+
+
+def unregister() -> None:
+    diagnose.unregister()

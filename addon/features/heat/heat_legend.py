@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The legend of the heat map, drawn over the 3D views: what is shown, and which values colours stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.heat import HeatScale, viridis
+from ...io import units
+
+WIDTH, BAR, MARGIN, GAP, FONT_SIZE = 420, 14, 24, 8, 12
+STEPS = 64
+BACKGROUND, TEXT = (0.08, 0.08, 0.08, 0.75), (1.0, 1.0, 1.0, 1.0)
+
+
+@dataclass
+class Content:
+    """title  what is shown, under which methods"""
+
+    scale: HeatScale
+    title: str
+
+
+# By the session_uid of the scene that is measured.
+contents: dict[int, Content] = {}
+_handle: object | None = None
+
+
+def show(on: bool) -> None:
+    """Has the legend drawn, or not."""
+    global _handle
+    if on and _handle is None and not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
+    elif not on and _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+        _handle = None
+
+
+def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str]:
+    """The values at even distances along the legend, with their unit."""
+    texts = [units.text(scene, scale.metric.unit, value) for value in scale.ticks(count)]
+    if scale.clipped:
+        texts[-1] = f"\u2265 {texts[-1]}"
+        if scale.low != 0.0:
+            texts[0] = f"\u2264 {texts[0]}"
+    return texts
+
+
+def _draw() -> None:
+    context = bpy.context
+    content = contents.get(context.scene.session_uid)
+    if content is None:
+        return
+    if not context.space_data.overlay.show_overlays:
+        return
+    import blf
+
+    size = context.preferences.system.ui_scale
+    left, right = _visible(context)
+    width = min(WIDTH * size, right - left - 2 * MARGIN * size)
+    x, y = (left + right - width) / 2, MARGIN * size
+    blf.size(0, FONT_SIZE * size)
+    blf.color(0, *TEXT)
+    line = blf.dimensions(0, "Mg")[1] + GAP * size
+    pad = 1.5 * GAP * size
+    _rectangle(x - 2 * pad, y - pad, width + 4 * pad, 2 * line + BAR * size + 2 * pad)
+    texts = labels(content.scale, context.scene)
+    if len(texts) * max(blf.dimensions(0, text)[0] + GAP * size for text in texts) > width:
+        texts = [texts[0], *[""] * (len(texts) - 2), texts[-1]]
+    for number, text in enumerate(texts):
+        share, wide = number / (len(texts) - 1), blf.dimensions(0, text)[0]
+        # The first begins and the last ends with the bar.
+        _write(
+            blf,
+            text,
+            x + share * (width - wide) if number in (0, len(texts) - 1) else x + share * width - wide / 2,
+            y,
+        )
+    _bar(x, y + line, width, BAR * size)
+    _write(blf, content.title, x, y + line + (BAR + GAP) * size)
+
+
+def _visible(context: bpy.types.Context) -> tuple[float, float]:
+    """From where to where neither toolbar nor sidebar covers the view, in pixels from its left edge."""
+    left, right = 0.0, float(context.region.width)
+    for region in context.area.regions:
+        if (
+            region.width > 1
+            and region.x < context.region.x + right
+            and context.preferences.system.use_region_overlap
+        ):
+            if region.type == "TOOLS":
+                left = max(left, region.x + region.width - context.region.x)
+            elif region.type == "UI":
+                right = min(right, region.x - context.region.x)
+    return left, right
+
+
+def _write(blf: object, text: str, x: float, y: float) -> None:
+    blf.position(0, round(x), round(y), 0)
+    blf.draw(0, text)
+
+
+def _rectangle(x: float, y: float, width: float, height: float) -> None:
+    corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
+    _strip(corners, [BACKGROUND] * 4)
+
+
+def _bar(x: float, y: float, width: float, height: float) -> None:
+    shares = np.linspace(0.0, 1.0, STEPS)
+    corners = [(x + share * width, y + up) for share in shares for up in (0.0, height)]
+    _strip(corners, [(*colour, 1.0) for colour in viridis(shares) for _corner in range(2)])
+
+
+def _strip(corners: list[tuple[float, float]], colours: list[tuple[float, ...]]) -> None:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    batch = batch_for_shader(shader, "TRI_STRIP", {"pos": [(*c, 0.0) for c in corners], "color": colours})
+    gpu.state.blend_set("ALPHA")
+    batch.draw(shader)
+    gpu.state.blend_set("NONE")

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The heat map: on each frame the chosen measure of the objects that show it, as their vertices' colours."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...attach import point_store, properties
+from ...core.heat import HeatScale
+from ...core.metrics import Measured
+from . import heat_legend, live, measures
+from .measures import SinewMeasures
+
+# What colours were made from, by the session_uid of the scene.
+_last: dict[int, tuple] = {}
+
+
+def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
+    """Colours those of the objects with a heat map that are in the scene that was evaluated, if anything
+    changed."""
+    if not heated:
+        if _last:
+            live.forget()
+        _last.clear()
+        heat_legend.contents.clear()
+        return
+    scene = depsgraph.scene.session_uid
+    shown = [(obj, skinned) for obj, skinned in heated if obj.evaluated_get(depsgraph).is_evaluated]
+    if not shown:
+        _last.pop(scene, None)
+        heat_legend.contents.pop(scene, None)
+        return
+    settings = measures.of(depsgraph.scene)
+    subject = live.measure(shown, settings.other, depsgraph)
+    if subject is None:
+        return
+    # Kept whole, not by id: that of an object that is gone may be another's.
+    inputs = (subject.measured, *_choices(settings))
+    if _equal(inputs, _last.get(scene)) and all(point_store.has_colours(obj) for obj, _driven in shown):
+        return
+    values = subject.measured.field(settings.quantity)
+    scale = scale_of(settings, subject.measured, values)
+    colours = scale.linear_colours(values)
+    for (obj, _driven), own in zip(shown, subject.split(colours), strict=True):
+        point_store.write_colours(obj, own)
+    _last[scene] = inputs
+    heat_legend.contents[scene] = heat_legend.Content(scale, _title(settings, shown))
+
+
+def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) -> HeatScale:
+    """What the colours of these values stand for."""
+    metric, diagonal = settings.metric, measured.rest.diagonal
+    least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    if settings.range == measures.PER_FRAME or not settings.end:
+        return HeatScale.over_values(metric, least, most, diagonal)
+    return HeatScale.fixed(metric, getattr(settings, settings.end), least, most)
+
+
+def _choices(settings: SinewMeasures) -> tuple:
+    return settings.quantity, settings.range, settings.length, settings.ratio
+
+
+def _equal(inputs: tuple, last: tuple | None) -> bool:
+    return last is not None and inputs[0] is last[0] and inputs[1:] == last[1:]
+
+
+def _title(settings: SinewMeasures, shown: live.Pairs) -> str:
+    """Of what, under which methods."""
+    methods = list(
+        dict.fromkeys(properties.method_label(properties.of(obj).method) for obj, _driven in shown)
+    )
+    text = f"{settings.metric.label}, {' and '.join(methods)}"
+    if settings.quantity == "distance":
+        text += f" against {properties.method_label(settings.other)}"
+    return text

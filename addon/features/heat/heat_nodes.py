@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Geometry Nodes groups that also colour the mesh: around those of node_group, for as long as a heat map
+is shown.
+
+The colours are an attribute of the evaluated mesh alone, under one name for all objects, so that objects with
+one mesh have colours of their own, and the material that shows them is one.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ...attach import node_group
+from ...attach.node_group import POINT_BUFFER, add_nodes, enabled_socket
+
+# The colour attribute of evaluated meshes.
+NAME = "Sinew Heat"
+# The attribute of a carrier that holds each vertex's colour.
+COLOURS = "sinew_colours"
+MARK = "sinew_heat"
+_KIND = 12
+
+
+def get_or_make() -> bpy.types.NodeTree:
+    """The group that takes points and colours from a carrier."""
+    return node_group.find(_KIND) or _make()
+
+
+def remove_unused_material() -> None:
+    for material in [m for m in bpy.data.materials if m.get(MARK) and m.library is None and m.users == 0]:
+        bpy.data.materials.remove(material)
+
+
+def _make() -> bpy.types.NodeTree:
+    points = node_group.get_or_make(POINT_BUFFER)
+    inputs = {
+        item.name: (item.socket_type, item.description)
+        for item in points.interface.items_tree
+        if item.in_out == "INPUT" and item.name != "Geometry"
+    }
+    group = node_group.new_group(f"{points.name} Heat", _KIND, inputs)
+    source, place, info, index, named, sample, store, paint, result = add_nodes(
+        group,
+        "NodeGroupInput",
+        "GeometryNodeGroup",
+        "GeometryNodeObjectInfo",
+        "GeometryNodeInputIndex",
+        "GeometryNodeInputNamedAttribute",
+        "GeometryNodeSampleIndex",
+        "GeometryNodeStoreNamedAttribute",
+        "GeometryNodeSetMaterial",
+        "NodeGroupOutput",
+    )
+    place.node_tree = points
+    named.data_type = "FLOAT_VECTOR"
+    named.inputs["Name"].default_value = COLOURS
+    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
+    store.data_type, store.domain = "FLOAT_COLOR", "POINT"
+    store.inputs["Name"].default_value = NAME
+    paint.inputs["Material"].default_value = _material()
+    link = group.links.new
+    for name in ("Geometry", *inputs):
+        link(source.outputs[name], place.inputs[name])
+    # Each vertex takes the colour of the carrier's vertex of that index.
+    link(source.outputs["Points"], info.inputs["Object"])
+    link(info.outputs["Geometry"], sample.inputs["Geometry"])
+    link(named.outputs["Attribute"], enabled_socket(sample.inputs, "Value"))
+    link(index.outputs["Index"], sample.inputs["Index"])
+    link(enabled_socket(sample.outputs, "Value"), enabled_socket(store.inputs, "Value"))
+    # Without colours, as before the first are written, the material is left alone too.
+    same = node_group.same_count(group, source.outputs["Geometry"], info.outputs["Geometry"])
+    link(same, store.inputs["Selection"])
+    link(same, paint.inputs["Selection"])
+    link(place.outputs["Geometry"], store.inputs["Geometry"])
+    link(store.outputs["Geometry"], paint.inputs["Geometry"])
+    link(paint.outputs["Geometry"], result.inputs["Geometry"])
+    return group
+
+
+def _material() -> bpy.types.Material:
+    """Shows the colours as they are, whatever light there is."""
+    for material in bpy.data.materials:
+        if material.get(MARK) and material.library is None:
+            return material
+    material = bpy.data.materials.new(NAME)
+    material[MARK] = True
+    if bpy.app.version < (5, 0):  # later ones have nodes always
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    colour, light, out = (
+        nodes.new(kind) for kind in ("ShaderNodeAttribute", "ShaderNodeEmission", "ShaderNodeOutputMaterial")
+    )
+    colour.attribute_name = NAME
+    for column, node in enumerate((colour, light, out)):
+        node.location = (220 * column, 0)
+    links.new(colour.outputs["Color"], light.inputs["Color"])
+    links.new(light.outputs["Emission"], out.inputs["Surface"])
+    return material

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons of heat map and worst frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...attach import properties
+from ...deform import evaluate
+from ...ui import stepped
+from ...ui.operators import OnSinewObjects, sinew_targets
+from . import measures, worst_frames
+
+
+class SINEW_OT_heat_map(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.heat_map"
+    bl_label = "Heat Map"
+    bl_description = (
+        "Show a measure of the deformation as colours, in Solid shading, in materials and in renders; once "
+        "more: everything as it was"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = sinew_targets(context)
+        on = not any(properties.of(obj).heat for obj in objects)
+        for obj in objects:
+            if properties.of(obj).heat != on:
+                properties.of(obj).heat = on
+        return {"FINISHED"}
+
+
+class _Scans(OnSinewObjects, stepped.Stepped):
+    saying = "Sinew measures frames"
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        settings = measures.of(context.scene)
+        return worst_frames.scan(
+            context.scene, sinew_targets(context), settings.quantity, settings.other, self.over
+        )
+
+
+class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
+    bl_idname = "sinew.worst_frames"
+    bl_label = "Find Worst Frames"
+    bl_description = "Go through frames and list those at which the measure is worst, one for each peak"
+    bl_options = {"REGISTER"}
+
+    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        worst = worst_frames.scans[context.scene.session_uid].worst()
+        text = f"worst at {worst[0][0]:g}" if worst else "nothing at any frame"
+        scan = worst_frames.scans[context.scene.session_uid]
+        self.report({"INFO"}, f"{scan.metric.label} over {len(scan.frames)} frames: {text}")
+        return {"FINISHED"}
+
+
+class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
+    bl_idname = "sinew.fit_heat_range"
+    bl_label = "Fit to Frames"
+    bl_description = "Go through frames and fix the range so that it holds the values at all of them"
+    bl_options = {"REGISTER", "UNDO"}
+
+    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        measures.of(context.scene).fix(worst_frames.scans[context.scene.session_uid].scale)
+        return {"FINISHED"}
+
+
+class SINEW_OT_go_to_frame(bpy.types.Operator):
+    bl_idname = "sinew.go_to_frame"
+    bl_label = "Go to Frame"
+    bl_description = "Go to this frame"
+    bl_options = {"REGISTER", "UNDO"}
+
+    frame: bpy.props.FloatProperty(name="Frame")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        evaluate.set_frame(context.scene, self.frame)
+        return {"FINISHED"}
+
+
+CLASSES = (SINEW_OT_heat_map, SINEW_OT_worst_frames, SINEW_OT_fit_heat_range, SINEW_OT_go_to_frame)

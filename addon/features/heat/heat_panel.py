@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar's heat map, numbers of the current frame, and worst frames."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...attach import properties
+from ...core.metrics import Measured
+from ...deform import handlers
+from ...io import units
+from ...ui import operators, redraw
+from ...ui.sidebar import Sidebar, draw_text
+from . import heat_operators, live, measures, worst_frames
+
+# What the number is that a frame is bad by.
+_WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of the area"}
+
+
+class SINEW_PT_measures(Sidebar, bpy.types.Panel):
+    bl_label = "Heat Map"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(operators.sinew_targets(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, measures.of(context.scene)
+        shown = any(properties.of(obj).heat for obj in operators.sinew_targets(context))
+        layout.operator("sinew.heat_map", icon="SHADING_RENDERED", depress=shown)
+        layout.prop(settings, "quantity", text="")
+        draw_text(layout, context, settings.metric.text)
+        if settings.quantity == "distance":
+            column = layout.column(align=True)
+            column.label(text="Compared with")
+            column.prop(settings, "other", text="")
+        if settings.end:
+            layout.row().prop(settings, "range", expand=True)
+            if settings.range == measures.FIXED:
+                row = layout.row(align=True)
+                row.prop(settings, settings.end)
+                row.operator_menu_enum("sinew.fit_heat_range", "over", text="Fit")
+
+
+class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
+    bl_label = "Numbers"
+    bl_parent_id = "SINEW_PT_measures"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        # Blender asks only what is open and visible to draw itself: elsewhere nothing is measured.
+        redraw.wanted = True
+        settings = measures.of(context.scene)
+        # As it was evaluated last: while drawing nothing may be evaluated, for that can write.
+        depsgraph = context.view_layer.depsgraph
+        pairs = handlers.states_of(operators.sinew_targets(context), depsgraph)
+        subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
+        if subject is None:
+            draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")
+            return
+        column = self.layout.column(align=True)
+        for name, value in rows(context.scene, subject.measured):
+            split = column.split(factor=0.42)
+            split.label(text=name)
+            split.label(text=value)
+        column = self.layout.column(align=True)
+        column.label(text="Distance is to")
+        column.prop(settings, "other", text="")
+
+
+def rows(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
+    """What each number is and its value with its unit, of one frame."""
+
+    def entry(unit: str, name: str, signed: bool = False) -> str:
+        return units.text(scene, unit, measured.entry(name), signed)
+
+    return [
+        ("Volume", entry("share", "volume_change", signed=True)),
+        ("Area", entry("share", "area_change", signed=True)),
+        ("Stretch", f"{entry('ratio', 'stretch_min')} to {entry('ratio', 'stretch_max')}"),
+        ("Stretch, RMS", entry("share", "stretch_rms")),
+        ("Flipped faces", f"{measured.entry('flipped_faces'):,}"),
+        ("Bulge", f"{entry('length', 'bulge_min')} to {entry('length', 'bulge_max', signed=True)}"),
+        ("Distance", f"at most {entry('length', 'distance_max')}"),
+        ("Distance, RMS", entry("length", "distance_rms")),
+    ]
+
+
+class SINEW_PT_worst_frames(Sidebar, bpy.types.Panel):
+    bl_label = "Worst Frames"
+    bl_parent_id = "SINEW_PT_measures"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_menu_enum("sinew.worst_frames", "over", text="Find", icon="VIEWZOOM")
+        scan = worst_frames.scans.get(context.scene.session_uid)
+        if scan is None:
+            return
+        methods = " and ".join(properties.METHODS[name].label for name in scan.methods)
+        draw_text(layout, context, f"{scan.metric.label}, {methods}, {len(scan.frames)} frames")
+        column = layout.column(align=True)
+        unit = "length" if scan.metric.unit == "length" else "share"
+        for frame, value in scan.worst():
+            number = _WORST.get(scan.metric.worst, "{}").format(units.text(context.scene, unit, value))
+            text = f"Frame {frame:g}:  {number}"
+            is_here = frame == context.scene.frame_current
+            column.operator("sinew.go_to_frame", text=text, depress=is_here).frame = frame
+        if not scan.worst():
+            column.label(text="Nothing at any frame")
+
+
+CLASSES = (*heat_operators.CLASSES, SINEW_PT_measures, SINEW_PT_numbers, SINEW_PT_worst_frames)

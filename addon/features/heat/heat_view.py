@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What has to be set around an object for its heat map to be seen, and given back afterwards: the colour
+attribute that its mesh shows, and what the 3D views in Solid shading take colours from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+
+import bpy
+
+from ...attach import node_group, point_store, properties
+from . import heat_legend, heat_nodes, measures
+
+FROM_ATTRIBUTE = "VERTEX"
+
+
+def sync(skinned: Iterable[bpy.types.Object]) -> None:
+    """Brings the file and the views in line with which of the driven objects show a heat map."""
+    shown = [obj for obj in skinned if properties.of(obj).heat and properties.of(obj).enabled]
+    _choose_attributes({obj.data for obj in shown if obj.data.is_editable})
+    _choose_colours(bool(shown))
+    heat_legend.show(bool(shown))
+
+
+def take_off(obj: bpy.types.Object) -> None:
+    """Takes the heat map off a driven object, but for its node group."""
+    properties.of(obj).property_unset("heat")
+    # First, as Blender 4.2 makes another colour attribute the active one when any attribute goes.
+    sync(_driven())
+    point_store.remove_colours(obj)
+
+
+def tidy() -> None:
+    """Takes away what no object needs any more."""
+    skinned = _driven()
+    node_group.remove_unused()
+    heat_nodes.remove_unused_material()
+    if not skinned:
+        for scene in bpy.data.scenes:
+            if scene.is_editable:
+                measures.clear(scene)
+
+
+def _driven() -> list[bpy.types.Object]:
+    return [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+
+
+def _choose_attributes(meshes: set[bpy.types.Mesh]) -> None:
+    """Makes the heat map the active colour attribute of these meshes, and of no others."""
+    for mesh in bpy.data.meshes:
+        kept = mesh.is_property_set("sinew_active_colour")
+        if mesh in meshes and not kept:
+            mesh.sinew_active_colour = mesh.attributes.active_color_name
+            # The attribute is one of the evaluated mesh alone: a name is all that it needs.
+            mesh.attributes.active_color_name = heat_nodes.NAME
+        elif kept and mesh not in meshes and mesh.is_editable:
+            if mesh.attributes.active_color_name == heat_nodes.NAME:
+                mesh.attributes.active_color_name = mesh.sinew_active_colour
+            mesh.property_unset("sinew_active_colour")
+            mesh.update_tag()
+
+
+def _choose_colours(heat: bool) -> None:
+    """Makes the 3D views take colours from attributes, or from what they took them before."""
+    for screen in bpy.data.screens:
+        kept = screen.is_property_set("sinew_colour_types")
+        if heat and not kept:
+            screen.sinew_colour_types = json.dumps([shading.color_type for shading in _shadings(screen)])
+            for shading in _shadings(screen):
+                shading.color_type = FROM_ATTRIBUTE
+        elif kept and not heat:
+            before = json.loads(screen.sinew_colour_types)
+            for number, shading in enumerate(_shadings(screen)):
+                # What the artist chose meanwhile stays; a view that was made meanwhile gets the default.
+                if shading.color_type == FROM_ATTRIBUTE:
+                    shading.color_type = before[number] if number < len(before) else "MATERIAL"
+            screen.property_unset("sinew_colour_types")
+
+
+def _shadings(screen: bpy.types.Screen) -> Iterator[bpy.types.View3DShading]:
+    for area in screen.areas:
+        for space in area.spaces:
+            if space.type == "VIEW_3D":
+                yield space.shading

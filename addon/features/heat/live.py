@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measures driven objects as they are now, from what Sinew knows of them: Blender evaluates nothing for it.
+
+Shapes are those that the skinning leaves, in world space; several objects are measured as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ...attach import attach, properties, upstream_proxy
+from ...core import influences
+from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
+from ...core.scale_rule import BLENDER_4
+from ...core.session import Binding, SkinStack, SkinStage, SkinStageFrame
+from ...core.spaces import is_same_space, transformed, transformed_axes
+from ...core.surface import Surface, joined
+from ...deform.skinned_object import SkinnedObject
+from ...io import armature_io, mesh_io
+
+# Sets of objects that are kept ready to be measured: those of the heat map and those of the panel.
+MOST_SUBJECTS = 2
+
+Pairs = Sequence[tuple[bpy.types.Object, SkinnedObject]]
+
+
+@dataclass
+class Part:
+    """One of the objects: what its topology and weights were read from, and what other methods make of it."""
+
+    obj: bpy.types.Object
+    skinned: SkinnedObject
+    source: object
+    surface: Surface
+    skin_stack: SkinStack
+
+
+@dataclass
+class Subject:
+    """Objects that are measured as one, their vertices one after the other.
+
+    stamp  what `measured` was worked out from
+    rest   world points at rest, and what they were made from
+    """
+
+    parts: list[Part]
+    gauge: Gauge
+    stamp: tuple | None = None
+    rest: np.ndarray | None = None
+    rest_made_from: tuple = ()
+    measured: Measured | None = None
+
+    def split(self, values: np.ndarray) -> list[np.ndarray]:
+        """Values of all vertices, for each object its own."""
+        return np.split(values, np.cumsum([part.surface.vertex_count for part in self.parts])[:-1])
+
+
+_subjects: dict[tuple[int, ...], Subject] = {}
+
+
+def forget() -> None:
+    _subjects.clear()
+
+
+def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject | None:
+    """The objects with `measured` of now; the same result object where nothing differs from the last call.
+
+    other  the method that distances are measured to
+
+    None where there is nothing to measure, or a mesh and its shape have other vertices for a moment.
+    """
+    key = tuple(obj.session_uid for obj, _driven in pairs)
+    subject = _subjects.pop(key, None)
+    if subject is None or not all(map(_is_current, subject.parts, pairs)):
+        subject = _read(pairs, depsgraph, subject)
+    if subject is None:
+        return None
+    _subjects[key] = subject
+    while len(_subjects) > MOST_SUBJECTS:
+        _subjects.pop(next(iter(_subjects)))
+    worlds = [_world(obj, depsgraph) for obj, _driven in pairs]
+    armatures = [_world(properties.of(obj).armature, depsgraph) for obj, _driven in pairs]
+    stamp = (
+        other,
+        *((skinned.shapes, _modifiers_methods(obj, other)) for obj, skinned in pairs),
+        *(matrix.tobytes() for matrix in (*worlds, *armatures)),
+    )
+    if stamp != subject.stamp:
+        _bring_rest(subject, worlds)
+        subject.gauge.set_frame(_frame_of_rig(subject, armatures))
+        shape = _in_world([skinned.points for _obj, skinned in pairs], worlds)
+        others = [_Other.of(part, other) for part in subject.parts]
+
+        def reference() -> np.ndarray:
+            return _in_world([each.points() for each in others], worlds)
+
+        subject.measured, subject.stamp = subject.gauge.measure(shape, reference), stamp
+    return subject
+
+
+def _is_current(part: Part, pair: tuple[bpy.types.Object, SkinnedObject]) -> bool:
+    return part.skinned is pair[1] and part.source is pair[1].source
+
+
+def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> Subject | None:
+    """Reads topology and weights; keeps the old gauge where they came out the same."""
+    parts = []
+    for obj, skinned in pairs:
+        mesh = (
+            obj.data
+            if properties.of(obj).upstream_proxy is None
+            else upstream_proxy.evaluated_mesh(obj, depsgraph)
+        )
+        if mesh is None or skinned.frames is None or len(mesh.vertices) != len(skinned.rest_points):
+            return None
+        known = [(skin_stage, skin_stage.binding) for skin_stage in skinned.skin_stack.skin_stages]
+        skin_stages = [
+            SkinStage(Binding(b.weighting, b.mix_weights), skin_stage.mask, skin_stage.multi)
+            for skin_stage, b in known
+        ]
+        parts.append(Part(obj, skinned, skinned.source, mesh_io.read_surface(mesh), SkinStack(skin_stages)))
+    if not parts:
+        return None
+    if old is not None and all(map(_is_alike, parts, old.parts)):
+        for part, known in zip(parts, old.parts, strict=True):
+            known.source = part.source
+        return old
+    held, bone_counts = [], []
+    for part in parts:
+        weighting, skinned = part.skinned.binding.weighting, part.skinned
+        space = _space(part, depsgraph)
+        held.append(weighting.influences_over_joints(transformed(skinned.rest_points, space)))
+        bone_counts.append(len(weighting.bones.rest))
+    surface = joined([part.surface for part in parts])
+    return Subject(parts, Gauge(surface, influences.joined(held, bone_counts)))
+
+
+def _is_alike(part: Part, known: Part) -> bool:
+    return (
+        part.skinned is known.skinned
+        and np.array_equal(part.surface.triangles, known.surface.triangles)
+        and np.array_equal(part.surface.edges, known.surface.edges)
+    )
+
+
+def _space(part: Part, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """The object's space to armature space."""
+    frame = part.skinned.frames[0]
+    if frame is not None:
+        return frame.bones_from_model
+    armature = properties.of(part.obj).armature
+    space = armature_io.bones_from_model(part.obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    return np.identity(4) if space is None else space
+
+
+def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
+    """What each Armature modifier would do itself, where that is asked for."""
+    if other != properties.BLENDER:
+        return ()
+    return tuple(attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj))
+
+
+@dataclass
+class _Other:
+    """An object's shape of now under another method, deformed only where it is asked for."""
+
+    skin_stack: SkinStack
+    rest_points: np.ndarray
+    frames: list[SkinStageFrame | None]
+
+    @classmethod
+    def of(cls, part: Part, other: str) -> _Other:
+        skinned, methods = part.skinned, _modifiers_methods(part.obj, other)
+        frames: list[SkinStageFrame | None] = []
+        for number, frame in enumerate(skinned.frames):
+            if frame is not None:
+                frame = replace(frame, method=methods[number] if methods else other, mix="")
+                if methods:
+                    frame.scale_rule = BLENDER_4.name
+            frames.append(frame)
+        return cls(part.skin_stack, skinned.rest_points, frames)
+
+    def points(self) -> np.ndarray:
+        """float32 [vertices, 3], object space."""
+        self.skin_stack.deform(self.rest_points, self.frames)
+        return self.skin_stack.points
+
+
+def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
+    """Brings the world points at rest up to date; the same array where nothing moved them."""
+    shapes = [part.skinned.rest_points for part in subject.parts]
+    if subject.rest_made_from:
+        known_shapes, known_worlds = subject.rest_made_from
+        same_shapes = all(a is b for a, b in zip(shapes, known_shapes, strict=True))
+        if same_shapes and all(map(np.array_equal, worlds, known_worlds)):
+            return
+    subject.rest, subject.rest_made_from = _in_world(shapes, worlds), (shapes, worlds)
+
+
+def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
+    rest_axes, posed_axes, motions = [], [], []
+    for part, armature in zip(subject.parts, armatures, strict=True):
+        bones, frame = part.skinned.binding.bones, part.skinned.frames[0]
+        at_rest = armature @ bones.rest
+        posed = at_rest if frame is None else armature @ frame.pose
+        rest_axes.append(bone_axes(bones, at_rest))
+        posed_axes.append(bone_axes(bones, posed))
+        # An armature of no size moves nothing that could be measured.
+        motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
+    return FrameOfRig(subject.rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
+
+
+def _world(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    return np.array(obj.evaluated_get(depsgraph).matrix_world, dtype=np.float64)
+
+
+def _in_world(shapes: Sequence[np.ndarray], worlds: Sequence[np.ndarray]) -> np.ndarray:
+    """float64 [vertices of all, 3], in memory axis by axis, as measuring wants it."""
+    return np.concatenate(
+        [
+            np.ascontiguousarray(shape.T, dtype=np.float64)
+            if is_same_space(world)
+            else transformed_axes(shape, world)
+            for shape, world in zip(shapes, worlds, strict=True)
+        ],
+        axis=1,
+    ).T

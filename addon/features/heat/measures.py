@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is measured in a scene, and how a heat map's colours stand for it: settings, in the .blend file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from ...attach import properties
+from ...core.diagnostics import USUAL_INFLUENCES
+from ...core.heat import HeatScale
+from ...core.metrics import METRICS, Metric
+
+PER_FRAME, FIXED = "FRAME", "FIXED"
+
+
+class Listener:
+    """Who hears of changed settings; set on registration."""
+
+    changed: Callable[[bpy.types.Context], None] | None = None
+
+
+def _changed(_settings: SinewMeasures, context: bpy.types.Context) -> None:
+    if Listener.changed is not None:
+        Listener.changed(context)
+
+
+class SinewMeasures(bpy.types.PropertyGroup):
+    """Of a scene: its meshes share one range and one legend."""
+
+    quantity: bpy.props.EnumProperty(
+        name="Measure",
+        description="What the heat map shows and worst frames are found by",
+        items=[(m.name, m.label, m.text, number) for number, m in enumerate(METRICS.values())],
+        default="stretch",
+        options=set(),
+        update=_changed,
+    )
+    other: bpy.props.EnumProperty(
+        name="Compared with",
+        description="What distances are measured to",
+        items=[
+            (properties.BLENDER, "Armature Modifier", "What Blender's modifier does, as its options say", 0),
+            *((m.name, m.label, m.description, m.number + 1) for m in properties.METHODS.values()),
+        ],
+        options=set(),
+        update=_changed,
+    )
+    range: bpy.props.EnumProperty(
+        name="Range",
+        description="Which values the colours stand for",
+        items=[
+            (PER_FRAME, "Per Frame", "As wide as each frame's own values", 0),
+            (FIXED, "Fixed", "The same at all frames, so that frames compare", 1),
+        ],
+        options=set(),
+        update=_changed,
+    )
+    length: bpy.props.FloatProperty(
+        name="Up to",
+        description="The length that the last colour stands for",
+        default=0.1,
+        min=1e-6,
+        soft_max=10.0,
+        precision=4,
+        subtype="DISTANCE",
+        options=set(),
+        update=_changed,
+    )
+    ratio: bpy.props.FloatProperty(
+        name="Up to",
+        description="The ratio that the last colour stands for; the first stands for one divided by it",
+        default=2.0,
+        min=1.01,
+        soft_max=4.0,
+        max=100.0,
+        options=set(),
+        update=_changed,
+    )
+
+    @property
+    def metric(self) -> Metric:
+        return METRICS[self.quantity]
+
+    @property
+    def end(self) -> str:
+        """The setting that a fixed range ends at; empty where it needs none."""
+        return {"length": "length", "ratio": "ratio", "share": ""}[self.metric.unit]
+
+    def fix(self, scale: HeatScale) -> None:
+        """The range of a scale from now on."""
+        if self.end:
+            setattr(self, self.end, scale.high)
+        self.range = FIXED
+
+
+def of(scene: bpy.types.Scene) -> SinewMeasures:
+    """Asking makes them, in a scene that had none."""
+    return scene.sinew_measures
+
+
+def clear(scene: bpy.types.Scene) -> None:
+    scene.property_unset("sinew_measures")
+    scene.property_unset("sinew_most_influences")
+
+
+CLASSES = (SinewMeasures,)
+
+
+def register() -> None:
+    bpy.types.Scene.sinew_measures = bpy.props.PointerProperty(type=SinewMeasures)
+    # Beside them, as unlike them it is asked for in files without anything of Sinew's.
+    bpy.types.Scene.sinew_most_influences = bpy.props.IntProperty(
+        name="Most Influences",
+        description="How many bones may move a vertex before it is reported",
+        default=USUAL_INFLUENCES,
+        min=1,
+        soft_max=8,
+        options=set(),
+    )
+    # What the artist had while a heat map is shown, to be given back.
+    bpy.types.Mesh.sinew_active_colour = bpy.props.StringProperty(options={"HIDDEN"})
+    bpy.types.Screen.sinew_colour_types = bpy.props.StringProperty(options={"HIDDEN"})
+
+
+def unregister() -> None:
+    del bpy.types.Scene.sinew_measures, bpy.types.Scene.sinew_most_influences
+    del bpy.types.Mesh.sinew_active_colour, bpy.types.Screen.sinew_colour_types

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Goes through frames for those at which a measure is worst, and for the range that holds all its values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from ...attach import properties
+from ...core.comparison import LENGTHS, ROUNDING, peaks
+from ...core.errors import SinewError
+from ...core.heat import HeatScale
+from ...core.metrics import METRICS, Metric
+from ...deform import evaluate, handlers
+from ...ui import stepped
+from . import live
+
+SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What was found.
+
+    frames  each with how bad it is, by the entry `metric.worst` of a summary
+    scale   wide enough for all of them
+    methods what the objects were deformed with
+    """
+
+    metric: Metric
+    frames: list[tuple[float, float]]
+    scale: HeatScale
+    methods: tuple[str, ...]
+    diagonal: float
+
+    def worst(self, count: int = SHOWN) -> list[tuple[float, float]]:
+        """At most `count` frames and values, the worst first; none that are rounding."""
+        least = ROUNDING * (self.diagonal if self.metric.worst in LENGTHS else 1.0)
+        chosen = peaks([value for _frame, value in self.frames], count)
+        return [self.frames[place] for place in chosen if self.frames[place][1] > least]
+
+
+# By the session_uid of the scene: found anew in no time, and no part of the file.
+scans: dict[int, Scan] = {}
+
+
+def armatures_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    return list(dict.fromkeys(a for obj in objects for a in properties.of(obj).armatures))
+
+
+def scan(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], quantity: str, other: str, over: str
+) -> Iterator[float]:
+    """Yields the share that is done; then scans[scene.session_uid] has the result.
+
+    Raises SinewError where an object can not be measured.
+    """
+    for obj in objects:
+        if not properties.of(obj).enabled or obj.mode == "EDIT":
+            raise SinewError(
+                f"{obj.name} is switched off or in edit mode: switch Sinew on in object mode first"
+            )
+    armatures, metric, found = armatures_of(objects), METRICS[quantity], []
+    extremes: list[float] = []
+    frames = stepped.frames_over(scene, armatures, over)
+    with stepped.kept_frame(scene, armatures):
+        for number, frame in enumerate(frames):
+            evaluate.set_frame(scene, frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            subject = live.measure(handlers.states_of(objects, depsgraph), other, depsgraph)
+            if subject is None:
+                raise SinewError(
+                    f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes"
+                )
+            measured = subject.measured
+            values = measured.field(quantity)
+            if len(values):
+                extremes += [float(values.min()), float(values.max())]
+            found.append((frame, measured.entry(metric.worst)))
+            yield (number + 1) / len(frames)
+    diagonal = measured.rest.diagonal
+    methods = tuple(dict.fromkeys(properties.of(obj).method for obj in objects))
+    scale = HeatScale.over_values(metric, min(extremes, default=0.0), max(extremes, default=0.0), diagonal)
+    scans[scene.session_uid] = Scan(metric, found, scale, methods, diagonal)

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The keyed poses of an action, and an armature's pose between them."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from ...core import inbetween as core
+from ...io import actions, pose_io
+from . import inbetween
+
+# Keyed poses kept at hand: those that playback uses now and soon.
+KEPT = 8
+
+
+@dataclass
+class Group:
+    """Bones that have keys at the same times.
+
+    times   [keys]
+    rows    [bones] where they stand in the pose; modes [bones] how they rotate
+    keyed   [bones, 10] the channels that have curves
+    curves  [curves] their numbers among all curves; bones, columns [curves] what they move, of `keyed`
+    still   [keys, bones] whether a bone holds its pose up to the next key
+    gains   [2] what the channels [bones, 10] gain by a round of the keys, before the first and after the
+            last; None where the keys do not repeat
+    poses   [bones, 10] of some keys, by number; what has no curves is 0
+    """
+
+    times: np.ndarray
+    rows: np.ndarray
+    modes: np.ndarray
+    keyed: np.ndarray
+    curves: list[int]
+    bones: np.ndarray
+    columns: np.ndarray
+    still: np.ndarray
+    gains: tuple[np.ndarray | None, np.ndarray | None]
+    poses: OrderedDict[int, np.ndarray] = field(default_factory=OrderedDict)
+
+
+@dataclass
+class KeyedPoses:
+    """What was read of a held slot for an armature; good until the action changes.
+
+    curves  what each curve of the slot moves, held or not
+    bones   the armature's bones with the property that turns each
+    """
+
+    curves: list[tuple[str, int]]
+    bones: dict[str, str]
+    groups: list[Group]
+
+
+@dataclass
+class Pose:
+    """What an armature's bones are to have at a time.
+
+    channels  float32 [bones, 10], as pose_io.read_channels() gives them
+    far       bones whose keys are too far apart: the method has no one answer, or the angles tell of a longer
+              way than it takes
+    """
+
+    channels: np.ndarray
+    far: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Span:
+    """Where a time lies in a group: the numbers of four keys, it being from the second to the third, each
+    with the round it is of; and the time and the keys' times in the first round, moved to where they lie."""
+
+    keys: tuple[int, int, int, int]
+    rounds: tuple[int, int, int, int]
+    time: float
+    times: np.ndarray
+
+
+def read(armature: bpy.types.Object) -> KeyedPoses:
+    """The keyed poses that Sinew plays on an armature; none where its action is not held."""
+    action, slot = inbetween.action_of(armature)
+    rotations = pose_io.rotation_properties(armature.pose.bones)
+    everything = [actions.key_of(curve) for curve in actions.all_curves(action, slot)]
+    numbers = {key: number for number, key in enumerate(everything)}
+    rows = {name: row for row, name in enumerate(rotations)}
+    found: dict[object, list[_Bone]] = {}
+    for name, pairs in actions.held_curves(action, slot).items():
+        pairs = [pair for pair in pairs if actions.plays(pair[1], rotations.get(name))]
+        if pairs:
+            bone = _Bone.read(armature.pose.bones[name], rows[name], pairs)
+            found.setdefault(bone.likeness, []).append(bone)
+    return KeyedPoses(everything, rotations, [_group(bones, numbers) for bones in found.values()])
+
+
+class _Bone(NamedTuple):
+    """What a group is made of; `gains` [2] of its curves, before the first key and after the last."""
+
+    row: int
+    mode: str
+    pairs: list[tuple[bpy.types.FCurve, actions.Channel]]
+    times: np.ndarray
+    still: np.ndarray
+    gains: tuple[np.ndarray | None, np.ndarray | None]
+
+    @classmethod
+    def read(
+        cls, bone: bpy.types.PoseBone, row: int, pairs: list[tuple[bpy.types.FCurve, actions.Channel]]
+    ) -> _Bone:
+        curves = [curve for curve, _channel in pairs]
+        times = actions.key_times(curves)
+        before, after = (actions.gains_of_a_round(curves, times, onwards) for onwards in (False, True))
+        return cls(row, bone.rotation_mode, pairs, times, actions.hold_still(curves, times), (before, after))
+
+    @property
+    def likeness(self) -> tuple:
+        """Equal for bones of one group."""
+        return (self.times.tobytes(), *(gain is None for gain in self.gains))
+
+
+def _group(bones: list[_Bone], numbers: dict[tuple[str, int], int]) -> Group:
+    owners = [number for number, bone in enumerate(bones) for _pair in bone.pairs]
+    columns = [channel.column for bone in bones for _curve, channel in bone.pairs]
+    keyed = np.zeros((len(bones), pose_io.CHANNELS), dtype=bool)
+    keyed[owners, columns] = True
+    gains = []
+    for side in (0, 1):
+        gains.append(None)
+        if bones[0].gains[side] is not None:
+            gains[side] = np.zeros(keyed.shape)
+            gains[side][owners, columns] = np.concatenate([bone.gains[side] for bone in bones])
+    return Group(
+        times=bones[0].times.astype(np.float64),
+        rows=np.array([bone.row for bone in bones]),
+        modes=np.array([bone.mode for bone in bones]),
+        keyed=keyed,
+        curves=[numbers[actions.key_of(curve)] for bone in bones for curve, _channel in bone.pairs],
+        bones=np.array(owners),
+        columns=np.array(columns),
+        still=np.array([bone.still for bone in bones]).T,
+        gains=(gains[0], gains[1]),
+    )
+
+
+def fits(poses: KeyedPoses, armature: bpy.types.Object) -> bool:
+    """Whether the armature and its action still have the curves and bones that were read."""
+    curves = [actions.key_of(curve) for curve in actions.all_curves(*inbetween.action_of(armature))]
+    return curves == poses.curves and pose_io.rotation_properties(armature.pose.bones) == poses.bones
+
+
+def pose_at(armature: bpy.types.Object, poses: KeyedPoses, time: float, method: str, path: str) -> Pose:
+    """The pose at `time`: at keys, and before the first and after the last, what Blender's curves have.
+
+    poses   of read(), where fits()
+    method  of core.METHODS, or core.BLENDER
+    """
+    curves = actions.all_curves(*inbetween.action_of(armature))
+    channels = pose_io.read_channels(armature.pose.bones)
+    pose, names = Pose(channels), list(poses.bones)
+    for group in poses.groups:
+        values = [curves[number].evaluate(time) for number in group.curves]
+        channels[group.rows[group.bones], group.columns] = values
+        span = span_at(group, time) if method != core.BLENDER else None
+        if span is not None:
+            found, is_far = _between(group, span, curves, channels[group.rows], method, path)
+            channels[group.rows] = np.where(group.keyed, found, channels[group.rows])
+            pose.far += [names[row] for row in group.rows[is_far]]
+    return pose
+
+
+def span_at(group: Group, time: float) -> Span | None:
+    """Where `time` lies among the keys; None at a key, and outside of them where they do not repeat."""
+    times = group.times
+    first, count = times[0], len(times)
+    length = times[-1] - first
+    if length == 0.0:
+        return None
+    here = 0 if first <= time <= times[-1] else int(np.floor((time - first) / length))
+    if here and group.gains[here > 0] is None:
+        return None
+    time = time - here * length
+    after = int(np.searchsorted(times, time, side="right"))
+    if after == count or times[after - 1] == time:
+        return None
+    keys, rounds = [max(after - 2, 0), after - 1, after, min(after + 1, count - 1)], [here] * 4
+    # Across the seam of a repetition the neighbour is of another round.
+    if after == 1 and _repeats(group, here - 1):
+        keys[0], rounds[0] = count - 2, here - 1
+    if after == count - 1 and _repeats(group, here + 1):
+        keys[3], rounds[3] = 1, here + 1
+    moved = times[keys] + length * (np.array(rounds) - here)
+    return Span(tuple(keys), tuple(rounds), time, moved)
+
+
+def _repeats(group: Group, number: int) -> bool:
+    return number == 0 or group.gains[number > 0] is not None
+
+
+def _between(
+    group: Group,
+    span: Span,
+    curves: Sequence[bpy.types.FCurve],
+    now: np.ndarray,
+    method: str,
+    path: str,
+) -> tuple[np.ndarray, np.ndarray]:
+    """float64 [bones, 10], and which bones turn far, [bones]; `now` [bones, 10] as Blender has it."""
+    # A channel without keys has its own value at all of them.
+    keys = np.stack(
+        [
+            np.where(group.keyed, _channels_at(group, curves, key, number), now)
+            for key, number in zip(span.keys, span.rounds, strict=True)
+        ]
+    )
+    if path == core.STRAIGHT:
+        a, b = _poses(group, keys[1]), _poses(group, keys[2])
+        found = core.straight(a, b, core.progress(now.astype(np.float64), keys[1], keys[2]), method)
+    else:
+        rigid, scale = zip(*(_poses(group, key) for key in keys), strict=True)
+        poses = core.Poses(np.stack(rigid), np.stack(scale))
+        found = core.on_spline(poses, span.times, span.time, method)
+    channels = pose_io.channels_of(found.poses, group.modes, near=keys[1])
+    if path == core.SPLINE:
+        channels = np.where(group.still[span.keys[1]][:, None], keys[1], channels)
+    # Angles tell how far they mean to go; quaternions do not. The method takes the shorter way.
+    angles = np.abs(keys[2] - keys[1])[:, 3:7].max(axis=1)
+    return channels, ~found.is_defined | ((group.modes != "QUATERNION") & (angles > np.pi + 1e-4))
+
+
+def _channels_at(
+    group: Group, curves: Sequence[bpy.types.FCurve], key: int, number_of_round: int
+) -> np.ndarray:
+    """float64 [bones, 10]: the channels at a key, in a round of the keys."""
+    channels = group.poses.get(key)
+    if channels is None:
+        channels = np.zeros(group.keyed.shape)
+        time = float(group.times[key])
+        channels[group.bones, group.columns] = [curves[number].evaluate(time) for number in group.curves]
+        group.poses[key] = channels
+        if len(group.poses) > KEPT:
+            group.poses.popitem(last=False)
+    if number_of_round == 0:
+        return channels
+    return channels + number_of_round * group.gains[number_of_round > 0]
+
+
+def _poses(group: Group, channels: np.ndarray) -> core.Poses:
+    """What has no keys takes no part: a bone that only turns does not swing about wherever it was moved to
+    by hand."""
+    poses = pose_io.poses_of(channels, group.modes)
+    poses.rigid[~group.keyed[:, 3:7].any(axis=1), :4] = (1.0, 0.0, 0.0, 0.0)
+    poses.rigid[~group.keyed[:, :3].any(axis=1), 4:] = 0.0
+    return poses

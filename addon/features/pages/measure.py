@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What metrics and diagnostics need from the open file: surfaces, weights, rest shapes, bones, shapes.
+
+Shapes are those that skinning leaves, in world space, before the modifiers behind it: every method has the
+same vertices. The open file's frame and methods are changed: for files that are opened only to be looked at.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...attach import attach, stack
+from ...attach.modifier_options import ModifierOptions
+from ...core.diagnostics import Finding, PoseCheck, check_weights
+from ...core.errors import SinewError
+from ...core.influences import GroupWeights, Influences, entries_of_bones
+from ...core.influences import joined as influences_of_all
+from ...core.metrics import FrameOfRig, Gauge, Summary, bone_axes
+from ...core.rig import Bones, Weighting
+from ...core.spaces import transformed
+from ...core.surface import joined
+from ...deform import evaluate, group_uses, handlers
+from ...io import armature_io, mesh_io
+
+# Shapes of as many frames are kept as fit into this: methods take turns on them.
+MOST_BYTES = 256_000_000
+
+
+@dataclass
+class Part:
+    """One of the meshes.
+
+    weighting, weights, rest_points  of the mesh as it is edited; points in armature space
+    vertex_count                     of what comes to the Armature modifier
+    influences                       the same, over bones and joints
+    """
+
+    obj: bpy.types.Object
+    armature: bpy.types.Object
+    weighting: Weighting
+    weights: GroupWeights
+    rest_points: np.ndarray
+    vertex_count: int
+    influences: Influences
+    pose_check: PoseCheck
+
+    def check_weights(self, most_influences: int) -> list[Finding]:
+        names = [group.name for group in self.obj.vertex_groups]
+        masks = group_uses.used(self.obj, self.weighting.bones.without_one(names))
+        return check_weights(self.weighting, self.rest_points, self.weights, names, most_influences, masks)
+
+
+@dataclass
+class Subject:
+    """The meshes that are measured as one, their vertices one after the other."""
+
+    scene: bpy.types.Scene
+    parts: list[Part]
+    gauge: Gauge
+
+    @property
+    def meshes(self) -> list[bpy.types.Object]:
+        return [part.obj for part in self.parts]
+
+    def split(self, values: np.ndarray) -> list[np.ndarray]:
+        """Values of all vertices, for each mesh its own."""
+        return np.split(values, np.cumsum([part.vertex_count for part in self.parts])[:-1])
+
+    def owner_of(self, vertex: int) -> tuple[str, int]:
+        """The mesh that a vertex of all is in, and its index there."""
+        for part in self.parts:
+            if vertex < part.vertex_count:
+                return part.obj.name, vertex
+            vertex -= part.vertex_count
+        raise IndexError(vertex)
+
+    def character_of(self, vertex: int, points: np.ndarray) -> np.ndarray:
+        """[n, 3]: of `points` [vertices, 3] those of the meshes that have the armature of a vertex's mesh."""
+        ends = np.cumsum([part.vertex_count for part in self.parts])
+        armature = self.parts[int(np.searchsorted(ends, vertex, side="right"))].armature
+        own = zip(self.parts, self.split(points), strict=True)
+        return np.concatenate([shape for part, shape in own if part.armature == armature])
+
+
+@dataclass
+class Measurements:
+    """Of each frame, by method.
+
+    times  milliseconds that Blender took for the whole frame
+    own    milliseconds of these that Sinew took; 0 for the Armature modifier
+    """
+
+    summaries: dict[str, list[Summary]]
+    times: dict[str, list[float]]
+    own: dict[str, list[float]]
+
+
+def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subject:
+    """Reads meshes that an armature deforms."""
+    with skinning_alone(meshes):
+        evaluate.use_method_on(meshes, evaluate.BLENDER)
+        for obj in meshes:
+            _show(attach.armature_of(obj))
+        with _at_rest(meshes):
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            parts = [_read_part(obj, depsgraph) for obj in meshes]
+            surface = joined([mesh_io.read_surface(obj.evaluated_get(depsgraph).data) for obj in meshes])
+    bone_counts = [len(part.weighting.bones.rest) for part in parts]
+    influences = influences_of_all([part.influences for part in parts], bone_counts)
+    return Subject(scene, parts, Gauge(surface, influences))
+
+
+def batches(subject: Subject, frames: Sequence[float], methods: int) -> list[Sequence[float]]:
+    """The frames in groups whose shapes, under as many methods, are small enough to keep."""
+    bytes_a_frame = 24 * max(subject.gauge.surface.vertex_count, 1) * (methods + 1)
+    size = int(np.clip(MOST_BYTES // bytes_a_frame, 1, 64))
+    return [frames[first : first + size] for first in range(0, len(frames), size)]
+
+
+def measure(
+    subject: Subject, methods: Sequence[str], reference: str, frames: Sequence[float]
+) -> Measurements:
+    """Measures shapes under each method at each frame.
+
+    reference  the method that distances are measured to
+    """
+    result = Measurements(*({method: [] for method in methods} for _ in range(3)))
+    played = list(dict.fromkeys([*methods, reference]))
+    with skinning_alone(subject.meshes):
+        rests = _play_rest(subject, frames)
+        shapes = {method: _play(subject, method, frames, result) for method in played[1:]}
+        poses: list[list[np.ndarray]] = []
+        shapes[played[0]] = _play(subject, played[0], frames, result, poses)
+    for index, (rest, pose) in enumerate(zip(rests, poses, strict=True)):
+        rig = _frame_of_rig(subject, rest, pose)
+        subject.gauge.set_frame(rig)
+        _look_at_pose(subject, rig, frames[index])
+        for method in methods:
+            measured = subject.gauge.measure(shapes[method][index], shapes[reference][index])
+            result.summaries[method].append(measured.summary())
+    return result
+
+
+def shapes_at(subject: Subject, methods: Sequence[str], frame: float) -> dict[str, np.ndarray]:
+    """World points under each method at one frame, which the gauge is set to."""
+    with skinning_alone(subject.meshes):
+        rest = _play_rest(subject, [frame])[0]
+        poses: list[list[np.ndarray]] = []
+        shapes = {method: _play(subject, method, [frame], poses=poses)[0] for method in methods}
+    subject.gauge.set_frame(_frame_of_rig(subject, rest, poses[0]))
+    return shapes
+
+
+@contextmanager
+def skinning_alone(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Inside, modifiers behind the skinning are switched off."""
+    hidden = []
+    for obj in meshes:
+        kept = [*stack.upstream(obj), *stack.armature_modifiers(obj), stack.sinew_modifier(obj)]
+        hidden += [m for m in obj.modifiers if m not in kept and m.show_viewport]
+    for modifier in hidden:
+        modifier.show_viewport = False
+    try:
+        yield
+    finally:
+        for modifier in hidden:
+            modifier.show_viewport = True
+
+
+@contextmanager
+def _at_rest(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Inside, armatures are in rest position: whatever deforms with them, deforms nothing."""
+    armatures = {attach.armature_of(obj).data for obj in meshes}
+    before = {armature: armature.pose_position for armature in armatures}
+    for armature in armatures:
+        armature.pose_position = "REST"
+    bpy.context.view_layer.update()
+    try:
+        yield
+    finally:
+        for armature, position in before.items():
+            armature.pose_position = position
+        bpy.context.view_layer.update()
+
+
+def _play(
+    subject: Subject,
+    method: str,
+    frames: Sequence[float],
+    result: Measurements | None = None,
+    poses: list[list[np.ndarray]] | None = None,
+) -> list[np.ndarray]:
+    """World points [vertices, 3] at each frame.
+
+    result  takes the times, where it holds the method
+    poses   takes each frame's matrices of each mesh's bones in world space
+    """
+    evaluate.use_method_on(subject.meshes, method)
+    # Binding happens once and is no part of a frame's time; nor is a frame timed that was there already.
+    evaluate.set_frame(subject.scene, frames[0] - 1)
+    shapes = []
+    for frame in frames:
+        started = time.perf_counter()
+        evaluate.set_frame(subject.scene, frame)
+        taken = 1000.0 * (time.perf_counter() - started)
+        shapes.append(_world_points(subject, frame))
+        if poses is not None:
+            poses.append([_bone_matrices(part) for part in subject.parts])
+        if result is not None and method in result.times:
+            result.times[method].append(taken)
+            states = [handlers.state_of(obj) for obj in subject.meshes if method != evaluate.BLENDER]
+            result.own[method].append(sum(state.milliseconds for state in states if state is not None))
+    return shapes
+
+
+def _play_rest(subject: Subject, frames: Sequence[float]) -> list[tuple[np.ndarray, list[np.ndarray]]]:
+    """World points at each frame with no bone at work, and the matrices of each mesh's bones then."""
+    evaluate.use_method_on(subject.meshes, evaluate.BLENDER)
+    rests = []
+    with _at_rest(subject.meshes):
+        for frame in frames:
+            evaluate.set_frame(subject.scene, frame)
+            rests.append((_world_points(subject, frame), [_bone_matrices(part) for part in subject.parts]))
+    return rests
+
+
+def _world_points(subject: Subject, frame: float) -> np.ndarray:
+    points = evaluate.world_points(subject.meshes)
+    if len(points) != subject.gauge.surface.vertex_count:
+        names = ", ".join(obj.name for obj in subject.meshes)
+        raise SinewError(
+            f"{names}: {len(points)} vertices at frame {frame}, {subject.gauge.surface.vertex_count} at "
+            "first; a modifier in front of the Armature modifier changes the topology, apply it"
+        )
+    return points
+
+
+def _bone_matrices(part: Part) -> np.ndarray:
+    """float64 [bones + joints, 4, 4] of the pose, in world space."""
+    armature = part.armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return np.array(armature.matrix_world) @ armature_io.read_pose(armature, part.weighting.bones)
+
+
+def _frame_of_rig(
+    subject: Subject, rest: tuple[np.ndarray, list[np.ndarray]], pose: list[np.ndarray]
+) -> FrameOfRig:
+    rest_axes, posed_axes, motions = [], [], []
+    for part, at_rest, posed in zip(subject.parts, rest[1], pose, strict=True):
+        rest_axes.append(bone_axes(part.weighting.bones, at_rest))
+        posed_axes.append(bone_axes(part.weighting.bones, posed))
+        # An armature of no size moves nothing that could be measured.
+        motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
+    return FrameOfRig(rest[0], *map(np.concatenate, (rest_axes, posed_axes, motions)))
+
+
+def _look_at_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
+    first = 0
+    for part in subject.parts:
+        count = len(part.weighting.bones.rest)
+        part.pose_check.look(rig.rotations[:, first : first + count], frame)
+        first += count
+
+
+def _show(armature: bpy.types.Object) -> None:
+    """Blender evaluates no pose that nothing visible needs."""
+    armature.hide_viewport = False
+    if armature.name in bpy.context.view_layer.objects:
+        armature.hide_set(False)
+
+
+def read_edited(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Weighting, GroupWeights, np.ndarray]:
+    """Of the mesh as it is edited: how bones hold it, its groups as stored, its points in armature space."""
+    armature = attach.armature_of(obj)
+    bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+    weights = mesh_io.read_group_weights(obj.data)
+    points = _in_armature_space(obj, armature, obj.data, depsgraph)
+    return _weighting(obj, weights, bones), weights, points
+
+
+def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
+    armature = attach.armature_of(obj)
+    weighting, weights, points = read_edited(obj, depsgraph)
+    bones = weighting.bones
+    edited = influences = weighting.influences_over_joints(points)
+    evaluated = obj.evaluated_get(depsgraph).data
+    if stack.upstream_changes(obj):
+        there = _weighting(obj, mesh_io.read_group_weights(evaluated), bones)
+        influences = there.influences_over_joints(_in_armature_space(obj, armature, evaluated, depsgraph))
+    count = len(evaluated.vertices)
+    return Part(obj, armature, weighting, weights, points, count, influences, PoseCheck(edited))
+
+
+def _weighting(obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
+    modifier = stack.armature_modifier(obj)
+    if modifier is not None:
+        return ModifierOptions.read(modifier).weighting(obj, weights, bones)
+    # Parent type Armature deforms by groups, and by envelopes where there are none.
+    entries = entries_of_bones(weights, bones.of_groups([group.name for group in obj.vertex_groups]))
+    return Weighting(bones, entries, use_envelopes=True)
+
+
+def _in_armature_space(
+    obj: bpy.types.Object, armature: bpy.types.Object, mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph
+) -> np.ndarray:
+    points = mesh_io.read_points(mesh)
+    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    return points if space is None else transformed(points, space)

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of meshes in the open file, in clay or as heat maps: without its own lights, materials, cameras.
+
+The open file's render settings, visibility and camera are changed: for files that are opened only to be
+looked at.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...core.errors import SinewError, WrongUse
+from ...core.heat import linear
+from ...core.opengl import usual_engine
+from ...core.output import write_whole
+from ...core.scratch import scratch_folder
+from ...core.views import View, camera_axes
+from ...io.files import telling_line
+
+CLAY = (0.72, 0.66, 0.6)
+HEAT = "sinew_heat"
+PNG_END = b"IEND\xaeB`\x82"
+
+
+def check_size(size: int) -> None:
+    if not 64 <= size <= 4096:
+        raise WrongUse(f"size: expected 64 to 4096 pixels, got {size}")
+
+
+def chosen_engine(wanted: str) -> str:
+    """The engine, "workbench" or "cycles", wanted by name or "auto".
+
+    Raises SinewError where it can not render here.
+    """
+    if wanted == "cycles":
+        return wanted
+    engine = usual_engine(bpy.app.binary_path)
+    if wanted not in ("auto", engine):
+        raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
+    return engine
+
+
+class Studio:
+    """Renders nothing but some meshes, on a clear background."""
+
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        meshes: list[bpy.types.Object],
+        engine: str,
+        size: int,
+        halved: bool = False,
+    ) -> None:
+        """
+        engine  "workbench" or "cycles"
+        size    pixels of a picture's longer side
+        halved  pictures are shown at half their size, which smooths edges: fewer samples a pixel will do
+        """
+        self.scene, self.engine, self._size = scene, engine, size
+        for obj in scene.objects:
+            obj.hide_render = obj not in meshes
+        for obj in meshes:
+            obj.visible_camera = True
+            obj.display_type = "TEXTURED"
+        _prepare_output(scene)
+        scene.camera = bpy.data.objects.new("Sinew Camera", bpy.data.cameras.new("Sinew Camera"))
+        scene.collection.objects.link(scene.camera)
+        if engine == "workbench":
+            _prepare_workbench(scene, halved)
+        else:
+            self._clay, self._heat = _prepare_cycles(scene, halved)
+        if halved:
+            # Dither makes a file larger by half.
+            scene.render.dither_intensity = 0.0
+        self._show_clay()
+
+    def painted(
+        self, meshes: Sequence[bpy.types.Object], colours: Sequence[np.ndarray]
+    ) -> AbstractContextManager[None]:
+        """A context in which copies of the meshes, as they are evaluated now, stand in their place.
+
+        colours  for each mesh [vertices, 3], sRGB in 0..1
+        """
+        copies = [_painted_copy(obj, own) for obj, own in zip(meshes, colours, strict=True)]
+        return self._shown_instead(meshes, copies)
+
+    @contextmanager
+    def _shown_instead(
+        self, meshes: Sequence[bpy.types.Object], copies: Sequence[bpy.types.Object]
+    ) -> Iterator[None]:
+        for obj, copy in zip(meshes, copies, strict=True):
+            obj.hide_render = True
+            self.scene.collection.objects.link(copy)
+        self._show_heat()
+        try:
+            yield
+        finally:
+            self._show_clay()
+            for obj, copy in zip(meshes, copies, strict=True):
+                obj.hide_render = False
+                mesh = copy.data
+                bpy.data.objects.remove(copy)
+                bpy.data.meshes.remove(mesh)
+
+    def _show_clay(self) -> None:
+        if self.engine == "workbench":
+            self._shade("SINGLE", light="Default", gloss=True)
+        else:
+            self._override(self._clay)
+
+    def _show_heat(self) -> None:
+        if self.engine == "workbench":
+            # Colours are to be read: of Blender's lights the most even one, and no gloss.
+            self._shade("VERTEX", light="paint.sl", gloss=False)
+        else:
+            self._override(self._heat)
+
+    def picture(self, view: View, path: Path) -> None:
+        """Renders what `view` sees to the PNG `path`."""
+        camera = self.scene.camera
+        right, up = camera_axes(view.direction)
+        matrix = np.identity(4)
+        matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = right, up, view.direction
+        matrix[:3, 3] = view.target + view.depth * view.direction
+        camera.matrix_world = Matrix(matrix.tolist())
+        camera.data.type = "ORTHO"
+        camera.data.sensor_fit = "AUTO"
+        camera.data.ortho_scale = max(view.width, view.height)
+        camera.data.clip_start = 1e-4 * view.depth
+        camera.data.clip_end = 2 * view.depth
+        render = self.scene.render
+        render.resolution_x, render.resolution_y = view.pixels(self._size)
+        _render(self.scene, path)
+
+    def _shade(self, colour: str, light: str, gloss: bool) -> None:
+        shading = self.scene.display.shading
+        shading.color_type, shading.studio_light = colour, light
+        shading.show_specular_highlight = shading.show_cavity = gloss
+
+    def _override(self, material: bpy.types.Material) -> None:
+        for layer in self.scene.view_layers:
+            layer.material_override = material
+
+
+class OwnLook:
+    """Renders what the file's own camera sees, as the file says."""
+
+    def __init__(self, scene: bpy.types.Scene, path: Path) -> None:
+        if scene.camera is None:
+            raise SinewError(
+                f"{path}: has no camera to look through; leave --own-look away for clay pictures"
+            )
+        self._scene = scene
+        _prepare_png(scene)
+
+    def picture(self, path: Path) -> None:
+        """Renders to the PNG `path`."""
+        _render(self._scene, path)
+
+
+def _render(scene: bpy.types.Scene, path: Path) -> None:
+    """Renders the current frame to the PNG `path`; raises SinewError where it can not be written."""
+    with scratch_folder() as folder:
+        # Not to `path` itself: Blender replaces each # and {} in it.
+        drawn = folder / "picture.png"
+        scene.render.filepath = str(drawn)
+        try:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        except RuntimeError as error:
+            raise SinewError(f"{path}: can not be drawn: {telling_line(error)}") from None
+        # Up to 5.2 it does not notice that a disk is full.
+        if not drawn.exists() or not drawn.read_bytes().endswith(PNG_END):
+            raise SinewError(f"{path}: can not be drawn: {folder.parent} did not take all of it; is it full?")
+        write_whole(path, lambda unfinished: shutil.copyfile(drawn, unfinished))
+
+
+def _painted_copy(obj: bpy.types.Object, colours: np.ndarray) -> bpy.types.Object:
+    """An object in no scene: the evaluated mesh of `obj`, with the colour attribute HEAT."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = bpy.data.meshes.new_from_object(evaluated)
+    attribute = mesh.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
+    values = np.ones((len(colours), 4), dtype=np.float32)
+    values[:, :3] = linear(colours)
+    attribute.data.foreach_set("color", values.ravel())
+    index = mesh.color_attributes.find(HEAT)
+    mesh.color_attributes.active_color_index = mesh.color_attributes.render_color_index = index
+    copy = bpy.data.objects.new(f"{obj.name} Sinew Heat", mesh)
+    copy.matrix_world = evaluated.matrix_world
+    return copy
+
+
+def _prepare_output(scene: bpy.types.Scene) -> None:
+    render = scene.render
+    render.resolution_percentage = 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
+    render.film_transparent = True
+    render.use_border = render.use_compositing = render.use_sequencer = False
+    render.use_freestyle = render.use_multiview = render.use_motion_blur = render.use_stamp = False
+    _prepare_png(scene)
+    scene.view_settings.view_transform = "Standard"
+    scene.view_settings.look = "None"
+    scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+
+
+def _prepare_png(scene: bpy.types.Scene) -> None:
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format = "PNG"
+    settings.color_mode = "RGBA"
+    settings.color_depth = "8"
+
+
+def _prepare_workbench(scene: bpy.types.Scene, halved: bool) -> None:
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.display.render_aa = "OFF" if halved else "8"
+    shading = scene.display.shading
+    shading.type = "SOLID"
+    shading.light = "STUDIO"
+    shading.single_color = CLAY
+    # World space's is grainy in a single sample.
+    shading.cavity_type = "SCREEN" if halved else "BOTH"
+    shading.show_shadows = shading.show_xray = shading.show_object_outline = False
+    shading.show_backface_culling = False
+
+
+def _prepare_cycles(scene: bpy.types.Scene, halved: bool) -> tuple[bpy.types.Material, bpy.types.Material]:
+    """Lights and noise; materials for clay and for heat."""
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU"
+    scene.cycles.samples = 4 if halved else 16
+    scene.cycles.use_denoising = False
+    scene.world = bpy.data.worlds.new("Sinew World")
+    scene.world.color = (0.25, 0.26, 0.28)
+    for name, energy, turn in (("Key", 2.0, (0.9, 0.2, 0.5)), ("Fill", 0.6, (1.0, 0.0, -0.9))):
+        light = bpy.data.objects.new(f"Sinew {name}", bpy.data.lights.new(f"Sinew {name}", "SUN"))
+        light.data.energy = energy
+        light.rotation_euler = turn
+        scene.collection.objects.link(light)
+    clay, _shader = _matt_material("Sinew Clay")
+    heat, shader = _matt_material("Sinew Heat")
+    shader.inputs["Specular IOR Level"].default_value = 0.0
+    colours = heat.node_tree.nodes.new("ShaderNodeVertexColor")
+    colours.layer_name = HEAT
+    heat.node_tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
+    return clay, heat
+
+
+def _matt_material(name: str) -> tuple[bpy.types.Material, bpy.types.ShaderNode]:
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (*CLAY, 1.0)
+    shader.inputs["Roughness"].default_value = 0.6
+    return material, shader

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures 3.6 to 3.11: pictures of deformed meshes, and what can be measured of them.
+
+The files are opened one after the other, in the place of the open one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+import sinew
+
+from ...attach import attach
+from ...core.metrics import volume
+from ...core.report import meshes
+from ...core.report.model import Figure, Picture
+from ...core.views import View, seen_extent, whole_view
+from ...deform import evaluate
+from ...io import armature_io, files, mesh_io
+from .render import Studio
+
+LINKS, MESH = "report_links.blend", "report_mesh.blend"
+# Keyframes of LINKS, and the frames of MESH where it is bent and where it is twisted most.
+FIRST_KEY, SECOND_KEY = 12, 36
+BENT, TWISTED = 16, 40
+
+
+def figures(
+    folder: Path, engine: str, size: int, scratch: Path, step: Callable[[str], None]
+) -> tuple[Figure, ...]:
+    """All six.
+
+    folder   with LINKS and MESH
+    engine   "workbench" or "cycles"
+    size     pixels of a picture
+    scratch  a folder for pictures on the way
+    step     called with what is about to be done
+
+    Raises SinewError where a file can not be read.
+    """
+    step("Drawing Figures 3.6 to 3.8")
+    hierarchies = _hierarchies(folder / LINKS, engine, size, scratch)
+    step("Drawing Figures 3.9 to 3.11")
+    return (*hierarchies, *_skins(folder / MESH, engine, size, scratch))
+
+
+def _open(path: Path) -> bpy.types.Object:
+    files.open_file(path)
+    return evaluate.deformed_meshes(bpy.context.scene)[0]
+
+
+def _studio(mesh: bpy.types.Object, engine: str, size: int) -> Studio:
+    studio = Studio(bpy.context.scene, [mesh], engine, size)
+    # In its own colours where the engine shows them: they show twists.
+    studio.scene.display.shading.color_type = "MATERIAL"
+    return studio
+
+
+def _draw(studio: Studio, view: View, scratch: Path) -> bytes:
+    path = scratch / "picture.png"
+    studio.picture(view, path)
+    return path.read_bytes()
+
+
+def read_chain(mesh: bpy.types.Object) -> meshes.Chain:
+    """The links of an open LINKS at its two keyframes. Mesh and armature lie in one place."""
+    scene, armature = bpy.context.scene, attach.armature_of(mesh)
+
+    def pose(frame: int) -> np.ndarray:
+        evaluate.set_frame(scene, frame)
+        evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return armature_io.read_pose(evaluated, bones).astype(np.float64)
+
+    bones = armature_io.read_bones(armature)
+    parents = [bones.names.index(bone.parent.name) if bone.parent else -1 for bone in armature.data.bones]
+    # One group to a vertex: that is what these figures are about.
+    group_of = mesh_io.read_group_weights(mesh.data).groups
+    return meshes.Chain(
+        points=mesh_io.read_points(mesh.data).astype(np.float64),
+        triangles=mesh_io.read_surface(mesh.data).triangles,
+        bones=bones.of_groups([group.name for group in mesh.vertex_groups])[group_of],
+        parents=np.array(parents, np.int32),
+        rest=bones.rest.astype(np.float64),
+        first=pose(FIRST_KEY),
+        second=pose(SECOND_KEY),
+    )
+
+
+def _hierarchies(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, ...]:
+    mesh = _open(path)
+    chain = read_chain(mesh)
+    shapes = {method: [chain.between(t, method) for t in meshes.TIMES] for method in meshes.HIERARCHIES}
+    mesh.modifiers.clear()
+    studio = _studio(mesh, engine, size)
+    view = whole_view([seen_extent(shape) for row in shapes.values() for shape in row])
+    drawn = []
+    for row in shapes.values():
+        for t, shape in zip(meshes.TIMES, row, strict=True):
+            mesh.data.vertices.foreach_set("co", shape.astype(np.float32).ravel())
+            mesh.data.update()
+            drawn.append(Picture(f"t = {t:g}", _draw(studio, view, scratch)))
+    # All at once, so that the three figures have one scale.
+    drawn = iter(meshes.trimmed(drawn))
+    pictures = {method: [next(drawn) for _ in row] for method, row in shapes.items()}
+    return meshes.hierarchy_figures(chain, shapes, pictures)
+
+
+def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, ...]:
+    mesh = _open(path)
+    scene = bpy.context.scene
+    evaluate.set_frame(scene, scene.frame_start)
+    rest = evaluate.world_points([mesh])
+    triangles = mesh_io.read_surface(mesh.data).triangles
+    groups = mesh_io.read_group_weights(mesh.data)
+    skin = meshes.Skin(
+        rest=rest,
+        rest_volume=volume(rest, triangles),
+        triangles=triangles,
+        counts=groups.counts,
+        groups=groups.groups,
+        weights=groups.weights,
+    )
+    shapes: dict[int, dict[str, np.ndarray]] = {BENT: {}, TWISTED: {}}
+    for frame, of_methods in shapes.items():
+        evaluate.set_frame(scene, frame)
+        for method in meshes.SKINS:
+            evaluate.use_method(mesh, method)
+            of_methods[method] = evaluate.world_points([mesh])
+    studio = _studio(mesh, engine, size)
+    pictures: dict[int, list[Picture]] = {}
+    labels = {method.name: method.label for method in sinew.methods()}
+    for frame, of_methods in shapes.items():
+        evaluate.set_frame(scene, frame)
+        view = whole_view([seen_extent(shape) for shape in of_methods.values()])
+        pictures[frame] = []
+        for letter, method in zip("abc", meshes.SKINS, strict=True):
+            evaluate.use_method(mesh, method)
+            pictures[frame].append(Picture(f"({letter}) {labels[method]}", _draw(studio, view, scratch)))
+        pictures[frame] = meshes.trimmed(pictures[frame])
+    evaluate.set_frame(scene, scene.frame_start)
+    view = whole_view([seen_extent(rest)])
+    at_rest = Picture("At rest: links, each with a bone", _draw(studio, view, scratch))
+    return (
+        meshes.figure_3_9(skin, *meshes.trimmed([at_rest])),
+        meshes.figure_3_10(skin, shapes[BENT], pictures[BENT]),
+        meshes.figure_3_11(skin, shapes[TWISTED], pictures[TWISTED]),
+    )

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Between Blender's conventions and Sinew's: meshes, armatures, poses, actions, files."""

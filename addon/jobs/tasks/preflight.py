@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a file needs Sinew, and what in it Sinew can not drive: for `sinew check`, ahead of a farm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+
+from ...attach import attach, properties, stack, upstream_proxy
+from ...attach.updates import updates_suspended
+from ...core import inbetween as core
+from ...core.errors import SinewError
+from ...deform import evaluate
+from ...features.inbetween import inbetween_handlers
+from ...io import files
+
+
+def check(task: dict, report: Callable[..., None]) -> dict:
+    """What there is to know of the file "source" of a task.
+
+    "meshes": name and method of each that Sinew deforms; "inbetweens": armatures that Sinew poses;
+    "problems": a sentence for each thing that Sinew can not do, with what to do about it; "notes": what is no
+    fault.
+    Raises SinewError where the file can not be read. The open file is of no use afterwards.
+    """
+    report("opening it")
+    # As it is, before Sinew sees to what it finds.
+    with updates_suspended():
+        files.open_file(Path(task["source"]))
+    report("trying it")
+    # What a library override stands for is there as well, linked, and of no concern.
+    overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
+    objects = [obj for obj in bpy.data.objects if obj not in overridden and not properties.is_copy(obj)]
+    skinned = [obj for obj in objects if properties.has_sinew(obj)]
+    armatures = [obj for obj in objects if obj.type == "ARMATURE" and obj.sinew_inbetween != core.BLENDER]
+    # Read before they are tried, which switches them on.
+    meshes = [
+        {"object": obj.name, "method": properties.of(obj).method}
+        for obj in skinned
+        if properties.of(obj).enabled
+    ]
+    off = [obj.name for obj in skinned if not properties.of(obj).enabled]
+    problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
+    problems += [reason for reason in map(inbetween_handlers.problem_of, armatures) if reason is not None]
+    problems += _undrivable(skinned)
+    notes = [f"{name} is switched off: its Armature modifier deforms it" for name in off]
+    notes += [
+        f"library {library.filepath} is missing: whether Sinew deforms what it links is not known"
+        for library in bpy.data.libraries
+        if _is_missing(library)
+    ]
+    return {
+        "meshes": meshes,
+        "inbetweens": [armature.name for armature in armatures],
+        "problems": problems,
+        "notes": notes,
+    }
+
+
+def _undrivable(objects: list[bpy.types.Object]) -> Iterator[str]:
+    """A sentence for each object with settings of Sinew that it can not drive. Each is evaluated, in its
+    scene and shown: what is hidden is not, and would tell nothing."""
+    left = []
+    for obj in objects:
+        problem = _obstacle(obj)
+        if problem is not None:
+            yield problem
+        else:
+            left.append(obj)
+    for scene in bpy.data.scenes:
+        here = [obj for obj in left if obj.name in scene.objects and obj.library is None]
+        left = [obj for obj in left if obj not in here]
+        if not here:
+            continue
+        bpy.context.window.scene = scene
+        evaluate.show(here)
+        wanted = [(obj, properties.of(obj).method) for obj in here]
+        yield from (str(error) for error in evaluate.use_methods(wanted) if error is not None)
+
+
+def _is_missing(library: bpy.types.Library) -> bool:
+    return not Path(bpy.path.abspath(library.filepath)).exists()
+
+
+def _obstacle(obj: bpy.types.Object) -> str | None:
+    """What is seen without an evaluation."""
+    gone = [replaced.name for replaced in properties.of(obj).replaced_modifiers if replaced.armature is None]
+    if gone and attach.armature_of(obj) is None:
+        return f"{obj.name}: the armature of {', '.join(gone)} is gone; choose another one, or Remove Sinew"
+    if stack.armature_modifier(obj) is None:
+        return (
+            f"{obj.name}: the Armature modifier that Sinew stands in for is gone; Remove Sinew, or add the "
+            "modifier anew"
+        )
+    if not obj.is_editable:
+        return (
+            f"{obj.name} is linked from another file, where Sinew deforms it; make a library override of it "
+            "(Object > Library Override > Make)"
+        )
+    if obj.override_library is not None and _is_missing(obj.override_library.reference.library):
+        library = obj.override_library.reference.library.filepath
+        return f"{obj.name} overrides what is in {library}, which is missing; put the file there"
+    try:
+        upstream_proxy.check(obj)
+    except SinewError as error:
+        return str(error)
+    return None
+
+
+def _remains(obj: bpy.types.Object) -> Iterator[str]:
+    """What there is of Sinew on an object without its settings, as older versions left it."""
+    if obj.type != "MESH" or properties.is_helper(obj):
+        return
+    if stack.sinew_modifier(obj) is not None:
+        yield (
+            f"{obj.name}: has the modifier {stack.sinew_modifier(obj).name} of Sinew without its settings, "
+            "and keeps one shape; delete that modifier and add Sinew again"
+        )
+    for modifier in obj.modifiers:
+        if modifier.type == "ARMATURE" and modifier.object is None and not stack.is_on(modifier):
+            yield (
+                f"{obj.name}: its modifier {modifier.name} is switched off and has no armature, as Sinew "
+                "leaves one that it stands in for; choose the armature and switch it on, or delete it"
+            )

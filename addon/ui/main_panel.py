@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab "Sinew" of the 3D view."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach import attach, properties
+from ..core import inbetween as core_inbetween
+from ..deform import handlers, small_meshes
+from ..deform.plan import ObjectFacts, plan
+from ..features.inbetween import inbetween, inbetween_handlers
+from . import operators
+from .sidebar import Sidebar, draw_text
+
+
+class SINEW_PT_main(Sidebar, bpy.types.Panel):
+    bl_label = "Sinew"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        meshes = operators.targets(context)
+        for other in attach.not_meshes(context.selected_objects):
+            text = f"{other.name} stays with its Armature modifier: Sinew deforms meshes only"
+            draw_text(layout, context, text, icon="INFO")
+        if not meshes:
+            draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
+            return
+        skinned = [obj for obj in meshes if properties.has_sinew(obj)]
+        if len(skinned) < len(meshes):
+            count = len(meshes) - len(skinned)
+            label = "Add Sinew" if count == 1 else f"Add Sinew to {count} Meshes"
+            layout.operator("sinew.add", text=label, icon="MOD_ARMATURE")
+        waits = operators.waits_for_render()
+        if waits:
+            draw_text(layout, context, f"{waits}: until then nothing can be changed", icon="INFO")
+            layout = layout.column()
+            layout.enabled = False
+        for obj in skinned:
+            box = layout.box()
+            _draw_settings(box, context, obj)
+            _draw_facts(box, context, obj)
+        if skinned:
+            row = layout.row(align=True)
+            row.operator("sinew.rebind", icon="FILE_REFRESH")
+            row.operator("sinew.remove", icon="X")
+            layout.operator("sinew.bake", text="Bake…", icon="RENDER_ANIMATION")
+            if not context.scene.render.use_lock_interface:
+                draw_text(
+                    layout, context, "Before rendering in this window, lock the interface:", icon="INFO"
+                )
+                layout.prop(context.scene.render, "use_lock_interface")
+
+
+def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    settings, state = properties.of(obj), handlers.state_of(obj)
+    row = layout.row(align=True)
+    row.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
+    if settings.error:
+        draw_text(layout, context, settings.error, icon="ERROR", alert=True)
+    elif settings.enabled:
+        facts = ObjectFacts(is_linked=obj.library is not None, mode=obj.mode)
+        reason = plan(facts).reason or (state.plan.reason if state is not None else "")
+        if reason:
+            draw_text(layout, context, reason, icon="INFO")
+    if state is not None and state.failures:
+        text = f"{state.failures} times not deformed within Blender's evaluation; last: {state.failure}"
+        draw_text(layout, context, text, icon="ERROR")
+    layout.prop(settings, "method", text="")
+    draw_text(layout, context, properties.METHODS[settings.method].description)
+    if len(settings.armatures) > 1 or any(
+        s.method != properties.SAME_METHOD for s in settings.replaced_modifiers
+    ):
+        for replaced in list(settings.replaced_modifiers)[1:]:
+            layout.prop(replaced, "method", text=replaced.name)
+    _draw_mix(layout, context, obj)
+    layout.prop(settings, "scale_rule")
+    if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
+        layout.prop(settings, "leave_small")
+
+
+def _draw_mix(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    mix = properties.of(obj).mix
+    layout.prop(mix, "method", text="Mix")
+    if mix.method == properties.OFF:
+        return
+    layout.prop_search(mix, "group", obj, "vertex_groups", text="By")
+    if not mix.group:
+        draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
+
+
+def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    armature = properties.of(obj).armature
+    state = handlers.state_of(obj)
+    rows = [("Armature", armature.name if armature else "none")]
+    if state is not None:
+        facts = state.facts
+        rows += [
+            ("Vertices", f"{facts.vertices:,}"),
+            ("Bones", f"{facts.bones}, {facts.weighted_bones} with weights"),
+            ("Influences", f"{facts.mean_influences:.2f} a vertex, at most {facts.most_influences}"),
+        ]
+        if not state.uses_builtin:
+            rows.append(("Last frame", f"{state.milliseconds:.2f} ms"))
+    column = layout.column(align=True)
+    for name, value in rows:
+        split = column.split(factor=0.4)
+        split.label(text=name)
+        split.label(text=value)
+    if state is not None:
+        for warning in state.facts.warnings:
+            draw_text(layout, context, warning, icon="ERROR")
+
+
+class SINEW_PT_inbetweens(Sidebar, bpy.types.Panel):
+    bl_label = "In-betweens"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(operators.armatures(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        armatures = operators.armatures(context)
+        for armature in armatures:
+            box = layout.box()
+            box.label(text=armature.name, icon="OUTLINER_OB_ARMATURE")
+            box.prop(armature, "sinew_inbetween", text="")
+            if inbetween.is_on(armature):
+                box.row().prop(armature, "sinew_inbetween_path", expand=True)
+                _draw_playing(box, context, armature)
+        if any(inbetween.is_on(armature) for armature in armatures):
+            layout.operator("sinew.bake_inbetweens", icon="KEYTYPE_BREAKDOWN_VEC")
+
+
+def _draw_playing(layout: bpy.types.UILayout, context: bpy.types.Context, armature: bpy.types.Object) -> None:
+    draw_text(layout, context, core_inbetween.METHODS[armature.sinew_inbetween].description)
+    problem = inbetween_handlers.problem_of(armature)
+    player = inbetween_handlers.player_of(armature)
+    if problem is not None:
+        draw_text(layout, context, problem, icon="ERROR", alert=True)
+    elif player is None or not player.bones:
+        draw_text(layout, context, "Key poses of bones: Sinew moves them between the keys", icon="INFO")
+    else:
+        text = f"Plays {player.bones} of {len(armature.pose.bones)} bones; meanwhile their curves are muted"
+        draw_text(layout, context, text, icon="INFO")
+    if player is not None:
+        for bone, reason in sorted(player.left.items()):
+            draw_text(layout, context, f"{bone} {reason}: Blender's curves play", icon="ERROR")
+        if player.pose is not None and player.pose.far:
+            names = ", ".join(player.pose.far)
+            reason = core_inbetween.TOO_FAR[armature.sinew_inbetween_path]
+            draw_text(layout, context, f"{names} {reason}", icon="ERROR")
+
+
+CLASSES = (SINEW_PT_main, SINEW_PT_inbetweens)

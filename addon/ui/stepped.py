@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that go through frames: in steps in a window, with progress and Esc; at once elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import bpy
+
+from ..core.errors import SinewError
+from ..deform import evaluate, handlers
+from ..io import pose_io
+
+# The window draws in between: rarely enough to cost little, often enough for Esc.
+SECONDS_BETWEEN_REDRAWS = 0.1
+OVER = [
+    ("SCENE", "Scene's Frames", "The scene's frame range, or its preview range where that is on"),
+    ("ACTION", "Action's Frames", "From the first to the last key of the armature's action"),
+]
+
+
+class Stepped:
+    """Has steps(context), which yields the share that is done, and finish(context), which takes what it
+    found. Both may raise SinewError, which is reported.
+
+    saying   what it does, in the status bar
+    stopped  what Esc reports; closing steps() has to leave all as it was
+    """
+
+    saying = "Sinew looks at frames"
+    stopped = "Stopped; nothing has changed"
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            for _share in self.steps(context):
+                pass
+        except SinewError as error:
+            return self._failed(error)
+        return self._finished(context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        self._left = self.steps(context)
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(0.0, window=context.window)
+        manager.progress_begin(0.0, 1.0)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC":
+            self.cancel(context)
+            self.report({"WARNING"}, self.stopped)
+            return {"CANCELLED"}
+        # Whatever else is done meanwhile would end up in what is found.
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        share = None
+        try:
+            share = self._go_on()
+        except SinewError as error:
+            return self._failed(error)
+        finally:
+            if share is None:
+                self._end(context)
+        if share is None:
+            return self._finished(context)
+        context.window_manager.progress_update(share)
+        context.workspace.status_text_set(f"{self.saying}: {share:.0%} (Esc stops)")
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Also when the window closes."""
+        self._left.close()
+        self._end(context)
+
+    def _go_on(self) -> float | None:
+        """The share that is done after some steps; None at the end."""
+        until, share = time.perf_counter() + SECONDS_BETWEEN_REDRAWS, 0.0
+        while share is not None and time.perf_counter() < until:
+            share = next(self._left, None)
+        return share
+
+    def _finished(self, context: bpy.types.Context) -> set[str]:
+        try:
+            return self.finish(context)
+        except SinewError as error:
+            return self._failed(error)
+
+    def _failed(self, error: SinewError) -> set[str]:
+        self.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+
+    def _end(self, context: bpy.types.Context) -> None:
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+        for area in context.screen.areas:
+            area.tag_redraw()
+
+
+def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], over: str) -> list[int]:
+    """The frames of one of OVER. Raises SinewError where there is no action."""
+    if over == "SCENE":
+        if scene.use_preview_range:
+            return list(range(scene.frame_preview_start, scene.frame_preview_end + 1))
+        return list(range(scene.frame_start, scene.frame_end + 1))
+    actions = [a.animation_data.action for a in armatures if a.animation_data is not None]
+    ranges = [tuple(action.frame_range) for action in actions if action is not None]
+    if not ranges:
+        names = ", ".join(armature.name for armature in armatures)
+        raise SinewError(f"{names}: no action; choose one, or the scene's frames")
+    first, last = min(start for start, _end in ranges), max(end for _start, end in ranges)
+    return list(range(round(first), round(last) + 1))
+
+
+@contextmanager
+def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Inside, go to any frame; afterwards the scene is at its own, and armatures are posed as they were,
+    keyed or not."""
+    frame = scene.frame_float
+    poses = [(armature, pose_io.read_channels(armature.pose.bones)) for armature in armatures]
+    try:
+        yield
+    finally:
+        evaluate.set_frame(scene, frame)
+        moved = [armature for armature, pose in poses if pose_io.write_channels(armature.pose.bones, pose)]
+        for armature in moved:
+            armature.update_tag()
+        if moved:
+            bpy.context.view_layer.update()
+            handlers.refresh(bpy.context)
