@@ -32,7 +32,7 @@ for name in bpy.context.preferences.addons.keys():
     if manifest.get("id") == "sinew":
         answer["sinew"], answer["problem"] = manifest.get("version"), None
         if not hasattr(bpy.types.Object, "sinew"):
-            answer["problem"] = importlib.import_module(name + ".blender.native").load_error()
+            answer["problem"] = importlib.import_module(name + ".native").load_error()
         break
     if name.rpartition(".")[2] == "sinew":
         answer["problem"] = "the extension is enabled and does not load"

@@ -26,7 +26,8 @@ def register() -> None:
     from .features.compare import comparison_labels, comparison_operators, comparison_panel, comparison_state
     from .features.diagnose import diagnostics_panel
     from .features.heat import heat_panel, measures
-    from .features.inbetween import inbetween_handlers
+    from .features.heat import subscription as heat
+    from .features.inbetween import inbetween_handlers, inbetween_panel
     from .ui import main_panel, operators, preferences
 
     _register_classes(
@@ -38,10 +39,9 @@ def register() -> None:
             *main_panel.CLASSES,
         )
     )
-    _register_classes(bake_operator.CLASSES)
+    _register_classes((*inbetween_panel.CLASSES, *bake_operator.CLASSES))
     _register_classes((*comparison_state.CLASSES, *comparison_operators.CLASSES, *comparison_panel.CLASSES))
     _register_classes((*heat_panel.CLASSES, *diagnostics_panel.CLASSES))
-    measures.register()
     bpy.types.Scene.sinew_comparison = bpy.props.PointerProperty(type=comparison_state.SinewComparison)
     comparison_labels.register()
     bpy.types.Object.sinew = bpy.props.PointerProperty(
@@ -55,6 +55,7 @@ def register() -> None:
     inbetween_handlers.register()
     inbetween_handlers.adopt_open_file()
     handlers.register()
+    heat.register()
     exporters.register()
     diagnostics_panel.register()
     handlers.adopt_open_file()
@@ -69,20 +70,19 @@ def unregister() -> None:
         from .deform import exporters, handlers
         from .features.compare import comparison_labels
         from .features.diagnose import diagnostics_panel
-        from .features.heat import heat_legend, measures
+        from .features.heat import subscription as heat
         from .features.inbetween import inbetween_handlers
 
         atexit.unregister(unregister)
         comparison_labels.unregister()
         diagnostics_panel.unregister()
-        heat_legend.show(False)
         # As in a saved file: the Armature modifiers deform.
         handlers.prepare_for_save()
         note.remove()
         exporters.unregister()
+        heat.unregister()
         handlers.unregister()
         inbetween_handlers.unregister()
-        measures.unregister()
         del bpy.types.Object.sinew, bpy.types.Mesh.sinew_asked, bpy.types.Action.sinew_holds
         del bpy.types.Scene.sinew_comparison
         for name in properties.INBETWEEN:

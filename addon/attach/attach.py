@@ -10,10 +10,10 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from ..features.heat import heat_view
 from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import node_group, point_store, pose_driver, properties, setting_animation, stack, upstream_proxy
 from .stack import armature_modifier, sinew_modifier
+from .subscribers import notify, subscribers
 from .updates import updates_suspended
 
 # Tools of this mode look for the armature behind a modifier that is on.
@@ -146,15 +146,14 @@ def take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
     with updates_suspended():
         _take_off(obj)
-    heat_view.tidy()
+    notify(subscribers.after_removal)
 
 
 def _take_off(obj: bpy.types.Object) -> None:
     switch(obj, on=False)
     resume_after_save(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
-    if settings.heat:
-        heat_view.take_off(obj)
+    notify(subscribers.before_removal, obj)
     if nodes is not None:
         active = obj.modifiers.active if obj.modifiers.active != nodes else armature_modifier(obj)
         obj.modifiers.remove(nodes)

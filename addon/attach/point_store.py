@@ -8,11 +8,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..features.heat import heat_nodes
 from ..io import mesh_io
 from . import node_group, point_buffer, pose_driver, properties, stack, upstream_proxy
+from .subscribers import subscribers
 
 ATTRIBUTE = "sinew_points"
+# Earlier versions also kept colours in the mesh.
+_OWN_ATTRIBUTES = (ATTRIBUTE, "sinew_colours")
 
 
 def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
@@ -33,7 +35,8 @@ def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
         point_buffer.remove(obj)
         _ensure_attribute(obj)
         kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
-    group = heat_nodes.get_or_make() if settings.heat else node_group.get_or_make(kind)
+    made_by_features = (make(obj) for make in subscribers.node_group)
+    group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind)
     if nodes.node_group != group:
         # It can be on an input that another group does not have.
         pose_driver.remove(obj)
@@ -71,23 +74,6 @@ def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
     """_differing_from() in place."""
     if np.array_equal(shown[:1], rest[:1]) and np.array_equal(shown, rest):
         shown[:] = _marked(shown, rest)
-
-
-def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
-    """Stores float32 [vertices, 3], linear, in the carrier, and has Blender evaluate it."""
-    mesh = properties.of(obj).point_buffer.data
-    mesh_io.write_vectors(mesh, heat_nodes.COLOURS, colours)
-    mesh.update_tag()
-
-
-def has_colours(obj: bpy.types.Object) -> bool:
-    point_buffer = properties.of(obj).point_buffer
-    return point_buffer is not None and heat_nodes.COLOURS in point_buffer.data.attributes
-
-
-def remove_colours(obj: bpy.types.Object) -> None:
-    if has_colours(obj):
-        mesh_io.remove_attribute(properties.of(obj).point_buffer.data, heat_nodes.COLOURS)
 
 
 def are_written(obj: bpy.types.Object, count: int) -> bool:
@@ -172,5 +158,5 @@ def remove_attributes(obj: bpy.types.Object) -> None:
     if not mesh.is_editable:
         return
     for name in [attribute.name for attribute in mesh.attributes]:
-        if name.startswith((ATTRIBUTE, heat_nodes.COLOURS)):
+        if name.startswith(_OWN_ATTRIBUTES):
             mesh_io.remove_attribute(mesh, name)

@@ -50,16 +50,16 @@ class _Variable:
         target.data_path = self.path
 
 
-def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]], asking: bool) -> None:
+def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]], in_depsgraph: bool) -> None:
     """Makes the driver as it has to be.
 
     poses   each an armature and the path of a property that is read no sooner than its bones are posed.
             Blender evaluates these bones, their parents and their constraints' targets, and no others.
-    asking  it asks Sinew for the points, once the carrier and what stands in front are evaluated
+    in_depsgraph  it asks Sinew for the points, once the carrier and what stands in front are evaluated
     """
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
-    if asking:
+    if in_depsgraph:
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
         # By a property, as Blender reads the transforms of the driver's own object without waiting for them.

@@ -155,10 +155,10 @@ class SinewSettings(bpy.types.PropertyGroup):
         update=_method_changed,
         override=OVERRIDABLE,
     )
-    replaced_modifiers: bpy.props.CollectionProperty(
+    stand_ins: bpy.props.CollectionProperty(
         type=SinewReplacedModifier, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )
-    replaces_modifiers: bpy.props.BoolProperty(
+    standing_in: bpy.props.BoolProperty(
         description="The Armature modifiers are switched off for Sinew's; not so while some of Blender's "
         "tools need them",
         options={"HIDDEN"},
@@ -179,9 +179,9 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    point_buffer: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
-    upstream_proxy: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
-    upstream_signature: bpy.props.StringProperty(options={"HIDDEN"})
+    carrier: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
+    front: bpy.props.PointerProperty(type=bpy.types.Object, options={"HIDDEN"}, override=OVERRIDABLE)
+    front_signature: bpy.props.StringProperty(options={"HIDDEN"})
     helper: bpy.props.BoolProperty(
         description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
     )
@@ -208,6 +208,45 @@ class SinewSettings(bpy.types.PropertyGroup):
         description="Read by pose_driver's driver, to ask for points",
     )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    # Files have had the names above since the first version: code has these.
+
+    @property
+    def replaced_modifiers(self) -> bpy.types.bpy_prop_collection:
+        """What Sinew keeps of each Armature modifier that it replaces."""
+        return self.stand_ins
+
+    @property
+    def replaces_modifiers(self) -> bool:
+        """Whether Sinew's modifier deforms now, and the Armature modifiers are off."""
+        return self.standing_in
+
+    @property
+    def point_buffer(self) -> bpy.types.Object | None:
+        """The object whose vertices are the deformed points (point_buffer.py)."""
+        return self.carrier
+
+    @point_buffer.setter
+    def point_buffer(self, made: bpy.types.Object | None) -> None:
+        self.carrier = made
+
+    @property
+    def upstream_proxy(self) -> bpy.types.Object | None:
+        """The copy that has the modifiers in front alone (upstream_proxy.py)."""
+        return self.front
+
+    @upstream_proxy.setter
+    def upstream_proxy(self, made: bpy.types.Object | None) -> None:
+        self.front = made
+
+    @property
+    def upstream_signature(self) -> str:
+        """What the proxy was made from, as upstream_proxy.signature()."""
+        return self.front_signature
+
+    @upstream_signature.setter
+    def upstream_signature(self, signature: str) -> None:
+        self.front_signature = signature
 
     @property
     def mixed_method(self) -> str:

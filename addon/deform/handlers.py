@@ -12,11 +12,10 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..attach import attach, note, overrides, point_store, properties, stack
+from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
-from ..features.heat import heat_map, heat_view, measures
 from ..io.animation_paths import animated_paths
-from ..ui import redraw
 from . import apply_plan, events, skinned_object
 from .changes import Changes, names_of_changed_meshes
 from .gate import Gate
@@ -146,10 +145,10 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
         yield
         session.objects = None
         depsgraph, changes = context.view_layer.depsgraph, Changes()
-        driven_before = depsgraph is not None and any(
+        had_sinew = depsgraph is not None and any(
             properties.has_sinew(obj.evaluated_get(depsgraph)) for obj in _skinned_objects(changes)
         )
-        if depsgraph is None or driven_before:
+        if depsgraph is None or had_sinew:
             depsgraph = context.evaluated_depsgraph_get()
         _update(depsgraph, changes)
         if _waiting():
@@ -159,10 +158,8 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
 
 def _waiting() -> set[int]:
     """The session_uid of each driven object that waits for what Blender makes of the modifiers in front."""
-    driven_now = [(obj, properties.of(obj)) for obj in _skinned_objects(Changes()) if state_of(obj) is None]
-    return {
-        obj.session_uid for obj, settings in driven_now if settings.enabled and settings.replaces_modifiers
-    }
+    on_now = [(obj, properties.of(obj)) for obj in _skinned_objects(Changes()) if state_of(obj) is None]
+    return {obj.session_uid for obj, settings in on_now if settings.enabled and settings.replaces_modifiers}
 
 
 def prepare_for_save() -> None:
@@ -193,7 +190,8 @@ def resume_after_save(context: bpy.types.Context) -> None:
     refresh(context)
 
 
-def _setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    """One of Sinew's settings of an object was changed: its shape may differ."""
     refresh(context)
     # Blender touches the object's mesh next. In a window that is an evaluation of its own; a script may
     # change weights before.
@@ -206,19 +204,7 @@ def _enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     if not settings.enabled and not is_rendering_in_window():
         apply_plan.apply(obj, apply_plan.plan_of(obj))
     settings.error = ""
-    _setting_changed(obj, context)
-
-
-def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    if not properties.has_sinew(obj):
-        return
-    if is_rendering_in_window():
-        session.must_refresh = True
-        return
-    if not properties.of(obj).heat:
-        heat_view.take_off(obj)
-    _setting_changed(obj, context)
-    heat_view.tidy()
+    setting_changed(obj, context)
 
 
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
@@ -249,9 +235,8 @@ def _update(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         requests.set_objects({obj.name: state for obj, state in session.pairs})
         session.all_use_builtin = _do_all_use_builtin()
         _subscribe_to_needed_frames()
-        heated = [obj for obj in session.objects or () if properties.of(obj).heat]
-        heat_map.update(states_of(heated, depsgraph), depsgraph)
-        redraw.request()
+        notify(subscribers.deformed, session.objects or [], depsgraph)
+        notify(subscribers.frame_shown)
 
 
 def _adopt_copied_modifiers(changes: Changes) -> None:
@@ -308,7 +293,7 @@ def _skinned_objects(changes: Changes) -> list[bpy.types.Object]:
     if session.objects is None or changes.structure or len(bpy.data.objects) != session.object_count:
         session.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
         session.object_count = len(bpy.data.objects)
-        heat_view.sync(session.objects)
+        notify(subscribers.objects_changed, session.objects)
         point_store.unshare(session.objects)
         pairs = {obj.session_uid for obj in session.objects}
         session.skinned = {uid: state for uid, state in session.skinned.items() if uid in pairs}
@@ -379,7 +364,7 @@ def _were_all_deformed(depsgraph: bpy.types.Depsgraph) -> bool:
     except ReferenceError:
         # Deleted since the objects were listed.
         return False
-    redraw.request()
+    notify(subscribers.frame_shown)
     return True
 
 
@@ -486,7 +471,7 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if session.all_use_builtin and Changes.are_motion_only(depsgraph):
-        redraw.request()
+        notify(subscribers.frame_shown)
         return
     with reaction() as may_react:
         session.gate.restore()
@@ -677,12 +662,10 @@ if events.IMPORTS_ARE_ANNOUNCED:
 
 def register() -> None:
     session.forget()
-    properties.listeners.method_changed = _setting_changed
+    properties.listeners.method_changed = setting_changed
     properties.listeners.enabled_changed = _enabled_changed
     properties.listeners.object_requested = requests.object_requested
     properties.listeners.mesh_requested = requests.mesh_requested
-    properties.listeners.heat_changed = _heat_changed
-    measures.Listener.changed = refresh
     events.subscribe_all(_HANDLERS)
     if not bpy.app.background:
         bpy.app.timers.register(_check_unannounced_changes, first_interval=1.0, persistent=True)

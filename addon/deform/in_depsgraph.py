@@ -39,7 +39,7 @@ class DepsgraphRequests:
         # may be reading it.
         self._states: dict[str, SkinnedObject] = {}
 
-    def give(self, states: dict[str, SkinnedObject]) -> None:
+    def set_objects(self, states: dict[str, SkinnedObject]) -> None:
         self._states = states
 
     def object_requested(self, evaluated: bpy.types.Object) -> None:

@@ -6,10 +6,8 @@ from __future__ import annotations
 import bpy
 
 from ..attach import attach, properties
-from ..core import inbetween as core_inbetween
 from ..deform import handlers, small_meshes
 from ..deform.plan import ObjectFacts, plan
-from ..features.inbetween import inbetween, inbetween_handlers
 from . import operators
 from .sidebar import Sidebar, draw_text
 
@@ -113,46 +111,4 @@ def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy
             draw_text(layout, context, warning, icon="ERROR")
 
 
-class SINEW_PT_inbetweens(Sidebar, bpy.types.Panel):
-    bl_label = "In-betweens"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(operators.armatures(context))
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        armatures = operators.armatures(context)
-        for armature in armatures:
-            box = layout.box()
-            box.label(text=armature.name, icon="OUTLINER_OB_ARMATURE")
-            box.prop(armature, "sinew_inbetween", text="")
-            if inbetween.is_on(armature):
-                box.row().prop(armature, "sinew_inbetween_path", expand=True)
-                _draw_playing(box, context, armature)
-        if any(inbetween.is_on(armature) for armature in armatures):
-            layout.operator("sinew.bake_inbetweens", icon="KEYTYPE_BREAKDOWN_VEC")
-
-
-def _draw_playing(layout: bpy.types.UILayout, context: bpy.types.Context, armature: bpy.types.Object) -> None:
-    draw_text(layout, context, core_inbetween.METHODS[armature.sinew_inbetween].description)
-    problem = inbetween_handlers.problem_of(armature)
-    player = inbetween_handlers.player_of(armature)
-    if problem is not None:
-        draw_text(layout, context, problem, icon="ERROR", alert=True)
-    elif player is None or not player.bones:
-        draw_text(layout, context, "Key poses of bones: Sinew moves them between the keys", icon="INFO")
-    else:
-        text = f"Plays {player.bones} of {len(armature.pose.bones)} bones; meanwhile their curves are muted"
-        draw_text(layout, context, text, icon="INFO")
-    if player is not None:
-        for bone, reason in sorted(player.left.items()):
-            draw_text(layout, context, f"{bone} {reason}: Blender's curves play", icon="ERROR")
-        if player.pose is not None and player.pose.far:
-            names = ", ".join(player.pose.far)
-            reason = core_inbetween.TOO_FAR[armature.sinew_inbetween_path]
-            draw_text(layout, context, f"{names} {reason}", icon="ERROR")
-
-
-CLASSES = (SINEW_PT_main, SINEW_PT_inbetweens)
+CLASSES = (SINEW_PT_main,)

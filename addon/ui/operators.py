@@ -11,7 +11,6 @@ from ..attach import attach, properties
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..deform import handlers
-from ..features.inbetween import inbetween, inbetween_bake
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -143,43 +142,4 @@ class SINEW_OT_remove(OnSinewObjects, bpy.types.Operator):
         return result
 
 
-class SINEW_OT_bake_inbetweens(bpy.types.Operator):
-    bl_idname = "sinew.bake_inbetweens"
-    bl_label = "Bake In-betweens"
-    bl_description = (
-        "Write the in-betweens as plain keys into a copy of the action, which plays without Sinew; the "
-        "action itself stays in the file"
-    )
-    bl_options = {"REGISTER", "UNDO"}
-
-    step: bpy.props.IntProperty(
-        name="Step", description="Frames from one baked key to the next", default=1, min=1, soft_max=12
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if any(inbetween.is_on(armature) for armature in armatures(context)):
-            return can_change(cls)
-        cls.poll_message_set("Choose a method for the in-betweens of a selected armature")
-        return False
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        manager = context.window_manager
-        manager.progress_begin(0.0, 1.0)
-        baked = []
-        try:
-            for armature in filter(inbetween.is_on, armatures(context)):
-                try:
-                    baked.append(inbetween_bake.bake(armature, self.step, manager.progress_update))
-                except SinewError as error:
-                    self.report({"ERROR"}, str(error))
-        finally:
-            manager.progress_end()
-        if not baked:
-            return {"CANCELLED"}
-        names = ", ".join(f"{one.bones} bones into {one.action.name}" for one in baked)
-        self.report({"INFO"}, f"Baked {names}")
-        return {"FINISHED"}
-
-
-CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove, SINEW_OT_bake_inbetweens)
+CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove)

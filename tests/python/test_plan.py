@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 # The package around it imports bpy; this file does not.
-_PATH = Path(__file__).resolve().parents[2] / "addon" / "blender" / "plan.py"
+_PATH = Path(__file__).resolve().parents[2] / "addon" / "deform" / "plan.py"
 _SPEC = importlib.util.spec_from_file_location("sinew_plan", _PATH)
 plan_module = importlib.util.module_from_spec(_SPEC)
 sys.modules["sinew_plan"] = plan_module

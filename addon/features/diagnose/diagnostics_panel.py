@@ -128,9 +128,10 @@ def _draw_check(
     if not found.findings:
         column.label(text="Nothing found", icon="CHECKMARK")
     draw_text(column, context, f"Checked: weights, {found.frames}")
-    upstream_proxy = [modifier.name for modifier in stack.upstream_changes(obj)]
-    if upstream_proxy:
-        text = f"What {', '.join(upstream_proxy)} in front makes of the mesh is not checked: it has no vertices to select"
+    upstream = [modifier.name for modifier in stack.upstream_changes(obj)]
+    if upstream:
+        names = ", ".join(upstream)
+        text = f"What {names} in front makes of the mesh is not checked: it has no vertices to select"
         draw_text(column, context, text, icon="INFO")
 
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...attach import point_store, properties
+from ...attach import properties
 from ...core.heat import HeatScale
 from ...core.metrics import Measured
-from . import heat_legend, live, measures
+from . import heat_legend, heat_nodes, live, measures
 from .measures import SinewMeasures
 
 # What colours were made from, by the session_uid of the scene.
@@ -37,13 +37,13 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
         return
     # Kept whole, not by id: that of an object that is gone may be another's.
     inputs = (subject.measured, *_choices(settings))
-    if _equal(inputs, _last.get(scene)) and all(point_store.has_colours(obj) for obj, _driven in shown):
+    if _equal(inputs, _last.get(scene)) and all(heat_nodes.has_colours(obj) for obj, _state in shown):
         return
     values = subject.measured.field(settings.quantity)
     scale = scale_of(settings, subject.measured, values)
     colours = scale.linear_colours(values)
-    for (obj, _driven), own in zip(shown, subject.split(colours), strict=True):
-        point_store.write_colours(obj, own)
+    for (obj, _state), own in zip(shown, subject.split(colours), strict=True):
+        heat_nodes.write_colours(obj, own)
     _last[scene] = inputs
     heat_legend.contents[scene] = heat_legend.Content(scale, _title(settings, shown))
 
@@ -67,9 +67,7 @@ def _equal(inputs: tuple, last: tuple | None) -> bool:
 
 def _title(settings: SinewMeasures, shown: live.Pairs) -> str:
     """Of what, under which methods."""
-    methods = list(
-        dict.fromkeys(properties.method_label(properties.of(obj).method) for obj, _driven in shown)
-    )
+    methods = list(dict.fromkeys(properties.method_label(properties.of(obj).method) for obj, _state in shown))
     text = f"{settings.metric.label}, {' and '.join(methods)}"
     if settings.quantity == "distance":
         text += f" against {properties.method_label(settings.other)}"

@@ -9,9 +9,11 @@ one mesh have colours of their own, and the material that shows them is one.
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
-from ...attach import node_group
+from ...attach import node_group, properties
 from ...attach.node_group import POINT_BUFFER, add_nodes, enabled_socket
+from ...io import mesh_io
 
 # The colour attribute of evaluated meshes.
 NAME = "Sinew Heat"
@@ -19,6 +21,11 @@ NAME = "Sinew Heat"
 COLOURS = "sinew_colours"
 MARK = "sinew_heat"
 _KIND = 12
+
+
+def group_of(obj: bpy.types.Object) -> bpy.types.NodeTree | None:
+    """For an object that shows a heat map; None for others."""
+    return get_or_make() if properties.of(obj).heat else None
 
 
 def get_or_make() -> bpy.types.NodeTree:
@@ -29,6 +36,23 @@ def get_or_make() -> bpy.types.NodeTree:
 def remove_unused_material() -> None:
     for material in [m for m in bpy.data.materials if m.get(MARK) and m.library is None and m.users == 0]:
         bpy.data.materials.remove(material)
+
+
+def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
+    """Stores float32 [vertices, 3], linear, in the carrier, and has Blender evaluate it."""
+    mesh = properties.of(obj).point_buffer.data
+    mesh_io.write_vectors(mesh, COLOURS, colours)
+    mesh.update_tag()
+
+
+def has_colours(obj: bpy.types.Object) -> bool:
+    point_buffer = properties.of(obj).point_buffer
+    return point_buffer is not None and COLOURS in point_buffer.data.attributes
+
+
+def remove_colours(obj: bpy.types.Object) -> None:
+    if has_colours(obj):
+        mesh_io.remove_attribute(properties.of(obj).point_buffer.data, COLOURS)
 
 
 def _make() -> bpy.types.NodeTree:

@@ -9,9 +9,9 @@ from ...attach import properties
 from ...core.metrics import Measured
 from ...deform import handlers
 from ...io import units
-from ...ui import operators, redraw
+from ...ui import operators
 from ...ui.sidebar import Sidebar, draw_text
-from . import heat_operators, live, measures, worst_frames
+from . import heat_operators, live, measures, redraw, worst_frames
 
 # What the number is that a frame is bad by.
 _WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of the area"}

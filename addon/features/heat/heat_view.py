@@ -9,40 +9,40 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
-from ...attach import node_group, point_store, properties
+from ...attach import node_group, properties
 from . import heat_legend, heat_nodes, measures
 
 FROM_ATTRIBUTE = "VERTEX"
 
 
-def sync(skinned: Iterable[bpy.types.Object]) -> None:
-    """Brings the file and the views in line with which of the driven objects show a heat map."""
-    shown = [obj for obj in skinned if properties.of(obj).heat and properties.of(obj).enabled]
+def sync(objects: Iterable[bpy.types.Object]) -> None:
+    """Brings the file and the views in line with which of the objects show a heat map."""
+    shown = [obj for obj in objects if properties.of(obj).heat and properties.of(obj).enabled]
     _choose_attributes({obj.data for obj in shown if obj.data.is_editable})
     _choose_colours(bool(shown))
     heat_legend.show(bool(shown))
 
 
 def take_off(obj: bpy.types.Object) -> None:
-    """Takes the heat map off a driven object, but for its node group."""
+    """Takes the heat map off an object, but for its node group."""
     properties.of(obj).property_unset("heat")
     # First, as Blender 4.2 makes another colour attribute the active one when any attribute goes.
-    sync(_driven())
-    point_store.remove_colours(obj)
+    sync(_objects())
+    heat_nodes.remove_colours(obj)
 
 
 def tidy() -> None:
     """Takes away what no object needs any more."""
-    skinned = _driven()
+    objects = _objects()
     node_group.remove_unused()
     heat_nodes.remove_unused_material()
-    if not skinned:
+    if not objects:
         for scene in bpy.data.scenes:
             if scene.is_editable:
                 measures.clear(scene)
 
 
-def _driven() -> list[bpy.types.Object]:
+def _objects() -> list[bpy.types.Object]:
     return [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
 
 

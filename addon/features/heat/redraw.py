@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach.updates import is_rendering_in_window
+from ...attach.updates import is_rendering_in_window
 
 # A panel that shows numbers was drawn since they last changed: it is open.
 wanted = False

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where features subscribe to what Sinew does with its objects: nothing below them knows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import bpy
+
+
+@dataclass
+class Subscribers:
+    """Each list is called in the order of subscription.
+
+    node_group       makes the node group of an object's modifier; None where the usual one will do
+    before_removal   Sinew is about to be taken off an object
+    after_removal    it was taken off one
+    objects_changed  these are the objects that have Sinew now
+    deformed         all objects have the shape of this evaluation, as far as handlers are concerned
+    frame_shown      what the panel shows of a frame may differ
+    """
+
+    node_group: list[Callable[[bpy.types.Object], bpy.types.NodeTree | None]] = field(default_factory=list)
+    before_removal: list[Callable[[bpy.types.Object], None]] = field(default_factory=list)
+    after_removal: list[Callable[[], None]] = field(default_factory=list)
+    objects_changed: list[Callable[[list[bpy.types.Object]], None]] = field(default_factory=list)
+    deformed: list[Callable[[list[bpy.types.Object], bpy.types.Depsgraph], None]] = field(
+        default_factory=list
+    )
+    frame_shown: list[Callable[[], None]] = field(default_factory=list)
+
+
+subscribers = Subscribers()
+
+
+def notify(functions: list[Callable], *arguments: object) -> None:
+    for function in functions:
+        function(*arguments)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How heat maps take part in what Sinew does with its objects."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...attach import properties
+from ...attach.subscribers import subscribers
+from ...attach.updates import is_rendering_in_window
+from ...deform import handlers
+from . import heat_legend, heat_map, heat_nodes, heat_view, measures, redraw
+
+
+def register() -> None:
+    measures.register()
+    measures.Listener.changed = handlers.refresh
+    properties.listeners.heat_changed = _heat_changed
+    for functions, function in _SUBSCRIPTIONS:
+        functions.append(function)
+
+
+def unregister() -> None:
+    heat_legend.show(False)
+    for functions, function in _SUBSCRIPTIONS:
+        functions.remove(function)
+    measures.Listener.changed = properties.listeners.heat_changed = None
+    measures.unregister()
+
+
+def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    if not properties.has_sinew(obj):
+        return
+    # Else it is seen to at the end of the render.
+    if not is_rendering_in_window() and not properties.of(obj).heat:
+        heat_view.take_off(obj)
+    handlers.setting_changed(obj, context)
+    if not is_rendering_in_window():
+        heat_view.tidy()
+
+
+def _take_off(obj: bpy.types.Object) -> None:
+    if properties.of(obj).heat:
+        heat_view.take_off(obj)
+
+
+def _colour(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> None:
+    heated = [obj for obj in objects if properties.of(obj).heat]
+    heat_map.update(handlers.states_of(heated, depsgraph), depsgraph)
+
+
+_SUBSCRIPTIONS = (
+    (subscribers.node_group, heat_nodes.group_of),
+    (subscribers.before_removal, _take_off),
+    (subscribers.after_removal, heat_view.tidy),
+    (subscribers.objects_changed, heat_view.sync),
+    (subscribers.deformed, _colour),
+    (subscribers.frame_shown, redraw.request),
+)
