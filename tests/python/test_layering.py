@@ -21,6 +21,12 @@ MAY_INCLUDE = {
     "ik": {"transform", "interpolate", "skeleton", "ik"},
 }
 
+# The rooms of addon/, lowest first: a file imports from its own and from those in front of it. What lies in
+# addon/ itself and starts a process is for all.
+ROOMS = ("core", "io", "attach", "deform", "ui", "features", "jobs", "commands")
+FOR_ALL = {"native", "blender_process", "other_blender"}
+FOR_COMMANDS = {"prepare", "worker"}
+
 # What nothing in addon/core may import: Blender and what is built on it.
 OF_BLENDER = {"aud", "bgl", "blf", "bl_math", "bmesh", "bpy", "bpy_extras", "gpu", "imbuf", "mathutils"}
 
@@ -68,21 +74,31 @@ def imports(text):
     return names
 
 
-def wrong_in_core(text, depth=0):
-    """Imports in `text`, a module `depth` folders below addon/core, that core may not have."""
-    wrong = []
+def of_blender(text):
+    """Imports of Blender in `text`."""
+    return [name for name in imports(text) if name.lstrip(".").split(".")[0] in OF_BLENDER]
+
+
+def rooms_used(text, path):
+    """The rooms and files of addon/ that `text` imports from, as the file `path`, relative to addon/."""
+    used = set()
     for name in imports(text):
         level = len(name) - len(name.lstrip("."))
         parts = name.lstrip(".").split(".")
-        if level > 0:
-            above_core = level - depth - 1
-            is_wrong = above_core > 1 or (above_core == 1 and parts[0] == "blender")
-        else:
-            of_extension = parts[0] in {"addon", "sinew_addon", "bl_ext"}
-            is_wrong = parts[0] in OF_BLENDER or (of_extension and "blender" in parts)
-        if is_wrong:
-            wrong.append(name)
-    return wrong
+        if level == len(path.parts):
+            used.add(parts[0])
+        elif level > len(path.parts):
+            used.add("outside")
+        elif level == 0 and parts[0] in {"addon", "sinew_addon", "bl_ext"}:
+            used.add(parts[1] if len(parts) > 1 else parts[0])
+    return used
+
+
+def wrong_rooms(text, path):
+    """The rooms that `text` imports from and may not."""
+    below = set(ROOMS[: ROOMS.index(path.parts[0]) + 1])
+    processes = FOR_ALL | FOR_COMMANDS if path.parts[0] == "commands" else FOR_ALL
+    return rooms_used(text, path) - below - processes
 
 
 LIBRARY_FILES = sources(LIBRARY, ".h", ".cpp")
@@ -123,16 +139,39 @@ def test_package_sinew_imports_nothing_of_blender_or_the_extension():
         assert roots & (OF_BLENDER | {"addon", "sinew_addon"}) == set(), path
 
 
-@pytest.mark.parametrize("folder", ["core", "batch"])
-def test_core_and_batch_import_nothing_of_blender(folder):
-    folder = ROOT / "addon" / folder
+def room_files(*rooms):
+    return [path for room in rooms for path in sources(ROOT / "addon" / room, ".py")]
+
+
+def test_every_folder_of_the_extension_is_a_room():
+    folders = {path.parent.name for path in (ROOT / "addon").glob("*/__init__.py")}
+    assert folders == set(ROOMS)
+
+
+def test_rooms_import_from_those_below_alone():
     wrong = {}
-    for path in sources(folder, ".py"):
-        depth = len(path.relative_to(folder).parts) - 1
-        found = wrong_in_core(path.read_text(encoding="utf-8"), depth)
+    for path in room_files(*ROOMS):
+        relative = path.relative_to(ROOT / "addon")
+        found = wrong_rooms(path.read_text(encoding="utf-8"), relative)
         if found:
-            wrong[path.relative_to(ROOT).as_posix()] = found
+            wrong[relative.as_posix()] = found
     assert wrong == {}
+
+
+def test_core_and_jobs_import_nothing_of_blender():
+    files = [path for path in room_files("core", "jobs") if "tasks" not in path.parts]
+    assert files
+    assert {path: of_blender(path.read_text(encoding="utf-8")) for path in files} == dict.fromkeys(files, [])
+
+
+def test_jobs_hand_tasks_out_without_importing_them():
+    files = [path for path in room_files("jobs") if "tasks" not in path.parts]
+    rooms = {
+        room
+        for path in files
+        for room in rooms_used(path.read_text(encoding="utf-8"), path.relative_to(ROOT / "addon"))
+    }
+    assert rooms <= {"core", "jobs"} | FOR_ALL
 
 
 # The tests above only ever see good sources: these show that they would see bad ones.
@@ -164,25 +203,39 @@ def test_a_python_header_is_seen(header):
         "import numpy, bpy.types as t",
         "from mathutils import Matrix",
         "def f():\n    import bmesh",
-        "from ..blender import mesh_io",
-        "from ..blender.mesh_io import read",
-        "from .. import blender",
-        "from ... import other",
-        "import sinew_addon.deform.handlers",
-        "from addon.blender import panels",
     ],
 )
-def test_a_wrong_import_in_core_is_seen(text):
-    assert len(wrong_in_core(text)) == 1
+def test_an_import_of_blender_is_seen(text):
+    assert len(of_blender(text)) == 1
 
 
 @pytest.mark.parametrize(
-    "text", ["import sinew", "from . import rig", "from .rig import Rig", "from .. import cli"]
+    ("path", "text"),
+    [
+        ("core/rig.py", "from ..io import mesh_io"),
+        ("core/rig.py", "from ..io.mesh_io import read_points"),
+        ("core/rig.py", "from .. import cli"),
+        ("core/rig.py", "from ... import other"),
+        ("core/report/page.py", "from ...deform import handlers"),
+        ("attach/attach.py", "def f():\n    from ..features.heat import heat_view"),
+        ("deform/handlers.py", "from ..ui import operators"),
+        ("deform/handlers.py", "import sinew_addon.features.heat"),
+        ("io/mesh_io.py", "from addon.attach import stack"),
+    ],
 )
-def test_a_right_import_in_core_is_let_through(text):
-    assert wrong_in_core(text) == []
+def test_a_wrong_room_is_seen(path, text):
+    assert len(wrong_rooms(text, Path(path))) == 1
 
 
-def test_imports_count_from_the_folder_of_the_module():
-    assert wrong_in_core("from ..blender import mesh_io", depth=1) == []
-    assert len(wrong_in_core("from ...blender import mesh_io", depth=1)) == 1
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("core/rig.py", "import sinew"),
+        ("core/rig.py", "from . import errors"),
+        ("core/report/page.py", "from ..errors import SinewError"),
+        ("features/heat/live.py", "from ...deform import handlers"),
+        ("features/bake/bake_apart.py", "from ...blender_process import BlenderProcess"),
+    ],
+)
+def test_a_right_room_is_let_through(path, text):
+    assert wrong_rooms(text, Path(path)) == set()
