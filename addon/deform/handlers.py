@@ -16,12 +16,13 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
-from . import apply_plan, events, skinned_object
+from . import after_update, apply_plan, events
 from .changes import Changes, names_of_changed_meshes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
 from .plan import Plan, State
 from .skinned_object import SkinnedObject
+from .update import update
 
 log = logging.getLogger("sinew")
 
@@ -92,10 +93,9 @@ def states_of(
         if state is None:
             continue
         with contextlib.suppress(SinewError):
-            current = skinned_object.bring_up_to_date(obj, state, depsgraph)
-            session.skinned[obj.session_uid] = current
-            pairs.append((obj, current))
-    return [(obj, state) for obj, state in pairs if state.frames is not None]
+            after_update.bring_up_to_date(obj, state, depsgraph)
+            pairs.append((obj, state))
+    return [(obj, state) for obj, state in pairs if state.shown.frames is not None]
 
 
 def refresh(context: bpy.types.Context) -> None:
@@ -258,8 +258,8 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
     if not apply_plan.has_lost_modifier(obj):
         return False
     # The last shape is worked out where it is asked for: not at each pose.
-    pairs = (None, None) if state is None else (state.source.points, state.points)
-    apply_plan.follow_removal(obj, *pairs)
+    known = (None, None) if state is None else (state.bound.source.points, state.points)
+    apply_plan.follow_removal(obj, *known)
     session.skinned.pop(obj.session_uid, None)
     session.objects = None
     return True
@@ -277,7 +277,7 @@ def _update_or_turn_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, c
                 # It was switched off while a window rendered.
                 apply_plan.apply(obj, apply_plan.plan_of(obj))
         else:
-            state = skinned_object.update(obj, state_of(obj), depsgraph, changes)
+            state = update(obj, state_of(obj), depsgraph, changes)
             if state is None:
                 session.skinned.pop(obj.session_uid, None)
             else:
@@ -447,7 +447,8 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 
 def _forget_deformed() -> None:
     for obj, state in session.pairs:
-        state.deformed_mesh, state.is_event_known, state.was_tagged = 0, True, False
+        evaluation = state.evaluation
+        evaluation.mesh, evaluation.is_event_known, evaluation.was_tagged = 0, True, False
         try:
             state.is_only_user = state.mesh_users == obj.data.users
         except ReferenceError:
@@ -484,7 +485,7 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 def _check_unannounced_changes() -> float:
     """What another add-on's handler changed behind Sinew's, Blender evaluates without telling anybody: in a
     window it is seen to a moment later."""
-    if any(state.changed_unannounced for _obj, state in session.pairs):
+    if any(state.evaluation.changed_unannounced for _obj, state in session.pairs):
         refresh(bpy.context)
     return 0.25
 
@@ -492,7 +493,7 @@ def _check_unannounced_changes() -> float:
 def _end_of_announced() -> None:
     """What Blender evaluates from here to the next event is for a handler that changed something."""
     for _obj, state in session.pairs:
-        state.is_event_known = state.was_tagged
+        state.evaluation.is_event_known = state.evaluation.was_tagged
 
 
 @persistent

@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's part in Blender's own evaluation: the driver of pose_driver asks for a mesh's points, after the
-poses and before the modifiers, and they are written into the evaluated mesh.
+"""Sinew within Blender's own evaluation: the driver of pose_driver requests a mesh's points, after the poses
+and before the modifiers, and they are written into evaluated data.
 
 Blender evaluates on many threads, and for a render beside the window. So only evaluated data is read here:
-an original may go at any moment. What is out of the ordinary, such as changed weights, is left to the
-handlers, which come afterwards and may change the file.
+an original may go at any moment. What is out of the ordinary, such as changed weights, is for the handlers,
+which come afterwards and may change the file.
 """
 
 from __future__ import annotations
 
 import threading
+import time
 
 import bpy
+import numpy as np
 import sinew
 
-from . import skinned_object
+from ..attach import point_store, properties
+from ..io import mesh_io
+from . import pose, source
+from .plan import State
 from .skinned_object import SkinnedObject
 
 
@@ -31,16 +36,17 @@ class _Thread(threading.local):
 
 
 class DepsgraphRequests:
-    """Answers the driver: first it names the object, then, on the same thread, the mesh."""
+    """What the driver's last variables call: the first names the object, the second, on the same thread, its
+    mesh."""
 
     def __init__(self) -> None:
         self._thread = _Thread()
         # By the object's name, which its evaluated copies have too. Replaced, never changed: other threads
         # may be reading it.
-        self._states: dict[str, SkinnedObject] = {}
+        self._objects: dict[str, SkinnedObject] = {}
 
-    def set_objects(self, states: dict[str, SkinnedObject]) -> None:
-        self._states = states
+    def set_objects(self, objects: dict[str, SkinnedObject]) -> None:
+        self._objects = objects
 
     def object_requested(self, evaluated: bpy.types.Object) -> None:
         self._thread.requesting = evaluated
@@ -50,11 +56,80 @@ class DepsgraphRequests:
         if evaluated is None or not (evaluated.is_evaluated and evaluated_mesh.is_evaluated):
             # Somebody else reads the property.
             return
-        state = self._states.get(evaluated.name)
-        if state is None:
+        skinned = self._objects.get(evaluated.name)
+        if skinned is None:
             return
         try:
-            skinned_object.deform_evaluated(evaluated, evaluated_mesh, state)
+            deform(evaluated, evaluated_mesh, skinned)
         except Exception as error:
-            # The handlers see to it, and the panel tells.
-            state.fail(error)
+            # The handlers see to it, and the panel says so.
+            skinned.evaluation.fail(error)
+
+
+def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> None:
+    """Writes the points into the evaluated mesh, or into the evaluated point buffer.
+
+    Does nothing where something is out of the ordinary, and notes why: that is for update().
+    """
+    if skinned.plan.state is not State.IN_DEPSGRAPH:
+        return
+    with skinned.lock:
+        reason = _deform(evaluated, mesh, skinned)
+        if reason:
+            skinned.evaluation.skip_reason = reason
+
+
+def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> str:
+    """Why it did nothing; empty where it wrote the points."""
+    started, settings, bound = time.perf_counter(), evaluated.sinew, skinned.bound
+    # Evaluated ones, as the driver reads them.
+    armatures = [replaced.armature for replaced in settings.replaced_modifiers]
+    if skinned.mode != evaluated.mode or not (skinned.is_only_user or skinned.plan.in_buffer):
+        return "its mode, or the users of its mesh, changed"
+    if [armature is None for armature in armatures] != [not uid for uid in bound.armatures]:
+        return "its Armature modifiers changed"
+    out = _points_to_write(settings, mesh, skinned)
+    if out is None or len(out) != len(bound.source.points):
+        return "its mesh changed"
+    _note_unannounced_change(out, skinned)
+    frames = pose.read(evaluated, settings, armatures, skinned, "VIEWPORT")
+    rest_points = source.evaluated_points(evaluated, mesh, bound.source)
+    if rest_points is None:
+        return "what modifiers in front make of its mesh changed"
+    shown = skinned.shown
+    if frames is None:
+        # The last shape stays.
+        last = bound.skin_stack.points
+        out[:] = rest_points if last is None else last
+    else:
+        bound.skin_stack.deform(rest_points, frames, out)
+        shown.frames, shown.rest_points = frames, rest_points
+        shown.number += 1
+    if skinned.plan.in_buffer:
+        point_store.mark_as_written(out, bound.source.points)
+    shown.first_point = out[0].tobytes()
+    skinned.evaluation.succeed(mesh)
+    shown.milliseconds = 1000.0 * (time.perf_counter() - started)
+    return ""
+
+
+def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
+    """Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy, without the
+    points that were written last."""
+    evaluation, first_point = skinned.evaluation, skinned.shown.first_point
+    if not (evaluation.is_event_known or skinned.plan.in_buffer) and first_point is not None:
+        evaluation.changed_unannounced |= out[0].tobytes() != first_point
+        skinned.needs_recheck |= evaluation.changed_unannounced
+
+
+def _points_to_write(
+    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject
+) -> np.ndarray | None:
+    """The memory of the evaluated mesh, or of the evaluated point buffer; None where it is not there."""
+    if not skinned.plan.in_buffer:
+        return mesh_io.points_in(mesh, skinned.attribute)
+    buffer = settings.point_buffer
+    # What an evaluated object has as its data, Blender does not always mark as evaluated.
+    if buffer is None or not buffer.is_evaluated:
+        return None
+    return mesh_io.points_in(buffer.data, mesh_io.POSITION)

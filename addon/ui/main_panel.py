@@ -62,8 +62,11 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
         reason = plan(facts).reason or (state.plan.reason if state is not None else "")
         if reason:
             draw_text(layout, context, reason, icon="INFO")
-    if state is not None and state.failures:
-        text = f"{state.failures} times not deformed within Blender's evaluation; last: {state.failure}"
+    if state is not None and state.evaluation.failures:
+        text = (
+            f"{state.evaluation.failures} times not deformed within Blender's evaluation; last: "
+            f"{state.evaluation.failure}"
+        )
         draw_text(layout, context, text, icon="ERROR")
     layout.prop(settings, "method", text="")
     draw_text(layout, context, properties.METHODS[settings.method].description)
@@ -93,21 +96,21 @@ def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy
     state = handlers.state_of(obj)
     rows = [("Armature", armature.name if armature else "none")]
     if state is not None:
-        facts = state.facts
+        facts = state.bound.facts
         rows += [
             ("Vertices", f"{facts.vertices:,}"),
             ("Bones", f"{facts.bones}, {facts.weighted_bones} with weights"),
             ("Influences", f"{facts.mean_influences:.2f} a vertex, at most {facts.most_influences}"),
         ]
         if not state.uses_builtin:
-            rows.append(("Last frame", f"{state.milliseconds:.2f} ms"))
+            rows.append(("Last frame", f"{state.shown.milliseconds:.2f} ms"))
     column = layout.column(align=True)
     for name, value in rows:
         split = column.split(factor=0.4)
         split.label(text=name)
         split.label(text=value)
     if state is not None:
-        for warning in state.facts.warnings:
+        for warning in state.bound.facts.warnings:
             draw_text(layout, context, warning, icon="ERROR")
 
 

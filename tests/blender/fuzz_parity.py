@@ -320,7 +320,9 @@ def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, of an object that was just deformed."""
     skinned = handlers.state_of(obj)
     bindings = [
-        link.binding for link in skinned.skin_stack.skin_stages if link.binding.last_frame is not None
+        stage.binding
+        for stage in skinned.bound.skin_stack.skin_stages
+        if stage.binding.last_frame is not None
     ]
     return np.logical_or.reduce([undecided_by(binding) for binding in bindings])
 
@@ -358,16 +360,16 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     """bool [vertices]: those that a change of the input by its rounding moves by the tolerance, as curved
     mapping does with what lies far inside a bend, and one modifier after the other."""
     skinned = handlers.state_of(obj)
-    rest_points = skinned.rest_points.astype(np.float64)
+    rest_points = skinned.shown.rest_points.astype(np.float64)
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
     shapes = []
     for points in (rest_points, rest_points + moved):
         links = [
             session.SkinStage(session.Binding(k.binding.weighting), k.mask, k.multi)
-            for k in skinned.skin_stack.skin_stages
+            for k in skinned.bound.skin_stack.skin_stages
         ]
         chain = session.SkinStack(links)
-        chain.deform(points.astype(np.float32), skinned.frames)
+        chain.deform(points.astype(np.float32), skinned.shown.frames)
         shapes.append(chain.points)
     return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
 
@@ -417,7 +419,7 @@ def error_of(
         bone.location.x += 1.0
     bpy.context.view_layer.update()
     state = handlers.state_of(obj)
-    shapes = state.shapes if state is not None else 0
+    shapes = state.shown.number if state is not None else 0
     for bone, location in zip(armature.pose.bones, before, strict=True):
         bone.location = location
     bpy.context.view_layer.update()

@@ -38,13 +38,13 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
     settings, state = properties.of(obj), handlers.state_of(obj)
     if not settings.enabled:
         raise NotBySinewError(f"Sinew is off: {settings.error}")
-    if state is None or state.frames is None:
+    if state is None or state.shown.frames is None:
         raise NotBySinewError("Sinew has not deformed it")
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for modifier in obj.evaluated_get(depsgraph).modifiers:
         replaced = modifier.type == "ARMATURE" and modifier.name in settings.replaced_modifiers
         if replaced and modifier.show_viewport:
             raise NotBySinewError(f"the Armature modifier {modifier.name} is on")
-    if state.shapes <= shapes_before:
+    if state.shown.number <= shapes_before:
         raise NotBySinewError("Sinew made no shape for this pose")
-    return EVALUATION if state.deformed_mesh else UPDATE
+    return EVALUATION if state.evaluation.mesh else UPDATE

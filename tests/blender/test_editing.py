@@ -427,7 +427,7 @@ def test_what_is_missing_in_the_rig_is_warned_of():
     for group in obj.vertex_groups:
         group.remove([0, 1])
     scenes.add_sinew(obj)
-    assert "2 of 252 vertices" in " ".join(handlers.state_of(obj).facts.warnings)
+    assert "2 of 252 vertices" in " ".join(handlers.state_of(obj).bound.facts.warnings)
 
 
 def test_remove_while_off_keeps_what_the_artist_switched():

@@ -57,7 +57,7 @@ def test_a_shape_of_another_pose_is_not_taken_for_this_one():
     scenes.add_sinew(obj)
     state = handlers.state_of(obj)
     with pytest.raises(routes.NotBySinewError, match="for this pose"):
-        routes.taken(obj, state.shapes)
+        routes.taken(obj, state.shown.number)
     properties.of(obj).enabled = False
     with pytest.raises(routes.NotBySinewError, match="off"):
         routes.taken(obj, -1)

@@ -13,7 +13,7 @@ import scenes
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
-from sinew_addon.deform import handlers, safe_mode, skinned_object
+from sinew_addon.deform import handlers, in_depsgraph, safe_mode
 from sinew_addon.deform.plan import State
 from sinew_addon.io import animation_paths
 
@@ -315,11 +315,11 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
     def fail(*_args: object) -> None:
         raise RuntimeError("disk on fire")
 
-    monkeypatch.setattr(skinned_object, "_deform_into", fail)
+    monkeypatch.setattr(in_depsgraph, "_deform", fail)
     got = scenes.shapes(obj, [2, 3, 4, 5])
     state = handlers.state_of(obj)
-    assert state.failures > 0
-    assert "disk on fire" in state.failure
+    assert state.evaluation.failures > 0
+    assert "disk on fire" in state.evaluation.failure
     assert state.plan.state is State.AFTER_UPDATE
     assert "disk on fire" in state.plan.reason
     expected = scenes.modifier_shapes(obj, [2, 3, 4, 5], preserve_volume=True)
@@ -337,7 +337,7 @@ def test_in_safe_mode_nothing_runs_within_the_evaluation(monkeypatch, how):
         monkeypatch.setenv(safe_mode.VARIABLE, "1")
     obj, _armature = scenes.make_arm()
     asked = []
-    monkeypatch.setattr(skinned_object, "deform_evaluated", lambda *arguments: asked.append(arguments))
+    monkeypatch.setattr(in_depsgraph, "deform", lambda *arguments: asked.append(arguments))
     scenes.add_sinew(obj, "dq")
     assert_equals_modifier(obj)
     assert asked == []

@@ -17,7 +17,8 @@ import numpy as np
 from ...attach import attach, properties, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
-from ...deform import evaluate, handlers, skinned_object
+from ...deform import evaluate, handlers
+from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, shape_animation
@@ -29,7 +30,7 @@ def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
     # As it was evaluated with the frame: what Sinew wrote since would be evaluated for nothing.
     pairs = handlers.states_of([obj], bpy.context.view_layer.depsgraph)
-    if not pairs or obj.mode in skinned_object.MODES_OF_THE_MODIFIER:
+    if not pairs or obj.mode in MODES_OF_THE_MODIFIER:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
     return pairs[0][1].points
 

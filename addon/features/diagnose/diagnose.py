@@ -191,9 +191,9 @@ def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
     if obj.mode == "EDIT":
         return _edited_weights(obj.data).equals(weights)
     state = handlers.state_of(obj)
-    if state is not None and not state.source.from_front:
+    if state is not None and not state.bound.source.from_front:
         # Read already, as Sinew follows them.
-        return state.source.weights.equals(weights)
+        return state.bound.source.weights.equals(weights)
     return mesh_io.read_group_weights(obj.data).equals(weights)
 
 

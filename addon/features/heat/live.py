@@ -19,6 +19,7 @@ from ...core.scale_rule import BLENDER_4
 from ...core.session import Binding, SkinStack, SkinStage, SkinStageFrame
 from ...core.spaces import is_same_space, transformed, transformed_axes
 from ...core.surface import Surface, joined
+from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
 from ...io import armature_io, mesh_io
 
@@ -30,11 +31,11 @@ Pairs = Sequence[tuple[bpy.types.Object, SkinnedObject]]
 
 @dataclass
 class Part:
-    """One of the objects: what its topology and weights were read from, and what other methods make of it."""
+    """One of the objects: what it was bound to when it was read, and what other methods make of it."""
 
     obj: bpy.types.Object
     skinned: SkinnedObject
-    source: object
+    bound: Bound
     surface: Surface
     skin_stack: SkinStack
 
@@ -73,7 +74,7 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
 
     None where there is nothing to measure, or a mesh and its shape have other vertices for a moment.
     """
-    key = tuple(obj.session_uid for obj, _driven in pairs)
+    key = tuple(obj.session_uid for obj, _skinned in pairs)
     subject = _subjects.pop(key, None)
     if subject is None or not all(map(_is_current, subject.parts, pairs)):
         subject = _read(pairs, depsgraph, subject)
@@ -82,11 +83,11 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
     _subjects[key] = subject
     while len(_subjects) > MOST_SUBJECTS:
         _subjects.pop(next(iter(_subjects)))
-    worlds = [_world(obj, depsgraph) for obj, _driven in pairs]
-    armatures = [_world(properties.of(obj).armature, depsgraph) for obj, _driven in pairs]
+    worlds = [_world(obj, depsgraph) for obj, _skinned in pairs]
+    armatures = [_world(properties.of(obj).armature, depsgraph) for obj, _skinned in pairs]
     stamp = (
         other,
-        *((skinned.shapes, _modifiers_methods(obj, other)) for obj, skinned in pairs),
+        *((skinned.shown.number, _modifiers_methods(obj, other)) for obj, skinned in pairs),
         *(matrix.tobytes() for matrix in (*worlds, *armatures)),
     )
     if stamp != subject.stamp:
@@ -103,7 +104,7 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
 
 
 def _is_current(part: Part, pair: tuple[bpy.types.Object, SkinnedObject]) -> bool:
-    return part.skinned is pair[1] and part.source is pair[1].source
+    return part.skinned is pair[1] and part.bound is pair[1].bound
 
 
 def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> Subject | None:
@@ -115,33 +116,33 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
             if properties.of(obj).upstream_proxy is None
             else upstream_proxy.evaluated_mesh(obj, depsgraph)
         )
-        if mesh is None or skinned.frames is None or len(mesh.vertices) != len(skinned.rest_points):
+        shown = skinned.shown
+        if mesh is None or shown.frames is None or len(mesh.vertices) != len(shown.rest_points):
             return None
-        known = [(skin_stage, skin_stage.binding) for skin_stage in skinned.skin_stack.skin_stages]
-        skin_stages = [
-            SkinStage(Binding(b.weighting, b.mix_weights), skin_stage.mask, skin_stage.multi)
-            for skin_stage, b in known
+        stages = [
+            SkinStage(Binding(stage.binding.weighting, stage.binding.mix_weights), stage.mask, stage.multi)
+            for stage in skinned.bound.skin_stack.skin_stages
         ]
-        parts.append(Part(obj, skinned, skinned.source, mesh_io.read_surface(mesh), SkinStack(skin_stages)))
+        parts.append(Part(obj, skinned, skinned.bound, mesh_io.read_surface(mesh), SkinStack(stages)))
     if not parts:
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
         for part, known in zip(parts, old.parts, strict=True):
-            known.source = part.source
+            known.bound = part.bound
         return old
-    held, bone_counts = [], []
+    entries, bone_counts = [], []
     for part in parts:
-        weighting, skinned = part.skinned.binding.weighting, part.skinned
+        weighting, shown = part.bound.binding.weighting, part.skinned.shown
         space = _space(part, depsgraph)
-        held.append(weighting.influences_over_joints(transformed(skinned.rest_points, space)))
+        entries.append(weighting.influences_over_joints(transformed(shown.rest_points, space)))
         bone_counts.append(len(weighting.bones.rest))
     surface = joined([part.surface for part in parts])
-    return Subject(parts, Gauge(surface, influences.joined(held, bone_counts)))
+    return Subject(parts, Gauge(surface, influences.joined(entries, bone_counts)))
 
 
 def _is_alike(part: Part, known: Part) -> bool:
     return (
-        part.skinned is known.skinned
+        part.bound.skin_stack is known.bound.skin_stack
         and np.array_equal(part.surface.triangles, known.surface.triangles)
         and np.array_equal(part.surface.edges, known.surface.edges)
     )
@@ -149,7 +150,7 @@ def _is_alike(part: Part, known: Part) -> bool:
 
 def _space(part: Part, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """The object's space to armature space."""
-    frame = part.skinned.frames[0]
+    frame = part.skinned.shown.frames[0]
     if frame is not None:
         return frame.bones_from_model
     armature = properties.of(part.obj).armature
@@ -174,15 +175,15 @@ class _Other:
 
     @classmethod
     def of(cls, part: Part, other: str) -> _Other:
-        skinned, methods = part.skinned, _modifiers_methods(part.obj, other)
+        shown, methods = part.skinned.shown, _modifiers_methods(part.obj, other)
         frames: list[SkinStageFrame | None] = []
-        for number, frame in enumerate(skinned.frames):
+        for number, frame in enumerate(shown.frames):
             if frame is not None:
                 frame = replace(frame, method=methods[number] if methods else other, mix="")
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)
-        return cls(part.skin_stack, skinned.rest_points, frames)
+        return cls(part.skin_stack, shown.rest_points, frames)
 
     def points(self) -> np.ndarray:
         """float32 [vertices, 3], object space."""
@@ -192,7 +193,7 @@ class _Other:
 
 def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
     """Brings the world points at rest up to date; the same array where nothing moved them."""
-    shapes = [part.skinned.rest_points for part in subject.parts]
+    shapes = [part.skinned.shown.rest_points for part in subject.parts]
     if subject.rest_made_from:
         known_shapes, known_worlds = subject.rest_made_from
         same_shapes = all(a is b for a, b in zip(shapes, known_shapes, strict=True))
@@ -204,7 +205,7 @@ def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
 def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
     rest_axes, posed_axes, motions = [], [], []
     for part, armature in zip(subject.parts, armatures, strict=True):
-        bones, frame = part.skinned.binding.bones, part.skinned.frames[0]
+        bones, frame = part.bound.binding.bones, part.skinned.shown.frames[0]
         at_rest = armature @ bones.rest
         posed = at_rest if frame is None else armature @ frame.pose
         rest_axes.append(bone_axes(bones, at_rest))

@@ -215,7 +215,7 @@ def _play(
         if result is not None and method in result.times:
             result.times[method].append(taken)
             states = [handlers.state_of(obj) for obj in subject.meshes if method != evaluate.BLENDER]
-            result.own[method].append(sum(state.milliseconds for state in states if state is not None))
+            result.own[method].append(sum(state.shown.milliseconds for state in states if state is not None))
     return shapes
 
 

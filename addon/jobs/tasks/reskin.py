@@ -149,7 +149,7 @@ def _drive(
             "before": way,
             "method": method,
             "scale": properties.of(obj).scale_rule,
-            "warnings": list(state.facts.warnings) if state is not None else [],
+            "warnings": list(state.bound.facts.warnings) if state is not None else [],
         }
         skinned.append((obj, mesh))
     return skinned, left_out

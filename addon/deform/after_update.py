@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew after Blender's evaluation: the points go into an object of the file, and Blender evaluates again."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+
+from ..attach import point_store, properties
+from . import bound, pose, source
+from .changes import Changes
+from .skinned_object import SkinnedObject
+
+
+def deform(
+    obj: bpy.types.Object,
+    skinned: SkinnedObject,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    is_inspected: bool,
+    is_first: bool,
+) -> None:
+    """Writes the points of this evaluation for the next one, where they differ from those that are there.
+
+    is_inspected  the object itself may have changed, and with it what holds its points
+    is_first      the object was not deformed after the update before: what holds its points has others
+    """
+    # Binding is not part of a frame's time: it happens once.
+    started, before = time.perf_counter(), skinned.shown.rest_points
+    differs = shape(obj, skinned, depsgraph)
+    if differs is None:
+        return
+    shown, stack = skinned.shown, skinned.bound.skin_stack
+    if changes.frame:
+        is_reshaped = before is not None and shown.rest_points is not before
+        skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
+    if differs or is_first:
+        point_store.write(obj, stack.points, skinned.bound.source.points)
+        shown.milliseconds = 1000.0 * (time.perf_counter() - started)
+    elif is_inspected and not point_store.are_written(obj, len(shown.rest_points)):
+        point_store.write(obj, stack.points, skinned.bound.source.points)
+
+
+def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool | None:
+    """Brings the stack's points up to this evaluation.
+
+    Whether they differ from the last ones; None where what decides them is unknown, and the last stay.
+    """
+    replaced_modifiers = properties.of(obj).replaced_modifiers
+    armatures = [each.armature and each.armature.evaluated_get(depsgraph) for each in replaced_modifiers]
+    evaluated = obj.evaluated_get(depsgraph)
+    settings = properties.of(evaluated)
+    if [each.name for each in settings.replaced_modifiers] != [each.name for each in replaced_modifiers]:
+        # Sinew was put on, or modifiers moved, since Blender evaluated it: what animation makes of the
+        # settings comes with the next time.
+        settings = properties.of(obj)
+    frames = pose.read(evaluated, settings, armatures, skinned, depsgraph.mode)
+    if frames is None or not pose.is_finite(frames):
+        return None
+    shown = skinned.shown
+    shown.frames = frames
+    shown.rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)
+    differs = skinned.bound.skin_stack.deform(shown.rest_points, frames)
+    shown.number += differs
+    return differs
+
+
+def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:
+    """What is known of a mesh that its Armature modifiers deform becomes that of this evaluation, for those
+    who measure or bake it; of others it is. Changes nothing in Blender.
+
+    Raises SinewError where the mesh has become one that can not be deformed.
+    """
+    if not skinned.uses_builtin:
+        return
+    if skinned.needs_recheck:
+        changes = Changes(meshes={obj.data.session_uid})
+        if source.has_changed(obj, skinned.bound.source, depsgraph, changes, touched=False):
+            skinned.bind(bound.read(obj, depsgraph, skinned.bound))
+        skinned.needs_recheck = False
+    with skinned.lock:
+        shape(obj, skinned, depsgraph)

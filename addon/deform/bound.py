@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is read of an object once, to deform it on every frame: mesh, weights, bones, modifiers' options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ..attach import attach, properties
+from ..attach.modifier_options import ModifierOptions
+from ..core.rig import Bones, RigFacts
+from ..core.session import Binding, SkinStack, SkinStage
+from ..io import armature_io
+from . import source, survey
+from .changes import Changes
+from .source import Source
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Never changed: another takes its place where any of it may be out of date.
+
+    armatures   the session_uid of each Armature modifier's armature, 0 for none
+    options     of each Armature modifier
+    source      rest points and weights
+    skin_stack  deforms by them: one stage for each Armature modifier
+    facts       of mesh and rig, for the panel
+    mix_group   the vertex group whose weights the stages have for their mix
+    """
+
+    armatures: list[int]
+    options: list[ModifierOptions]
+    source: Source
+    skin_stack: SkinStack
+    facts: RigFacts
+    mix_group: str
+
+    def is_of_another_stack(self, other: Bound | None) -> bool:
+        """Whether modifiers, bones or weights differ from the other's: more than the rest points."""
+        return other is None or self.skin_stack is not other.skin_stack
+
+    @property
+    def binding(self) -> Binding:
+        """Of the first Armature modifier."""
+        return self.skin_stack.skin_stages[0].binding
+
+
+def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | None = None) -> Bound:
+    """Binds anew what comes out other than it was; the same object where nothing did.
+
+    old  where neither modifiers nor their options changed since. Requires source.is_ready().
+    """
+    read_now = source.read(obj, depsgraph)
+    pairs = attach.replaced_modifiers(obj)
+    bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
+    mix_group = properties.of(obj).mix.group
+    if old is not None and old.mix_group == mix_group and _equals_but_for_points(old, read_now, bones):
+        if np.array_equal(read_now.points, old.source.points):
+            # The same array tells that nothing moved.
+            read_now.points = old.source.points
+        return replace(old, source=read_now)
+    options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
+    mix_weights = _mix_weights(obj, read_now, mix_group)
+    stages = [
+        SkinStage(
+            Binding(option.weighting(obj, read_now.weights, its_bones), mix_weights),
+            option.mask_weights(obj, read_now.weights),
+            option.multi,
+        )
+        for option, its_bones in zip(options, bones, strict=True)
+    ]
+    weighting = stages[0].binding.weighting
+    facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
+    armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
+    return Bound(armatures, options, read_now, SkinStack(stages), facts, mix_group)
+
+
+def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
+    """Whether it was bound to other armatures, by other options or for another mix."""
+    pairs = attach.replaced_modifiers(obj)
+    return (
+        bound.armatures != [uid(replaced.armature) for _modifier, replaced in pairs]
+        or bound.options != [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
+        or bound.mix_group != properties.of(obj).mix.group
+    )
+
+
+def have_bones_changed(
+    obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether one of the armatures has other bones than those read; of one in edit mode that is not asked."""
+    changed = False
+    for stage, replaced in zip(
+        bound.skin_stack.skin_stages, properties.of(obj).replaced_modifiers, strict=False
+    ):
+        armature, known = replaced.armature, stage.binding.bones
+        if armature is None or armature.mode == "EDIT":
+            continue
+        if armature.data.session_uid in changes.armatures or not known.complete:
+            bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
+            changed |= not bones.equals(known)
+    return changed
+
+
+def uid(data: bpy.types.ID | None) -> int:
+    """0 for none."""
+    return 0 if data is None else data.session_uid
+
+
+def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> bool:
+    known = [stage.binding.bones for stage in old.skin_stack.skin_stages]
+    return read_now.equals_but_for_points(old.source) and all(
+        now.equals(before) for now, before in zip(bones, known, strict=False)
+    )
+
+
+def _mix_weights(obj: bpy.types.Object, read_now: Source, name: str) -> np.ndarray | None:
+    """float32 [vertices], 0 to 1; None where there is no such group."""
+    group = obj.vertex_groups.get(name) if name else None
+    return None if group is None else read_now.weights.of_group(group.index)
+
+
+def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:
+    if armature is None or armature.mode == "EDIT":
+        return Bones.none()
+    return armature_io.read_bones(armature.evaluated_get(depsgraph))

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What decides the part of each Armature modifier in one evaluation's shape: pose, method, scale rule."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..attach import properties
+from ..core.errors import SinewError
+from ..core.session import SkinStageFrame
+from ..io import armature_io
+from .skinned_object import SkinnedObject
+
+Frames = list[SkinStageFrame | None]
+"""One for each Armature modifier, None for one that takes no part."""
+
+
+def read(
+    evaluated: bpy.types.Object,
+    settings: properties.SinewSettings,
+    armatures: list[bpy.types.Object | None],
+    skinned: SkinnedObject,
+    mode: str,
+) -> Frames | None:
+    """None where it is unknown, and the last shape stays.
+
+    settings   the object's, evaluated
+    armatures  of each Armature modifier, evaluated
+    mode       the depsgraph's
+    Raises SinewError where a driver sets a method or a scale rule that there is not.
+    """
+    method, scale_rule = settings.method, settings.scale_rule
+    if not (method and scale_rule):
+        raise SinewError(
+            f"{evaluated.name}: the driver of its method or scale gives a number that stands for none; "
+            f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
+        )
+    frames: Frames = []
+    for stage, replaced, armature, is_keyed in zip(
+        skinned.bound.skin_stack.skin_stages,
+        settings.replaced_modifiers,
+        armatures,
+        skinned.visibility_keyed,
+        strict=False,
+    ):
+        flags = evaluated.modifiers[replaced.name] if is_keyed or skinned.uses_builtin else replaced
+        if armature is None or armature.mode == "EDIT" or not _takes_part(flags, mode):
+            frames.append(None)
+            continue
+        space = armature_io.bones_from_model(evaluated, armature)
+        if space is None:
+            # An armature scaled to nothing for a moment.
+            return None
+        pose = armature_io.read_pose(armature, stage.binding.bones)
+        own = properties.method_of_modifier(method, replaced.method, is_first=not frames)
+        mix = settings.mixed_method if own == method else ""
+        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix))
+    return frames
+
+
+def is_finite(frames: Frames) -> bool:
+    return all(np.isfinite(frame.pose).all() for frame in frames if frame is not None)
+
+
+def _takes_part(flags: properties.SinewReplacedModifier | bpy.types.Modifier, mode: str) -> bool:
+    return flags.show_render if mode == "RENDER" else flags.show_viewport

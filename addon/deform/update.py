@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an event means for one skinned object: what is read anew, what changes in the file, who deforms it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach import attach, point_store, pose_driver, properties, stack
+from ..attach.updates import is_rendering_in_window
+from ..core.errors import SinewError
+from ..io import armature_io
+from . import after_update, apply_plan, bound, source
+from .changes import Changes
+from .plan import MODES_OF_THE_MODIFIER, Plan, State
+from .skinned_object import SkinnedObject, object_state_of
+
+# As often its node group is made again, which another add-on removes.
+MAX_GROUP_LOSSES = 2
+# As often as Sinew in a row could not deform a mesh within Blender's evaluation, it tries again there.
+MAX_FAILURES_IN_A_ROW = 1
+
+
+def update(
+    obj: bpy.types.Object, skinned: SkinnedObject | None, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> SkinnedObject | None:
+    """Deforms an object that is on, or has Blender do so with the next evaluation, if anything changed.
+
+    What is known of it from now on; None where it waits for another evaluation, or is in a mode of the
+    modifier. Raises SinewError with a sentence for the user where Sinew can not deform it.
+    """
+    if obj.library is not None:
+        # Its Armature modifier deforms it: that is how its file is saved.
+        return None
+    if skinned is not None and _is_as_it_was(obj, skinned, changes):
+        return skinned
+    if obj.mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
+        apply_plan.apply(obj, apply_plan.plan_of(obj))
+        return None
+    inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
+    if not inspect and _has_shape(obj, skinned, depsgraph, changes):
+        skinned.dirtied_by_frames = False
+        return skinned
+    if inspect and is_rendering_in_window():
+        # Seen to when the render has ended.
+        if skinned is None:
+            return None
+        skinned.needs_apply, inspect = True, False
+    before = None if skinned is None else skinned.plan
+    was_on = properties.of(obj).replaces_modifiers
+    plan = _apply_plan(obj, skinned, changes) if inspect else before
+    # First of all, as groups are renamed along with bones.
+    bones_changed = skinned is not None and bound.have_bones_changed(obj, skinned.bound, depsgraph, changes)
+    # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
+    if not source.is_ready(obj, depsgraph, was_on):
+        # What is in another scene stays as it is.
+        return None if obj.evaluated_get(depsgraph).is_evaluated else skinned
+    known = None if skinned is None else skinned.bound
+    skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
+    if inspect or skinned.bound.is_of_another_stack(known):
+        skinned.note_object(obj, plan)
+        if not plan.uses_builtin:
+            keep_poses_evaluated(obj, skinned)
+    # A render lists all as new with each frame; to tag the object has Blender (4.2 to 5.2) copy it anew,
+    # without what animation had set.
+    is_same = not skinned.bound.is_of_another_stack(known) and skinned.bound.source.equals(known.source)
+    if skinned.plan.state is State.IN_DEPSGRAPH:
+        _request_points(obj, skinned, is_new_plan=plan != before, is_same=is_same)
+    elif skinned.plan.state is State.AFTER_UPDATE:
+        is_first = before is None or before.state is not State.AFTER_UPDATE
+        with skinned.lock:
+            after_update.deform(obj, skinned, depsgraph, changes, inspect, is_first)
+    else:
+        skinned.shown.frames = None
+    skinned.bound.source.known_key_values = skinned.bound.source.key_values
+    return skinned
+
+
+def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
+    """Notes what was done to Sinew's modifier and to the object's name since the last event.
+
+    Raises SinewError where the user has to see to something first.
+    """
+    if skinned.evaluation.user_error is not None:
+        raise skinned.evaluation.user_error
+    if not skinned.is_attached(obj):
+        skinned.needs_apply = True
+        nodes = stack.sinew_modifier(obj)
+        skinned.group_losses += nodes is not None and nodes.node_group is None
+        if skinned.group_losses > MAX_GROUP_LOSSES:
+            raise SinewError(
+                f"{obj.name}: something removes Sinew's node group again and again, another add-on perhaps; "
+                "stop that, then press Rebind"
+            )
+    if skinned.name != obj.name:
+        skinned.name, skinned.evaluation.skip_reason = obj.name, "it has another name"
+
+
+def _is_as_it_was(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
+    """Whether nothing has to be looked at. A mesh that needs another look counts as changed.
+
+    Raises SinewError where the user has to see to something first.
+    """
+    _check_attached(obj, skinned)
+    if skinned.needs_recheck:
+        changes.meshes.add(obj.data.session_uid)
+        changes.touched.add(obj.data.session_uid)
+    return (
+        skinned.mode == obj.mode
+        and not (skinned.needs_apply or skinned.evaluation.skip_reason)
+        and skinned.is_untouched_by(changes)
+    )
+
+
+def _needs_inspection(
+    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether the object itself may have changed, or could not be deformed as planned."""
+    is_skipped = bool(skinned.evaluation.skip_reason)
+    if is_skipped:
+        skinned.evaluation.failures_in_a_row += 1
+    if skinned.mode != obj.mode or skinned.needs_apply or is_skipped or changes.structure:
+        return True
+    keys = obj.data.shape_keys
+    is_touched = obj.session_uid in changes.objects or uid_in(keys, changes.touched)
+    if not (is_touched or changes.armatures):
+        return False
+    # To request points touches the object by itself.
+    explains_touch = skinned.plan.state is State.IN_DEPSGRAPH or skinned.was_deformed(obj, depsgraph)
+    return not explains_touch or object_state_of(obj) != skinned.object_state
+
+
+def uid_in(data: bpy.types.ID | None, uids: set[int]) -> bool:
+    return data is not None and data.session_uid in uids
+
+
+def _has_shape(
+    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """Whether the last evaluation gave it its shape, and nothing else changed that has to be read."""
+    return (
+        skinned.was_deformed(obj, depsgraph)
+        and not changes.armatures
+        and obj.data.session_uid not in changes.touched
+    )
+
+
+def _apply_plan(obj: bpy.types.Object, skinned: SkinnedObject | None, changes: Changes) -> Plan:
+    """Raises SinewError where the modifiers that Sinew works with are gone."""
+    _check_modifiers(obj, changes)
+    failure = ""
+    if skinned is not None and skinned.evaluation.failures_in_a_row > MAX_FAILURES_IN_A_ROW:
+        failure = skinned.evaluation.failure
+    plan = apply_plan.plan_of(obj, failure)
+    apply_plan.apply(obj, plan)
+    return plan
+
+
+def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
+    """Brings what Sinew keeps of the modifiers in line with what the artist did to them.
+
+    Raises SinewError where those that Sinew works with are gone.
+    """
+    if stack.armature_modifier(obj) is None:
+        raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
+    # What decides the plan, such as Preserve Volume, is the artist's own.
+    attach.resume_after_save(obj)
+    attach.follow_stack(obj)
+    attach.adopt_pointers(obj)
+    _check_armatures(obj, changes)
+
+
+def _check_armatures(obj: bpy.types.Object, changes: Changes) -> None:
+    armatures = properties.of(obj).armatures
+    if not armatures:
+        raise SinewError(
+            f"{obj.name}: its armature was deleted; choose another in the Armature modifier and press "
+            "Rebind, or Remove"
+        )
+    for armature in armatures:
+        if changes.structure and attach.is_deleted(armature):
+            raise SinewError(
+                f"{obj.name}: its armature {armature.name} was deleted, or is in no collection; choose "
+                "another in the Armature modifier and press Rebind, or Remove"
+            )
+
+
+def _bind(
+    obj: bpy.types.Object,
+    skinned: SkinnedObject | None,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    inspect: bool,
+    bones_changed: bool,
+) -> SkinnedObject:
+    """Bound anew where its mesh, weights, bones or modifiers changed.
+
+    inspect  the object itself may have changed
+    """
+    if skinned is None:
+        return SkinnedObject(bound.read(obj, depsgraph), obj.name, obj.mode)
+    skinned.mode = obj.mode
+    # In a window, while a shape key's slider moves, weights are read with the next event only.
+    reads_later = not bpy.app.background and source.is_slider_moved(
+        obj, skinned.bound.source, depsgraph, changes
+    )
+    if inspect and bound.is_of_other_modifiers(obj, skinned.bound):
+        skinned.bind(bound.read(obj, depsgraph))
+    elif bones_changed or (
+        not reads_later and source.has_changed(obj, skinned.bound.source, depsgraph, changes, inspect)
+    ):
+        skinned.bind(bound.read(obj, depsgraph, skinned.bound))
+    skinned.needs_recheck, skinned.evaluation.changed_unannounced = reads_later, False
+    return skinned
+
+
+def _request_points(obj: bpy.types.Object, skinned: SkinnedObject, is_new_plan: bool, is_same: bool) -> None:
+    """Has Blender evaluate the object once more, and so request its points, where they may differ."""
+    skinned.dirtied_by_frames = False
+    if skinned.plan.in_buffer:
+        point_store.set_rest_points(obj, skinned.bound.source.points, anew=is_new_plan)
+    if skinned.evaluation.skip_reason or not is_same or is_new_plan:
+        skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
+        obj.update_tag(refresh={"OBJECT"})
+
+
+def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
+    """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where it
+    can."""
+    settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
+    skinned.attribute, skinned.mesh_users, skinned.is_only_user = settings.attribute, mesh.users, True
+    poses = [
+        (replaced.armature, path)
+        for (_modifier, replaced), stage in zip(pairs, skinned.bound.skin_stack.skin_stages, strict=False)
+        if replaced.armature is not None
+        for path in armature_io.paths_to_wait_for(replaced.armature, stage.binding.moving_bones)
+    ]
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), skinned.plan.state is State.IN_DEPSGRAPH)
