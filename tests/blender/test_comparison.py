@@ -197,7 +197,7 @@ SETUPS = [
 ]
 
 
-@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
 @pytest.mark.parametrize("set_up", SETUPS, ids=lambda f: f.__name__)
 def test_rigs(set_up, skinned):
     obj, armature = scenes.make_arm(sides=8, rings=11)
@@ -265,7 +265,7 @@ def test_a_full_scene_is_as_it_was(tmp_path):
     assert [line for line in changed if not line.startswith("objects[Bare [props.blend]]")] == []
 
 
-@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
 @pytest.mark.parametrize("set_up", [plain, mirrored_in_front], ids=lambda f: f.__name__)
 def test_save_and_reopen(tmp_path, set_up, skinned):
     obj, armature = scenes.make_arm()
@@ -406,7 +406,7 @@ def test_what_the_artist_put_into_the_collection_stays():
     assert list(lamp.users_collection) == [bpy.context.scene.collection]
 
 
-@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
 def test_the_original_is_deleted(tmp_path, skinned):
     obj, _armature = scenes.make_arm()
     if skinned:

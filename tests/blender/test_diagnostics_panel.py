@@ -43,7 +43,7 @@ def selected(obj: bpy.types.Object) -> list[int]:
     return [vertex.index for vertex in bmesh.from_edit_mesh(obj.data).verts if vertex.select]
 
 
-@pytest.mark.parametrize("driven", [False, True])
+@pytest.mark.parametrize("skinned", [False, True])
 def test_finds_exactly_the_planted_faults(skinned):
     obj, _armature = faulty_arm()
     if skinned:
@@ -160,7 +160,7 @@ def test_select_can_be_undone():
     assert found(bpy.data.objects["Arm"])["no_weights"] == UNWEIGHTED
 
 
-@pytest.mark.parametrize("driven", [False, True])
+@pytest.mark.parametrize("skinned", [False, True])
 def test_results_go_stale_when_weights_change_and_not_before(skinned):
     obj, armature = faulty_arm()
     if skinned:

@@ -772,7 +772,7 @@ def test_a_library_override_keeps_the_choice(tmp_path):
     assert np.array_equal(film(armature), played)
 
 
-@pytest.mark.parametrize("driven", [False, True], ids=["modifier", "Sinew"])
+@pytest.mark.parametrize("skinned", [False, True], ids=["modifier", "Sinew"])
 def test_meshes_follow_in_the_same_frame(skinned):
     """Live as baked, of which Blender plays plain keys."""
     obj, armature = scenes.make_arm()

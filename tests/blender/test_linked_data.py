@@ -67,7 +67,7 @@ def assert_shapes(expected: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("front", [False, True], ids=["alone", "front"])
-@pytest.mark.parametrize("driven", [False, True], ids=["plain", "driven"])
+@pytest.mark.parametrize("skinned", [False, True], ids=["plain", "skinned"])
 @pytest.mark.parametrize("override", [False, True], ids=["local", "override"])
 def test_linked_meshes(tmp_path, override, skinned, front):
     expected = save_library(tmp_path, skinned, front)
