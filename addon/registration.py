@@ -67,7 +67,7 @@ def register() -> None:
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
         from .attach import note, properties
-        from .deform import exporters, handlers
+        from .deform import exporters, handlers, session
         from .features.compare import comparison_labels
         from .features.diagnose import diagnostics_panel
         from .features.heat import subscription as heat
@@ -77,7 +77,7 @@ def unregister() -> None:
         comparison_labels.unregister()
         diagnostics_panel.unregister()
         # As in a saved file: the Armature modifiers deform.
-        handlers.prepare_for_save()
+        session.prepare_for_save()
         note.remove()
         exporters.unregister()
         heat.unregister()

@@ -16,7 +16,7 @@ import numpy as np
 import sinew_addon
 from sinew_addon.attach import attach
 from sinew_addon.core.metrics import METRICS
-from sinew_addon.deform import handlers
+from sinew_addon.deform import session
 from sinew_addon.features.heat import measures
 
 SIDES, RINGS, ROUNDS, FRAMES = 200, 500, 8, range(2, 12)
@@ -74,7 +74,7 @@ def main() -> None:
         obj = make_tube()
     scene = bpy.context.scene
     attach.add(obj, "dq")
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     least = {name: math.inf for name in ("off", *METRICS)}
     for _round in range(ROUNDS):
         least["off"] = min(least["off"], least_time(scene))

@@ -16,7 +16,7 @@ from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
 
-# Tools of this mode look for the armature behind a modifier that is on.
+# Tools of this mode find the armature by a modifier that is on.
 MODES_FOR_WEIGHTS = {"WEIGHT_PAINT"}
 
 
@@ -33,7 +33,7 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of `objects` that are meshes deformed by an armature, or driven by Sinew; a comparison's copies
+    """Those of `objects` that are meshes deformed by an armature, or that have Sinew; a comparison's copies
     are none."""
     return [
         o
@@ -68,7 +68,7 @@ def check_can_add(obj: bpy.types.Object) -> None:
 
 def add(obj: bpy.types.Object, method: str | None = None) -> None:
     """Sinew takes over from the Armature modifiers, each with its method where none is given; with the next
-    handlers.refresh() it deforms.
+    session.refresh() it deforms.
 
     Raises SinewError, and changes nothing, where that can not be done.
     """
@@ -120,7 +120,7 @@ def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
 
 
 def use_one_method(obj: bpy.types.Object, method: str) -> None:
-    """All Armature modifiers that Sinew stands in for blend by `method`."""
+    """All Armature modifiers that Sinew replaces blend by `method`."""
     settings = properties.of(obj)
     for replaced in settings.replaced_modifiers:
         if replaced.method != properties.SAME_METHOD:
@@ -170,7 +170,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def switch(obj: bpy.types.Object, on: bool) -> None:
-    """On: Sinew deforms. Off: the Armature modifiers do, as they were, and Sinew's modifier rests."""
+    """On: Sinew deforms. Off: the Armature modifiers do, as they were, and Sinew's modifier is off."""
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     resume_after_save(obj)
     if on:
@@ -233,7 +233,7 @@ def _switch_off(obj: bpy.types.Object) -> None:
         if not properties.of(obj).replaces_modifiers or flags not in ours:
             properties.store(replaced, "show_viewport", modifier.show_viewport)
             properties.store(replaced, "show_render", modifier.show_render)
-        # What an animation sets it would set again with the next frame, and tells Sinew until then.
+        # What an animation sets, it would set again with the next frame; until then it counts.
         if not is_visibility_animated(obj, modifier):
             _show(modifier, keeps_modifiers_on(obj) and replaced.show_viewport, False)
 
@@ -267,7 +267,7 @@ def _replaced_modifier(
 def replaced_modifiers(
     obj: bpy.types.Object,
 ) -> list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]:
-    """The Armature modifiers that Sinew stands in for, in their order, and what it keeps of each."""
+    """The Armature modifiers that Sinew replaces, in their order, and what it keeps of each."""
     run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers
     count = len(kept)
     pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
@@ -304,7 +304,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
 
 
 def _position_modifier(obj: bpy.types.Object) -> None:
-    """In front of the Armature modifiers in whose place it stands; behind them where they can be on beside
+    """In front of the Armature modifiers that it replaces; behind them where they can be on beside
     it, as it moves each vertex to its point whatever came before."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
@@ -322,7 +322,7 @@ def keeps_modifiers_on(obj: bpy.types.Object) -> bool:
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:
-    """What each Armature modifier that Sinew stands in for blends by, by its name."""
+    """What each Armature modifier that Sinew replaces blends by, by its name."""
     return {
         replaced.name: properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
         for number, replaced in enumerate(settings.replaced_modifiers)

@@ -32,7 +32,7 @@ class ModifierOptions:
 
     @staticmethod
     def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
-        """The same, in order, for a quick look."""
+        """The same, in order, to compare quickly."""
         return (
             modifier.use_vertex_groups,
             modifier.use_bone_envelopes,
@@ -67,6 +67,6 @@ def differences(obj: bpy.types.Object) -> list[str]:
     if others:
         found.append(
             f"Armature modifiers apart from the first stay Blender's: {', '.join(m.name for m in others)}; "
-            "move them right behind it to have them driven"
+            "move them right behind it to have Sinew deform by them"
         )
     return found

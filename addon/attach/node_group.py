@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group "Sinew": moves each vertex to the point that an attribute or a carrier holds for
-it."""
+"""The Geometry Nodes group "Sinew": moves each vertex to its point in an attribute or in a point buffer."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ MISSING = (
     "Armature modifier shows the nearest shape that Blender has."
 )
 
-POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender asks Sinew for the points")
+POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
 PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
 
 
@@ -28,7 +27,7 @@ def find(kind: int) -> bpy.types.NodeTree | None:
 
 
 def get_or_make(kind: int) -> bpy.types.NodeTree:
-    """The group that takes points from an ATTRIBUTE or from a CARRIER."""
+    """The group that takes points from an ATTRIBUTE or from a POINT_BUFFER."""
     make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
     return find(kind) or make()
 
@@ -50,7 +49,7 @@ def remove_unused() -> None:
 
 
 def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
-    """Gives a Sinew modifier its inputs, by name; those that it has already are left alone, as every change
+    """Gives a Sinew modifier its inputs, by name; those that it has already are not set, as every change
     makes Blender evaluate the object."""
     changed = [name for name, value in values.items() if get_input(modifier, name) != value]
     for name in changed:
@@ -60,7 +59,7 @@ def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
         else:
             modifier[identifier] = values[name]
     if changed:
-        # An input by itself tells Blender nothing, nor of an object that is to be evaluated first.
+        # Setting an input has Blender neither evaluate the object nor wait for another one.
         modifier.node_group = modifier.node_group
 
 
@@ -182,7 +181,7 @@ def _make_for_carrier() -> bpy.types.NodeTree:
     link(index.outputs["Index"], sample.inputs["Index"])
     link(enabled_socket(sample.outputs, "Value"), place.inputs["Position"])
     link(source.outputs["Geometry"], place.inputs["Geometry"])
-    # Where the numbers of vertices differ, as before the first points are written, the shape is left alone.
+    # Where the numbers of vertices differ, as before the first points are written, the shape stays as it is.
     link(same_count(group, source.outputs["Geometry"], info.outputs["Geometry"]), place.inputs["Selection"])
     # Never taken: naming the object in a node is what makes Blender evaluate it.
     upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The text block that tells those who open a saved file without Sinew what is missing."""
+"""The text block that says what is missing to those who open a saved file without Sinew."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ modifiers deform them, by the nearest shape that Blender has. Leave the modifier
 
 
 def write(objects: list[bpy.types.Object]) -> None:
-    """Before the file is saved; without objects there is nothing to tell."""
+    """Before the file is saved; without objects there is nothing to say."""
     remove()
     if objects:
         text = bpy.data.texts.new(NAME)

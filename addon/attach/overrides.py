@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings on library overrides, which Blender does not keep with the file where the library has none.
 
-The modifier that Sinew adds is kept, and the carrier that it names is local: that holds a copy of them.
+The modifier that Sinew adds is kept, and the point buffer that it names is local: that holds a copy of them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from . import node_group, properties, stack
 
 
 def keep(obj: bpy.types.Object) -> None:
-    """Copies the settings of a driven override to its carrier."""
+    """Copies the settings of a skinned override to its point buffer."""
     settings = properties.of(obj)
     if obj.override_library is not None and settings.point_buffer is not None:
         properties.copy(settings, properties.of(settings.point_buffer))
@@ -20,7 +20,7 @@ def keep(obj: bpy.types.Object) -> None:
 
 
 def take_back() -> None:
-    """Gives all overrides whose settings are gone those that their carriers hold."""
+    """Gives all overrides whose settings are gone those that their point buffers hold."""
     for obj in bpy.data.objects:
         if obj.type != "MESH" or obj.override_library is None or properties.has_sinew(obj):
             continue

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the deformed points of a driven object are held, for Sinew's modifier to read: in an attribute of the
-mesh, or in a carrier where the mesh is not the object's own or not what is deformed. Within Blender's
-evaluation they are written to the evaluated attribute or carrier, so no frame of Sinew's touches a mesh."""
+"""Where the deformed points of an object are stored, for Sinew's modifier to read.
+
+In an attribute of the mesh; in a point buffer where the mesh is not the object's own or not what is deformed.
+Within Blender's evaluation they are written to the evaluated attribute or buffer, so that no frame touches a
+mesh of the file.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,7 @@ _OWN_ATTRIBUTES = (ATTRIBUTE, "sinew_colours")
 
 
 def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
-    """Makes what holds the points of a driven object, a carrier or an attribute, and tells Sinew's modifier
-    of it.
+    """Makes the attribute or the point buffer for an object's points, and has Sinew's modifier read it.
 
     Raises SinewError where what stands in front can not be evaluated apart.
     """
@@ -51,13 +53,13 @@ def _ensure_attribute(obj: bpy.types.Object) -> None:
         settings.attribute = _free_attribute_name(mesh)
     attribute = mesh.attributes.get(settings.attribute)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
-        # What an evaluation shows that Sinew could not answer.
+        # What an evaluation shows to which Sinew gave no points.
         rest = mesh_io.read_points(mesh)
         mesh_io.write_vectors(mesh, settings.attribute, _marked(rest, rest))
 
 
 def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
-    """Stores float32 [vertices, 3], object space, in the carrier, and has Blender evaluate it.
+    """Stores float32 [vertices, 3], object space, in the point buffer, and has Blender evaluate it.
 
     rest  the points as the mesh comes with them
     """
@@ -65,7 +67,7 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
 
 
 def set_rest_points(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
-    """Gives the carrier the rest points, for an evaluation to move: where their number differs, or anew."""
+    """The point buffer gets the rest points, for an evaluation to move: where their number differs, or anew."""
     if anew or not are_written(obj, len(rest)):
         write(obj, rest, rest)
 
@@ -77,7 +79,7 @@ def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
 
 
 def are_written(obj: bpy.types.Object, count: int) -> bool:
-    """Whether the carrier holds points of as many vertices."""
+    """Whether the point buffer holds points of as many vertices."""
     point_buffer = properties.of(obj).point_buffer
     return point_buffer is not None and len(point_buffer.data.vertices) == count
 
@@ -101,7 +103,7 @@ def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarra
 
 def _marked(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """The points; where they are the rest points to the last bit, one of them off by a rounding. So a mesh
-    that Sinew's modifier was applied to is told from one that it was deleted from, and points that Sinew
+    that Sinew's modifier was applied to can be known from one that it was deleted from, and points that Sinew
     wrote from those that a mesh comes with."""
     if not np.array_equal(points, rest):
         return points
@@ -111,7 +113,7 @@ def _marked(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def remove_point_attributes(obj: bpy.types.Object) -> None:
-    """Takes them off the mesh while Sinew rests: a subdivision would work them out for each of its vertices,
+    """Takes them off the mesh while Sinew is off: a subdivision would work them out for each of its vertices,
     and exports would have them."""
     if not obj.data.is_editmode:
         remove_attributes(obj)
@@ -120,27 +122,27 @@ def remove_point_attributes(obj: bpy.types.Object) -> None:
 
 
 def remove(obj: bpy.types.Object) -> None:
-    """Takes away all that held points."""
+    """Takes away all that stored points."""
     upstream_proxy.remove(obj)
     point_buffer.remove(obj)
     remove_point_attributes(obj)
 
 
 def unshare(objects: list[bpy.types.Object]) -> None:
-    """Gives each driven object a carrier and a front of its own where two share them, as copies of an object
-    do: arrange() makes them."""
+    """No two objects share a point buffer or an upstream proxy, as copies of an object do: ensure() makes
+    each its own."""
     taken: set[str] = set()
     for obj in objects:
         settings = properties.of(obj)
-        held = {
+        used = {
             helper.name_full
             for helper in (settings.point_buffer, settings.upstream_proxy)
             if helper is not None
         }
-        if held & taken and obj.is_editable:
+        if used & taken and obj.is_editable:
             settings.point_buffer = settings.upstream_proxy = None
             settings.upstream_signature = ""
-        taken |= held
+        taken |= used
 
 
 def _free_attribute_name(mesh: bpy.types.Mesh) -> str:

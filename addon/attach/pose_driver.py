@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The driver that ties a driven object to the poses, which no modifier does while Sinew is at work.
+"""The driver that ties a skinned object to the poses, which no modifier does while Sinew is at work.
 
 Its variables read the bones, so Blender evaluates their poses even where the armature is hidden. On an input
 of Sinew's modifier it also places Sinew within Blender's own evaluation: whenever a pose, the object's place,
@@ -55,7 +55,7 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
 
     poses   each an armature and the path of a property that is read no sooner than its bones are posed.
             Blender evaluates these bones, their parents and their constraints' targets, and no others.
-    in_depsgraph  it asks Sinew for the points, once the carrier and what stands in front are evaluated
+    in_depsgraph  it asks Sinew for the points, once the point buffer and what stands in front are evaluated
     """
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
@@ -126,5 +126,5 @@ def _find(obj: bpy.types.Object) -> bpy.types.FCurve | None:
 
 
 def _requests_points(driver: bpy.types.Driver) -> bool:
-    asked = [variable.targets[0].data_path for variable in list(driver.variables)[-2:]]
-    return asked == [OBJECT_REQUEST_PATH, MESH_REQUEST_PATH]
+    paths = [variable.targets[0].data_path for variable in list(driver.variables)[-2:]]
+    return paths == [OBJECT_REQUEST_PATH, MESH_REQUEST_PATH]

@@ -16,7 +16,7 @@ from . import stage_settings
 from .stage_settings import OFF
 
 METHODS = {method.name: method for method in sinew.methods()}
-# The choice beside Sinew's methods: the Armature modifier as it stands in the file.
+# The choice beside Sinew's methods: the Armature modifier as the file has it.
 BLENDER = "blender"
 
 
@@ -75,13 +75,13 @@ def method_of_modifier(method: str, own: str, is_first: bool) -> str:
     """What one of an object's Armature modifiers blends by; the first has the object's.
 
     method  the object's
-    own     the stand-in's
+    own     the kept modifier's
     """
     return method if is_first or own == SAME_METHOD else own
 
 
 class SinewReplacedModifier(bpy.types.PropertyGroup):
-    """What Sinew keeps of an Armature modifier that it stands in for, called `name`."""
+    """What Sinew keeps of an Armature modifier that it replaces, called `name`."""
 
     armature: bpy.props.PointerProperty(
         name="Armature",
@@ -115,7 +115,7 @@ STAGE_GROUPS = stage_settings.groups(_method_changed)
 
 class SinewSettings(bpy.types.PropertyGroup):
     """How Sinew drives this object: in the place of the Armature modifiers of `stand_ins`. Without any, the
-    object is not driven."""
+    object has no Sinew."""
 
     method: bpy.props.EnumProperty(
         name="Method",
@@ -175,7 +175,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         override=OVERRIDABLE,
     )
     attribute: bpy.props.StringProperty(
-        description="Attribute that holds the points; empty where the carrier does",
+        description="Attribute that holds the points; empty where the point buffer does",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
@@ -255,7 +255,7 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def armature(self) -> bpy.types.Object | None:
-        """The armature of the first modifier that Sinew stands in for."""
+        """The armature of the first modifier that Sinew replaces."""
         return self.replaced_modifiers[0].armature if self.replaced_modifiers else None
 
     @property
@@ -269,7 +269,7 @@ def of(obj: bpy.types.Object) -> SinewSettings:
 
 
 def has_sinew(obj: bpy.types.Object) -> bool:
-    # Asking for the settings of an object that has none would leave an empty group in the file.
+    # To read the settings of an object that has none would leave an empty group in the file.
     if obj.type != "MESH" or not obj.is_property_set("sinew"):
         return False
     return len(obj.sinew.replaced_modifiers) > 0 and not obj.sinew.helper

@@ -24,8 +24,8 @@ def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
             for curve in [c for c in curves if c.data_path.startswith(path)]:
                 curves.remove(curve)
                 removed += 1
-        left = actions.curve_lists(action, actions.slot_of(player))
-        if removed and player is animation and not any(len(curves) for curves in left):
+        curves_now = actions.curve_lists(action, actions.slot_of(player))
+        if removed and player is animation and not any(len(curves) for curves in curves_now):
             animation.action = None
             if not action.users:
                 bpy.data.actions.remove(action)

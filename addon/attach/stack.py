@@ -29,12 +29,12 @@ def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:
-    """The first Armature modifier that Sinew stands in for, or would."""
+    """The first Armature modifier that Sinew replaces, or would."""
     return next(iter(armature_modifiers(obj)), None)
 
 
 def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
-    """The Armature modifiers that Sinew stands in for, or would: the first and those right behind it, which
+    """The Armature modifiers that Sinew replaces, or would: the first and those right behind it, which
     Blender may chain as Multi Modifiers."""
     own, run = sinew_modifier(obj), []
     for modifier in list(obj.modifiers)[_start(obj) :]:
@@ -46,7 +46,7 @@ def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier
 
 
 def _start(obj: bpy.types.Object) -> int:
-    """The place of the first Armature modifier that Sinew stands in for; of the first one with an armature,
+    """The place of the first Armature modifier that Sinew replaces; of the first one with an armature,
     those that are switched off last, where it would."""
     modifiers = list(obj.modifiers)
     if not properties.has_sinew(obj):
@@ -84,7 +84,7 @@ def visibility_is_animated(obj: bpy.types.Object) -> bool:
 
 
 def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The modifiers ahead of those that Sinew stands in for, without Sinew's own."""
+    """The modifiers ahead of those that Sinew replaces, without Sinew's own."""
     # Also while it has no node group yet.
     own = sinew_modifier(obj)
     ahead = list(obj.modifiers)[: _index(obj, armature_modifier(obj))]

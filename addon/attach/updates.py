@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whose turn it is to react to Blender's events: one thread at a time, and not to those that Sinew itself
+"""Who reacts to Blender's events: one thread at a time, and none to those that Sinew itself
 causes. A window that renders calls handlers from the render's thread beside its own."""
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One driven mesh between frames: its bound deformers, what they were last given, and the result."""
+"""One skinned mesh between frames: its bound deformers, what they were last given, and the result."""
 
 from __future__ import annotations
 

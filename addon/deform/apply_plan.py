@@ -17,7 +17,7 @@ log = logging.getLogger("sinew")
 
 
 def plan_of(obj: bpy.types.Object, failure: str = "") -> Plan:
-    """What is to become of a driven object as it is now.
+    """What is to become of a skinned object as it is now.
 
     failure  what failed when Sinew deformed it within Blender's evaluation
     """
@@ -26,7 +26,7 @@ def plan_of(obj: bpy.types.Object, failure: str = "") -> Plan:
 
 def facts_of(obj: bpy.types.Object, failure: str = "") -> ObjectFacts:
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
-    # While Sinew rests, the modifiers have the flags that it would keep.
+    # While Sinew is off, the modifiers have the flags that it would keep.
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
     return ObjectFacts(
         enabled=settings.enabled,
@@ -62,7 +62,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
 
 
 def has_lost_modifier(obj: bpy.types.Object) -> bool:
-    """Whether Sinew's modifier, or the one that it left the mesh to, is gone."""
+    """Whether Sinew's modifier, or the one that deforms the mesh meanwhile, is gone."""
     if obj.data.is_editmode:
         return False
     uses_builtin = not properties.of(obj).replaces_modifiers
@@ -72,7 +72,7 @@ def has_lost_modifier(obj: bpy.types.Object) -> bool:
 def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:
     """Takes Sinew off an object that has lost its modifier.
 
-    Applied, or converted to a mesh, it left its shape in the mesh, and the Armature modifiers in whose place
+    Applied, or converted to a mesh, its shape is the mesh's own, and the Armature modifiers in whose place
     it stood go as they would have gone; deleted, it gives the mesh back to them.
 
     rest, shown  float32 [vertices, 3], as the mesh was bound, and its last shape; None where unknown
@@ -125,7 +125,7 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
 def _origin_of(
     nodes: bpy.types.NodesModifier, armatures: list[bpy.types.ArmatureModifier]
 ) -> bpy.types.Object | None:
-    """The driven object that the modifiers were copied from: the one whose points they name, else the active
+    """The skinned object that the modifiers were copied from: the one whose points they name, else the active
     one, which Blender's own commands copy from, else one with modifiers of these names and armatures."""
     names = {modifier.name for modifier in armatures}
     alike = [
@@ -134,13 +134,13 @@ def _origin_of(
         if properties.has_sinew(obj)
         and names >= {each.name for each in properties.of(obj).replaced_modifiers}
     ]
-    held = node_group.get_input(nodes, "Points")
+    buffer = node_group.get_input(nodes, "Points")
     pointed = {modifier.object for modifier in armatures} - {None}
 
     def likeness(obj: bpy.types.Object) -> tuple[bool, bool, bool]:
         settings = properties.of(obj)
         return (
-            settings.point_buffer is not None and settings.point_buffer == held,
+            settings.point_buffer is not None and settings.point_buffer == buffer,
             obj == bpy.context.view_layer.objects.active,
             pointed <= set(settings.armatures),
         )

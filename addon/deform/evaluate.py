@@ -19,7 +19,7 @@ from ..core.parameters import Value
 from ..core.spaces import transformed_axes
 from ..core.views import View, of_one_size, seen_extent, whole_view
 from ..io import mesh_io
-from . import handlers
+from . import session
 
 
 def method_names() -> list[str]:
@@ -95,7 +95,7 @@ def use_method(obj: bpy.types.Object, method: str) -> None:
 
 def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
     """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
-    return _use_methods(wanted, handlers.changing)
+    return _use_methods(wanted, session.changing)
 
 
 def use_methods_for_file(
@@ -103,9 +103,9 @@ def use_methods_for_file(
     scales: Mapping[bpy.types.Object, str | None],
     values: Mapping[bpy.types.Object, Mapping[str, Value]],
 ) -> list[SinewError | None]:
-    """The same for a file that was opened to be saved so (see handlers.changing_for_file), and with the names
+    """The same for a file that was opened to be saved so (see session.changing_for_file), and with the names
     of their scale rules, where None leaves an object its own, and their parameters."""
-    return _use_methods(wanted, handlers.changing_for_file, scales, values)
+    return _use_methods(wanted, session.changing_for_file, scales, values)
 
 
 def set_parameters(values: Mapping[str, Value]) -> None:
@@ -180,7 +180,7 @@ def drivable_meshes(
 ) -> tuple[list[bpy.types.Object], list[str]]:
     """Those of deformed_meshes that take all `methods`, and a sentence for each of the others.
 
-    Raises SinewError that names the file `path` where none is left.
+    Raises SinewError that names the file `path` where there is none.
     """
     try:
         meshes = deformed_meshes(scene, name)

@@ -7,9 +7,12 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-# Blender 4.2 does not tell that objects came from another file: there each frame has to be looked at.
+# Blender 4.2 has no event for objects that come from another file: there each frame has to be checked.
 IMPORTS_ARE_ANNOUNCED = hasattr(bpy.app.handlers, "blend_import_post")
 
+
+# What Sinew does at a change of frame, by event (handlers.py): only where there is something to do.
+FRAME_HANDLERS: dict[str, Callable] = {}
 
 _OURS = __package__.rpartition(".")[0]
 

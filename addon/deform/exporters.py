@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's exporters of skins look for Armature modifiers that deform, and bring the mesh itself to rest by
+"""Blender's exporters of skins need Armature modifiers that deform, and bring the mesh itself to rest by
 them: for the time of an export the file is as a saved one.
 
 The glTF exporter calls extensions before and after it. The FBX exporter, in Python too, calls nobody (seen on

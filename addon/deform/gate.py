@@ -4,7 +4,7 @@
 Where Sinew deforms after the update, Blender evaluates on a change of frame, calls Sinew, and evaluates
 again what Sinew wrote. A mesh that moves, or whose shape keys do, comes up in the first round too, with the
 points of the last frame: all for nothing. So its modifiers are suspended until the points are there. To
-suspend them has the mesh read anew: a mesh that is only posed is left alone, and evaluated twice.
+suspend them has the mesh read anew: a mesh that is only posed keeps its modifiers, and is evaluated twice.
 """
 
 from __future__ import annotations

@@ -14,15 +14,15 @@ def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
     """Those of the mesh object's groups `names` that something uses: a modifier (the Armature modifier's mask
     too), a shape key, Sinew's mix, a constraint to the group, or a bone of another of the object's
     armatures."""
-    left = set(names)
+    unused = set(names)
     found: set[str] = set()
     all_uses = (_in_modifiers, _in_shape_keys, _in_mix, _bones_of_all_armatures, _in_constraints)
     for uses in all_uses:
-        if not left:
+        if not unused:
             break
-        now = left.intersection(uses(obj))
+        now = unused.intersection(uses(obj))
         found |= now
-        left -= now
+        unused -= now
     return found
 
 

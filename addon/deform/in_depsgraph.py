@@ -114,7 +114,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
 
 
 def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
-    """Another add-on's handler touched the mesh, of which Blender tells nobody: it is a new copy, without the
+    """Another add-on's handler touched the mesh, for which there is no event: it is a new copy, without the
     points that were written last."""
     evaluation, first_point = skinned.evaluation, skinned.shown.first_point
     if not (evaluation.is_event_known or skinned.plan.in_buffer) and first_point is not None:

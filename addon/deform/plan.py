@@ -22,7 +22,7 @@ class State(Enum):
 @dataclass(frozen=True)
 class Plan:
     """reason     one clause for the panel; empty for the rule and for what the user chose
-    in_buffer  the points are held by an object of their own (carrier.py), not by an attribute of the mesh
+    in_buffer  an object of their own stores the points (point_buffer.py), not an attribute of the mesh
     """
 
     state: State

@@ -26,6 +26,6 @@ def is_on() -> bool:
 
 def set_forced(on: bool | None) -> None:
     """Whatever the environment and the preference say; None: as they say. Takes effect with the next
-    evaluation of an object that changed, or with handlers.refresh()."""
+    evaluation of an object that changed, or with session.refresh()."""
     global _forced
     _forced = on

@@ -26,7 +26,7 @@ class Shown:
 
     frames        what decided it, for each Armature modifier; None before the first
     rest_points   float32 [vertices, 3], what it was deformed from
-    first_point   its first point, by which it is told from one that somebody else wrote
+    first_point   its first point, by which it is known from one that somebody else wrote
     number        how many there have been: another shape has another number
     milliseconds  that it took
     """
@@ -46,7 +46,7 @@ class Evaluation:
                          the same event, while Blender keeps the mesh
     is_event_known       Blender called handlers before it, or Sinew itself caused it
     was_tagged           Sinew has had Blender evaluate the object since
-    changed_unannounced  the mesh was another one, of which nobody had been told
+    changed_unannounced  the mesh was another one, without any event before it
     skip_reason          why it was not given points; empty where it was
     user_error           what the user has to see to before it can be
     failures, failure    how often it failed, and what failed last
@@ -180,8 +180,8 @@ class SkinnedObject:
         return given != 0 and given == obj.data.evaluated_get(depsgraph).as_pointer()
 
     def is_attached(self, obj: bpy.types.Object) -> bool:
-        """Whether Sinew's modifier is there, with its node group where that is needed: of what another
-        add-on's handler takes away Blender tells nobody."""
+        """Whether Sinew's modifier is there, with its node group where that is needed: for what another
+        add-on's handler takes away there is no event."""
         modifier = obj.modifiers.get(self.modifier)
         if self.uses_builtin:
             return modifier is not None

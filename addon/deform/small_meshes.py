@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small meshes, which are left to their Armature modifiers where those give the same shape as Sinew: for few
-vertices they take less time than asking Sinew for points does by itself.
+"""Small meshes, which their Armature modifiers deform where those give the same shape as Sinew: for few
+vertices they take less time than a request for points does by itself.
 
 Sinew stays on, with all that it measures, bakes and compares; only who deforms from frame to frame differs.
 """
@@ -20,7 +20,7 @@ is_used = True
 
 
 def is_builtin_faster(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifiers of a driven object, as they are set, have its shape in less time."""
+    """Whether the Armature modifiers of a skinned object, as they are set, have its shape in less time."""
     settings = properties.of(obj)
     return (
         is_used

@@ -96,7 +96,7 @@ def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
 
 
 def _is_as_it_was(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
-    """Whether nothing has to be looked at. A mesh that needs another look counts as changed.
+    """Whether nothing has to be read again. A mesh that needs a recheck counts as changed.
 
     Raises SinewError where the user has to see to something first.
     """

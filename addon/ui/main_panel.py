@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..attach import attach, properties
-from ..deform import handlers, small_meshes
+from ..deform import session, small_meshes
 from ..deform.plan import ObjectFacts, plan
 from . import operators
 from .sidebar import Sidebar, draw_text
@@ -51,7 +51,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
 
 
 def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    settings, state = properties.of(obj), handlers.state_of(obj)
+    settings, state = properties.of(obj), session.state_of(obj)
     row = layout.row(align=True)
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
@@ -93,7 +93,7 @@ def _draw_mix(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
 
 def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
     armature = properties.of(obj).armature
-    state = handlers.state_of(obj)
+    state = session.state_of(obj)
     rows = [("Armature", armature.name if armature else "none")]
     if state is not None:
         facts = state.bound.facts

@@ -10,7 +10,7 @@ import bpy
 from ..attach import attach, properties
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
-from ..deform import handlers
+from ..deform import session
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -99,8 +99,8 @@ class SINEW_OT_add(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = [obj for obj in targets(context) if not properties.has_sinew(obj)]
         result = _for_each(self, objects, attach.add, "Sinew deforms")
-        handlers.session.forget()
-        handlers.refresh(context)
+        session.forget()
+        session.refresh(context)
         return result
 
 
@@ -121,7 +121,7 @@ class SINEW_OT_rebind(OnSinewObjects, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = sinew_targets(context)
-        result = _for_each(self, objects, lambda obj: handlers.rebind(obj, context), "Rebound")
+        result = _for_each(self, objects, lambda obj: session.rebind(obj, context), "Rebound")
         failed = [properties.of(obj).error for obj in objects if properties.of(obj).error]
         if failed:
             self.report({"ERROR"}, failed[0])
@@ -138,7 +138,7 @@ class SINEW_OT_remove(OnSinewObjects, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = sinew_targets(context)
         result = _for_each(self, objects, attach.remove, "Removed Sinew from")
-        handlers.session.forget()
+        session.forget()
         return result
 
 

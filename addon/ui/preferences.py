@@ -7,12 +7,12 @@ import os
 
 import bpy
 
-from ..deform import handlers, safe_mode
+from ..deform import safe_mode, session
 from .sidebar import draw_text
 
 
 def _changed(_preferences: SinewPreferences, context: bpy.types.Context) -> None:
-    handlers.refresh(context)
+    session.refresh(context)
 
 
 class SinewPreferences(bpy.types.AddonPreferences):

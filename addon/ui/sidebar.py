@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar tab, and what stands in it where the native library does not load."""
+"""The sidebar tab, and what is in it where the native library does not load."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def draw_text(
     icon: str = "NONE",
     alert: bool = False,
 ) -> None:
-    """Text broken into as many labels as the sidebar's width asks for."""
+    """Text broken into as many labels as the sidebar's width needs."""
     scale = context.preferences.system.ui_scale
     width = max(20, int(context.region.width / scale * CHARACTERS_PER_PIXEL) - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)

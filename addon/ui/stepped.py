@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..core.errors import SinewError
-from ..deform import evaluate, handlers
+from ..deform import evaluate, session
 from ..io import pose_io
 
 # The window draws in between: rarely enough to cost little, often enough for Esc.
@@ -29,7 +29,7 @@ class Stepped:
     stopped  what Esc reports; closing steps() has to leave all as it was
     """
 
-    saying = "Sinew looks at frames"
+    saying = "Sinew goes through frames"
     stopped = "Stopped; nothing has changed"
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
@@ -139,4 +139,4 @@ def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) ->
             armature.update_tag()
         if moved:
             bpy.context.view_layer.update()
-            handlers.refresh(bpy.context)
+            session.refresh(bpy.context)

@@ -32,8 +32,8 @@ import routes
 import scenes
 from mathutils import Euler, Matrix, Vector
 from sinew_addon.attach import attach
-from sinew_addon.core import session
-from sinew_addon.deform import handlers
+from sinew_addon.core import session as core_session
+from sinew_addon.deform import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import reference
@@ -318,7 +318,7 @@ def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
 
 def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, of an object that was just deformed."""
-    skinned = handlers.state_of(obj)
+    skinned = session.state_of(obj)
     bindings = [
         stage.binding
         for stage in skinned.bound.skin_stack.skin_stages
@@ -327,7 +327,7 @@ def undecided(obj: bpy.types.Object) -> np.ndarray:
     return np.logical_or.reduce([undecided_by(binding) for binding in bindings])
 
 
-def undecided_by(binding: session.Binding) -> np.ndarray:
+def undecided_by(binding: core_session.Binding) -> np.ndarray:
     frame = binding.last_frame
     space = frame.bones_from_model
     points = frame.rest_points @ space[:3, :3].T + space[:3, 3]
@@ -359,16 +359,16 @@ def undecided_by(binding: session.Binding) -> np.ndarray:
 def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     """bool [vertices]: those that a change of the input by its rounding moves by the tolerance, as curved
     mapping does with what lies far inside a bend, and one modifier after the other."""
-    skinned = handlers.state_of(obj)
+    skinned = session.state_of(obj)
     rest_points = skinned.shown.rest_points.astype(np.float64)
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
     shapes = []
     for points in (rest_points, rest_points + moved):
         links = [
-            session.SkinStage(session.Binding(k.binding.weighting), k.mask, k.multi)
+            core_session.SkinStage(core_session.Binding(k.binding.weighting), k.mask, k.multi)
             for k in skinned.bound.skin_stack.skin_stages
         ]
-        chain = session.SkinStack(links)
+        chain = core_session.SkinStack(links)
         chain.deform(points.astype(np.float32), skinned.shown.frames)
         shapes.append(chain.points)
     return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
@@ -395,7 +395,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
         attach.remove(obj)
-        handlers.session.forget()
+        session.forget()
     routes.release()
     return outcome
 
@@ -418,7 +418,7 @@ def error_of(
     for bone in armature.pose.bones:
         bone.location.x += 1.0
     bpy.context.view_layer.update()
-    state = handlers.state_of(obj)
+    state = session.state_of(obj)
     shapes = state.shown.number if state is not None else 0
     for bone, location in zip(armature.pose.bones, before, strict=True):
         bone.location = location

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 from sinew_addon.attach import properties
-from sinew_addon.deform import handlers, safe_mode, small_meshes
+from sinew_addon.deform import safe_mode, session, small_meshes
 
 EVALUATION, UPDATE = "evaluation", "update"
 ROUTES = (EVALUATION, UPDATE)
@@ -35,7 +35,7 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
 
     Raises NotBySinewError where it is not Sinew's.
     """
-    settings, state = properties.of(obj), handlers.state_of(obj)
+    settings, state = properties.of(obj), session.state_of(obj)
     if not settings.enabled:
         raise NotBySinewError(f"Sinew is off: {settings.error}")
     if state is None or state.shown.frames is None:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 from sinew_addon.attach import attach
-from sinew_addon.deform import handlers
+from sinew_addon.deform import session
 
 # Stated tolerance against the Armature modifier, as a part of the bounding box's diagonal.
 TOLERANCE = 1e-5
@@ -131,12 +131,12 @@ def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume:
 
 def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
     attach.add(obj, method)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
 
 
 def states_of(obj: bpy.types.Object) -> list:
     """A driven object with what is known of it at this frame, for measuring."""
-    return handlers.states_of([obj], bpy.context.evaluated_depsgraph_get())
+    return session.states_of([obj], bpy.context.evaluated_depsgraph_get())
 
 
 def worst(a: np.ndarray, b: np.ndarray) -> float:

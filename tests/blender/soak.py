@@ -26,7 +26,7 @@ import psutil
 import routes
 import scenes
 from sinew_addon.attach import attach
-from sinew_addon.deform import handlers
+from sinew_addon.deform import session
 from sinew_addon.features.compare import comparison
 
 LENGTH = 24
@@ -109,7 +109,7 @@ def disturb(objects: list[bpy.types.Object], number: int) -> None:
         comparison.end(bpy.context)
     elif what == 3:
         attach.remove(obj)
-        handlers.session.forget()
+        session.forget()
         bpy.context.scene.frame_set(7)
         scenes.add_sinew(obj, "dq")
     else:

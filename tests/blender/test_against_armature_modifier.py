@@ -11,7 +11,7 @@ import pytest
 import scenes
 from conftest import BLEND_FILES, REAL_RIGS
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import handlers
+from sinew_addon.deform import session
 from sinew_addon.io import files, mesh_io
 
 ORACLES = [("lbs", False), ("dq", True)]
@@ -260,7 +260,7 @@ def test_an_armature_modifier_apart_stays_blenders():
     scenes.add_sinew(obj)
     assert scenes.worst(scenes.shapes(obj, [1, 6, 11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert obj.modifiers["Second"].object is not None
-    assert any("Second" in warning for warning in handlers.state_of(obj).bound.facts.warnings)
+    assert any("Second" in warning for warning in session.state_of(obj).bound.facts.warnings)
 
 
 def test_each_of_several_armature_modifiers_starts_with_its_own_method():

@@ -9,7 +9,7 @@ import pytest
 import scenes
 import sinew_addon
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import apply_plan, evaluate, handlers, safe_mode
+from sinew_addon.deform import apply_plan, evaluate, safe_mode, session
 from sinew_addon.io import mesh_io
 from test_editing import assert_follows
 
@@ -319,7 +319,7 @@ def test_a_driver_that_gives_no_method_is_said_so():
     variable.targets[0].id, variable.targets[0].data_path = obj, '["number"]'
     for number, error in ((1, ""), (7, "the driver of its method")):
         obj["number"] = number
-        handlers.rebind(obj, bpy.context)
+        session.rebind(obj, bpy.context)
         bpy.context.scene.frame_set(11)
         bpy.context.view_layer.update()
         assert error in properties.of(obj).error

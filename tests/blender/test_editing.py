@@ -9,7 +9,7 @@ import pytest
 import scenes
 import snapshot
 from sinew_addon.attach import attach, point_store, properties
-from sinew_addon.deform import handlers, safe_mode
+from sinew_addon.deform import safe_mode, session
 from sinew_addon.io import armature_io
 
 
@@ -382,7 +382,7 @@ def test_an_unchanged_object_is_not_written(monkeypatch):
     written = []
     monkeypatch.setattr(point_store, "write", lambda *_args: written.append(1))
     bpy.context.scene.frame_set(6)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert not written
 
 
@@ -427,7 +427,7 @@ def test_what_is_missing_in_the_rig_is_warned_of():
     for group in obj.vertex_groups:
         group.remove([0, 1])
     scenes.add_sinew(obj)
-    assert "2 of 252 vertices" in " ".join(handlers.state_of(obj).bound.facts.warnings)
+    assert "2 of 252 vertices" in " ".join(session.state_of(obj).bound.facts.warnings)
 
 
 def test_remove_while_off_keeps_what_the_artist_switched():

@@ -16,7 +16,7 @@ import pytest
 import scenes
 from sinew_addon.attach import attach, properties
 from sinew_addon.attach.updates import updates_suspended
-from sinew_addon.deform import handlers, safe_mode
+from sinew_addon.deform import safe_mode, session
 from sinew_addon.io import files, mesh_io
 from sinew_addon.jobs.job_file import Settings
 from sinew_addon.jobs.tasks import reskin
@@ -294,7 +294,7 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     names = ["Arm", "Front", "Child", "Driven"]
     for name in names:
         scenes.add_sinew(bpy.data.objects[name], "dq")
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     expected = {name: scenes.final_points(bpy.data.objects[name]) for name in names}
     reskin.reskin(task(path), lambda _doing: None)
     copy = str(tmp_path / "unfinished.blend")

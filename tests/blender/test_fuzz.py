@@ -8,7 +8,7 @@ import pytest
 import routes
 import scenes
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import handlers, small_meshes
+from sinew_addon.deform import session, small_meshes
 
 RIGS = 300
 
@@ -55,7 +55,7 @@ def test_a_shape_of_another_pose_is_not_taken_for_this_one():
     obj, _armature = scenes.make_arm()
     routes.force(routes.EVALUATION)
     scenes.add_sinew(obj)
-    state = handlers.state_of(obj)
+    state = session.state_of(obj)
     with pytest.raises(routes.NotBySinewError, match="for this pose"):
         routes.taken(obj, state.shown.number)
     properties.of(obj).enabled = False

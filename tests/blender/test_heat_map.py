@@ -18,7 +18,7 @@ from sinew_addon.commands import compare
 from sinew_addon.commands.console import Console
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS
-from sinew_addon.deform import evaluate, handlers
+from sinew_addon.deform import evaluate, session
 from sinew_addon.features.heat import heat_legend, heat_nodes, live, measures
 from sinew_addon.features.pages import measure
 
@@ -303,14 +303,14 @@ def test_undo_and_redo():
     bpy.ops.ed.undo_push(message="heat map")
     colours = shown_colours(obj)
     bpy.ops.ed.undo()
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     obj = bpy.data.objects["Arm"]
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     assert heat_nodes.NAME not in mesh.attributes
     assert color_types() == types
     assert mesh.attributes.active_color_name == ""
     bpy.ops.ed.redo()
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     obj = bpy.data.objects["Arm"]
     np.testing.assert_allclose(shown_colours(obj), colours, atol=1e-6)
     assert set(color_types()) == {"VERTEX"}
@@ -323,7 +323,7 @@ def test_what_is_deleted_gives_the_views_back():
     bpy.ops.sinew.heat_map()
     bpy.data.objects.remove(obj)
     bpy.context.view_layer.update()
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert color_types() == types
 
 

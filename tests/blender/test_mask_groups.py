@@ -7,7 +7,7 @@ import bpy
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.deform import handlers, survey
+from sinew_addon.deform import session, survey
 from sinew_addon.features.diagnose import diagnose
 from sinew_addon.features.pages import measure
 
@@ -135,8 +135,8 @@ def test_while_sinew_is_at_work():
     obj.vertex_groups.new(name=GROUP).add([1, 2, 3], 1.0, "REPLACE")
     obj.modifiers["Armature"].vertex_group = GROUP
     scenes.add_sinew(obj, "dq")
-    assert handlers.state_of(obj).bound.facts.warnings == ()
+    assert session.state_of(obj).bound.facts.warnings == ()
     obj.modifiers["Armature"].vertex_group = ""
     bpy.context.view_layer.update()
-    handlers.rebind(obj, bpy.context)
-    assert any(GROUP in warning for warning in handlers.state_of(obj).bound.facts.warnings)
+    session.rebind(obj, bpy.context)
+    assert any(GROUP in warning for warning in session.state_of(obj).bound.facts.warnings)

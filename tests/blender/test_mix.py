@@ -10,7 +10,7 @@ import pytest
 import scenes
 import whole_file
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import handlers, safe_mode, small_meshes
+from sinew_addon.deform import safe_mode, session, small_meshes
 from sinew_addon.deform.plan import State
 
 FRAMES = [1, 4, 7, 11]
@@ -74,7 +74,7 @@ def test_two_modifiers_have_the_same_shape(monkeypatch, set_up, is_safe):
     mixed(obj)
     got = scenes.shapes(obj, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert handlers.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
+    assert session.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
 
 
 def test_painting_choosing_and_switching_off_are_seen():
@@ -139,7 +139,7 @@ def test_a_small_mesh_with_a_mix_is_not_left_to_blender(monkeypatch):
     monkeypatch.setattr(small_meshes, "is_used", True)
     mixed(obj)
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert handlers.state_of(obj).plan.state is State.IN_DEPSGRAPH
+    assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
 
 
 def test_saved_copied_and_removed(tmp_path):

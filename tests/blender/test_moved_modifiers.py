@@ -7,7 +7,7 @@ import bpy
 import pytest
 import scenes
 from sinew_addon.attach import attach, properties
-from sinew_addon.deform import handlers, small_meshes
+from sinew_addon.deform import session, small_meshes
 
 FRAMES = [1, 6, 11]
 
@@ -62,7 +62,7 @@ def test_chained_modifiers_in_another_order(monkeypatch, is_used, volume, over_s
     put(obj, "Armature", "Sinew" if over_sinew else "Second")
     check(obj, before)
     attach.remove(obj)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert names(obj) == ["Armature", "Second"]
     check(obj, before)
 
@@ -91,7 +91,7 @@ def test_a_third_added():
     got = scenes.shapes(obj, FRAMES)
     assert not third.show_viewport
     attach.remove(obj)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert third.show_viewport
     assert scenes.worst(got, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
@@ -119,7 +119,7 @@ def test_something_moved_between(moved, place):
     assert properties.of(obj).error == ""
     order = names(obj)
     attach.remove(obj)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert names(obj) == [name for name in order if name != "Sinew"]
     expected = scenes.shapes(obj, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
@@ -168,7 +168,7 @@ def test_a_keyed_modifier_is_renamed_while_it_is_off():
     bpy.context.scene.frame_set(1)
     scenes.add_sinew(obj, "lbs")
     modifier.name = "Other"
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert properties.has_sinew(obj)
     check(obj, expected)
 

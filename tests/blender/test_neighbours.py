@@ -13,7 +13,7 @@ import scenes
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
-from sinew_addon.deform import handlers, in_depsgraph, safe_mode
+from sinew_addon.deform import in_depsgraph, safe_mode, session
 from sinew_addon.deform.plan import State
 from sinew_addon.io import animation_paths
 
@@ -32,7 +32,7 @@ def arm(route) -> bpy.types.Object:
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(6)
-    assert handlers.state_of(obj).plan.state is route
+    assert session.state_of(obj).plan.state is route
     return obj
 
 
@@ -271,7 +271,7 @@ def test_suspended_modifiers_come_back_whatever_a_neighbour_does(monkeypatch, ne
     other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj, "dq")
     scenes.shapes(obj, [2, 3, 4])
-    assert handlers.state_of(obj).dirtied_by_frames
+    assert session.state_of(obj).dirtied_by_frames
     suspended = []
 
     def interfere() -> None:
@@ -317,7 +317,7 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
 
     monkeypatch.setattr(in_depsgraph, "_deform", fail)
     got = scenes.shapes(obj, [2, 3, 4, 5])
-    state = handlers.state_of(obj)
+    state = session.state_of(obj)
     assert state.evaluation.failures > 0
     assert "disk on fire" in state.evaluation.failure
     assert state.plan.state is State.AFTER_UPDATE
@@ -341,7 +341,7 @@ def test_in_safe_mode_nothing_runs_within_the_evaluation(monkeypatch, how):
     scenes.add_sinew(obj, "dq")
     assert_equals_modifier(obj)
     assert asked == []
-    assert handlers.state_of(obj).plan.reason == "Safe mode"
+    assert session.state_of(obj).plan.reason == "Safe mode"
 
 
 def test_suspended_by_two_threads_at_once():
@@ -434,7 +434,7 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     obj.keyframe_insert("sinew.method", frame=4)
     other = obj.copy()
     bpy.context.scene.collection.objects.link(other)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert other.animation_data.action == obj.animation_data.action
     attach.remove(obj)
     assert "sinew.method" in animation_paths.animated_paths(other)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import attach, node_group, note, properties, stack
-from sinew_addon.deform import exporters, handlers, safe_mode, small_meshes
+from sinew_addon.deform import exporters, safe_mode, session, small_meshes
 
 FRAMES = [1, 6, 11]
 
@@ -116,7 +116,7 @@ def test_between_the_handlers_of_saving_nothing_of_the_file_changes(tmp_path):
         obj.update_tag()
         bpy.context.view_layer.update()
         bpy.context.scene.frame_set(5)
-        handlers.refresh(bpy.context)
+        session.refresh(bpy.context)
         bpy.context.scene.frame_set(11)
         seen.append((before, state()))
 
@@ -158,7 +158,7 @@ def test_a_save_that_fails_ends_as_one_that_does_not(tmp_path):
     with pytest.raises(RuntimeError):
         save(tmp_path / "no such folder" / "saved.blend")
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
-    assert not handlers.session.is_saving
+    assert not session.current.is_saving
 
 
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])

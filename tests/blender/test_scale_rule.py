@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.deform import handlers
+from sinew_addon.deform import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import reference
@@ -36,7 +36,7 @@ def posed_arm(scaled: bool) -> bpy.types.Object:
 
 
 def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
-    link = handlers.state_of(obj).bound.skin_stack.skin_stages[0]
+    link = session.state_of(obj).bound.skin_stack.skin_stages[0]
     frame, rest = link.binding.last_frame, link.binding.bones.rest.astype(np.float64)
     influences = link.binding.weighting.influences(frame.rest_points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(rest)

@@ -11,7 +11,7 @@ import whole_file
 from program import run_sinew
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
-from sinew_addon.deform import events, handlers, small_meshes
+from sinew_addon.deform import events, handlers, session, small_meshes
 from sinew_addon.features.heat import live
 from sinew_addon.features.inbetween import inbetween_handlers
 
@@ -37,7 +37,7 @@ def deformer(obj: bpy.types.Object) -> str:
     by_blender = own.show_viewport and own.show_render and own.object is not None
     by_sinew = sinews.show_viewport and sinews.show_render
     assert by_blender != by_sinew
-    settings, state = properties.of(obj), handlers.state_of(obj)
+    settings, state = properties.of(obj), session.state_of(obj)
     assert (settings.enabled, settings.error) == (True, "")
     assert state.uses_builtin == by_blender
     drivers = obj.animation_data.drivers if obj.animation_data else []
@@ -122,7 +122,7 @@ def test_something_in_front_is_taken_up(arm):
     mirror = obj.modifiers.new("Mirror", "MIRROR")
     obj.modifiers.move(2, 0)
     bpy.context.view_layer.update()
-    assert not handlers.state_of(obj).uses_builtin
+    assert not session.state_of(obj).uses_builtin
     expected = scenes.final_points(obj)
     properties.of(obj).enabled = False
     assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5 * scenes.diagonal(obj)
@@ -180,7 +180,7 @@ def test_on_and_off_and_removed(tmp_path):
     assert deformer(obj) == "blender"
     bpy.context.scene.frame_set(1)
     attach.remove(obj)
-    handlers.refresh(bpy.context)
+    session.refresh(bpy.context)
     assert whole_file.differences(before, whole_file.of_open_file()) == []
 
 
@@ -275,10 +275,10 @@ def test_chained_modifiers_each_by_its_own():
     second.object, second.use_deform_preserve_volume = armature, True
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj)
-    assert handlers.state_of(obj).uses_builtin
+    assert session.state_of(obj).uses_builtin
     assert np.array_equal(scenes.shapes(obj, FRAMES), expected)
     properties.of(obj).replaced_modifiers[1].method = "SAME"
-    assert not handlers.state_of(obj).uses_builtin
+    assert not session.state_of(obj).uses_builtin
 
 
 def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):

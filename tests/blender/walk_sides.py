@@ -325,22 +325,22 @@ class SinewSide:
 
     def add(self, obj: bpy.types.Object, method: str | None, leave_small: bool) -> None:
         from sinew_addon.attach import attach
-        from sinew_addon.deform import handlers
+        from sinew_addon.deform import session
 
         if not self.has_sinew(obj):
             attach.add(obj, method)
             obj.sinew.leave_small = leave_small
             # As the button does.
-            handlers.session.forget()
-            handlers.refresh(bpy.context)
+            session.forget()
+            session.refresh(bpy.context)
 
     def remove(self, obj: bpy.types.Object) -> None:
         from sinew_addon.attach import attach
-        from sinew_addon.deform import handlers
+        from sinew_addon.deform import session
 
         if self.has_sinew(obj):
             attach.remove(obj)
-            handlers.session.forget()
+            session.forget()
 
     def set_method(self, obj: bpy.types.Object, method: str) -> None:
         from sinew_addon.attach import attach
@@ -351,9 +351,9 @@ class SinewSide:
         obj.sinew.enabled = on
 
     def rebind(self, obj: bpy.types.Object) -> None:
-        from sinew_addon.deform import handlers
+        from sinew_addon.deform import session
 
-        handlers.rebind(obj, bpy.context)
+        session.rebind(obj, bpy.context)
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         setattr(obj.sinew, name, value)
@@ -364,10 +364,10 @@ class SinewSide:
         obj.sinew.heat = on
 
     def set_safe(self, on: bool) -> None:
-        from sinew_addon.deform import handlers, safe_mode
+        from sinew_addon.deform import safe_mode, session
 
         safe_mode.set_forced(on or self._is_safe)
-        handlers.refresh(bpy.context)
+        session.refresh(bpy.context)
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         numbers = {m.name: m.number for m in self._properties.METHODS.values()}

@@ -17,7 +17,7 @@ import numpy as np
 from ...attach import attach, properties, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
-from ...deform import evaluate, handlers
+from ...deform import evaluate, session
 from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...io import files
 from ...io.animation_paths import curves_of
@@ -29,7 +29,7 @@ SHAPE_KEYS = "shape-keys"
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
     # As it was evaluated with the frame: what Sinew wrote since would be evaluated for nothing.
-    pairs = handlers.states_of([obj], bpy.context.view_layer.depsgraph)
+    pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
     if not pairs or obj.mode in MODES_OF_THE_MODIFIER:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
     return pairs[0][1].points
@@ -197,7 +197,7 @@ class Bake:
         except BaseException:
             self.discard()
             raise
-        handlers.session.forget()
+        session.forget()
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
@@ -226,7 +226,7 @@ def suffix_of(kind: str) -> str:
 def start(
     meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], target: Path, overwrite: bool
 ) -> Started:
-    """A bake of driven meshes; caches go to a folder beside `target`, exports to itself.
+    """A bake of skinned meshes; caches go to a folder beside `target`, exports to itself.
 
     frames     in rising order
     overwrite  whether files that are there already may be replaced

@@ -18,7 +18,7 @@ from ...attach.updates import updates_suspended
 from ...core import side_by_side
 from ...core.errors import SinewError
 from ...core.spaces import transformed
-from ...deform import evaluate, handlers
+from ...deform import evaluate, session
 from ...io import actions
 from . import comparison_state, offset_nodes
 
@@ -74,7 +74,7 @@ def start(
     except BaseException:
         end(context)
         raise
-    handlers.refresh(context)
+    session.refresh(context)
     return [*problems, *(e for e in (properties.of(copy).error for copy in collection.objects) if e)]
 
 
@@ -133,7 +133,7 @@ def end(context: bpy.types.Context) -> None:
         if obj.users == 0:
             bpy.data.objects.remove(obj)
     _remove_left_over()
-    handlers.refresh(context)
+    session.refresh(context)
 
 
 def _remove_copies(copies: list[bpy.types.Object]) -> None:

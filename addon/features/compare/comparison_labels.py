@@ -12,7 +12,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...attach import properties
-from ...deform import evaluate, handlers
+from ...deform import evaluate, session
 from . import comparison, comparison_state
 
 FONT = 0
@@ -61,7 +61,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
 
 def _method_label(obj: bpy.types.Object) -> str:
     settings = properties.of(obj)
-    by_sinew = settings.enabled and handlers.state_of(obj) is not None
+    by_sinew = settings.enabled and session.state_of(obj) is not None
     return properties.method_label(settings.method if by_sinew else evaluate.BLENDER)
 
 

@@ -18,7 +18,7 @@ from ...core.errors import SinewError
 from ...core.influences import GroupWeights
 from ...core.rig import Bones, Weighting
 from ...core.rotations import rotations_of
-from ...deform import evaluate, events, group_uses, handlers
+from ...deform import evaluate, events, group_uses, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped
 from ..pages import measure
@@ -190,7 +190,7 @@ def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
         return False
     if obj.mode == "EDIT":
         return _edited_weights(obj.data).equals(weights)
-    state = handlers.state_of(obj)
+    state = session.state_of(obj)
     if state is not None and not state.bound.source.from_front:
         # Read already, as Sinew follows them.
         return state.bound.source.weights.equals(weights)

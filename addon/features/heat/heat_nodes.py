@@ -17,7 +17,7 @@ from ...io import mesh_io
 
 # The colour attribute of evaluated meshes.
 NAME = "Sinew Heat"
-# The attribute of a carrier that holds each vertex's colour.
+# The attribute of a point buffer that holds each vertex's colour.
 COLOURS = "sinew_colours"
 MARK = "sinew_heat"
 _KIND = 12
@@ -29,7 +29,7 @@ def group_of(obj: bpy.types.Object) -> bpy.types.NodeTree | None:
 
 
 def get_or_make() -> bpy.types.NodeTree:
-    """The group that takes points and colours from a carrier."""
+    """The group that takes points and colours from a point buffer."""
     return node_group.find(_KIND) or _make()
 
 
@@ -39,7 +39,7 @@ def remove_unused_material() -> None:
 
 
 def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
-    """Stores float32 [vertices, 3], linear, in the carrier, and has Blender evaluate it."""
+    """Stores float32 [vertices, 3], linear, in the point buffer, and has Blender evaluate it."""
     mesh = properties.of(obj).point_buffer.data
     mesh_io.write_vectors(mesh, COLOURS, colours)
     mesh.update_tag()
@@ -85,7 +85,7 @@ def _make() -> bpy.types.NodeTree:
     link = group.links.new
     for name in ("Geometry", *inputs):
         link(source.outputs[name], place.inputs[name])
-    # Each vertex takes the colour of the carrier's vertex of that index.
+    # Each vertex takes the colour of the point buffer's vertex of that index.
     link(source.outputs["Points"], info.inputs["Object"])
     link(info.outputs["Geometry"], sample.inputs["Geometry"])
     link(named.outputs["Attribute"], enabled_socket(sample.inputs, "Value"))

@@ -7,7 +7,7 @@ import bpy
 
 from ...attach import properties
 from ...core.metrics import Measured
-from ...deform import handlers
+from ...deform import session
 from ...io import units
 from ...ui import operators
 from ...ui.sidebar import Sidebar, draw_text
@@ -53,7 +53,7 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
         settings = measures.of(context.scene)
         # As it was evaluated last: while drawing nothing may be evaluated, for that can write.
         depsgraph = context.view_layer.depsgraph
-        pairs = handlers.states_of(operators.sinew_targets(context), depsgraph)
+        pairs = session.states_of(operators.sinew_targets(context), depsgraph)
         subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
         if subject is None:
             draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")

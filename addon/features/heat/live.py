@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures driven objects as they are now, from what Sinew knows of them: Blender evaluates nothing for it.
+"""Measures skinned objects as they are now, from what Sinew knows of them: Blender evaluates nothing for it.
 
 Shapes are those that the skinning leaves, in world space; several objects are measured as one.
 """

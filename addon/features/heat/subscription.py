@@ -8,13 +8,13 @@ import bpy
 from ...attach import properties
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
-from ...deform import handlers
+from ...deform import session
 from . import heat_legend, heat_map, heat_nodes, heat_view, measures, redraw
 
 
 def register() -> None:
     measures.register()
-    measures.Listener.changed = handlers.refresh
+    measures.Listener.changed = session.refresh
     properties.listeners.heat_changed = _heat_changed
     for functions, function in _SUBSCRIPTIONS:
         functions.append(function)
@@ -34,7 +34,7 @@ def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     # Else it is seen to at the end of the render.
     if not is_rendering_in_window() and not properties.of(obj).heat:
         heat_view.take_off(obj)
-    handlers.setting_changed(obj, context)
+    session.setting_changed(obj, context)
     if not is_rendering_in_window():
         heat_view.tidy()
 
@@ -46,7 +46,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 def _colour(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> None:
     heated = [obj for obj in objects if properties.of(obj).heat]
-    heat_map.update(handlers.states_of(heated, depsgraph), depsgraph)
+    heat_map.update(session.states_of(heated, depsgraph), depsgraph)
 
 
 _SUBSCRIPTIONS = (

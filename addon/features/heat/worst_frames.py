@@ -13,7 +13,7 @@ from ...core.comparison import LENGTHS, ROUNDING, peaks
 from ...core.errors import SinewError
 from ...core.heat import HeatScale
 from ...core.metrics import METRICS, Metric
-from ...deform import evaluate, handlers
+from ...deform import evaluate, session
 from ...ui import stepped
 from . import live
 
@@ -69,7 +69,7 @@ def scan(
         for number, frame in enumerate(frames):
             evaluate.set_frame(scene, frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            subject = live.measure(handlers.states_of(objects, depsgraph), other, depsgraph)
+            subject = live.measure(session.states_of(objects, depsgraph), other, depsgraph)
             if subject is None:
                 raise SinewError(
                     f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes"

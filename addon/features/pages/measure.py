@@ -25,7 +25,7 @@ from ...core.metrics import FrameOfRig, Gauge, Summary, bone_axes
 from ...core.rig import Bones, Weighting
 from ...core.spaces import transformed
 from ...core.surface import joined
-from ...deform import evaluate, group_uses, handlers
+from ...deform import evaluate, group_uses, session
 from ...io import armature_io, mesh_io
 
 # Shapes of as many frames are kept as fit into this: methods take turns on them.
@@ -214,7 +214,7 @@ def _play(
             poses.append([_bone_matrices(part) for part in subject.parts])
         if result is not None and method in result.times:
             result.times[method].append(taken)
-            states = [handlers.state_of(obj) for obj in subject.meshes if method != evaluate.BLENDER]
+            states = [session.state_of(obj) for obj in subject.meshes if method != evaluate.BLENDER]
             result.own[method].append(sum(state.shown.milliseconds for state in states if state is not None))
     return shapes
 

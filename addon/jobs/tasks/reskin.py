@@ -20,7 +20,7 @@ from ...core.frames import parse_frames
 from ...core.names import fits
 from ...core.output import remove
 from ...core.views import seen_extent, whole_view
-from ...deform import evaluate, handlers
+from ...deform import evaluate, session
 from ...features.bake import bake_copy
 from ...features.compare import comparison
 from ...features.pages import render
@@ -116,7 +116,7 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
                 left_out.append(str(error))
                 continue
             meshes.append({"object": obj.name, "method": method, "warnings": []})
-        handlers.session.forget()
+        session.forget()
     if not meshes:
         reason = left_out.pop() if left_out else "no mesh is deformed by Sinew"
         raise SinewError(f"{source}: {reason}; nothing written")
@@ -142,7 +142,7 @@ def _drive(
             if properties.has_sinew(obj) and not was_driven:
                 attach.remove(obj)
             continue
-        state = handlers.state_of(obj)
+        state = session.state_of(obj)
         mesh = {
             "object": obj.name,
             "vertices": len(obj.data.vertices),
@@ -241,7 +241,7 @@ def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: 
         return
     objects = [obj for obj, _mesh in shown]
     with clock.doing("comparing"):
-        handlers.resume_after_save(bpy.context)
+        session.resume_after_save(bpy.context)
         evaluate.show(objects)
         frames = _frames(task["frames"], scene)
         ours = [_points(scene, objects, frame) for frame in frames]

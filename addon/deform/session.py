@@ -1,0 +1,428 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All skinned objects of the open file, brought up to date with an evaluation, and made ready for saving."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import bpy
+
+from ..attach import attach, note, overrides, point_store, properties, stack
+from ..attach.subscribers import notify, subscribers
+from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
+from ..core.errors import SinewError
+from . import after_update, apply_plan, events
+from .changes import Changes
+from .gate import Gate
+from .in_depsgraph import DepsgraphRequests
+from .plan import Plan, State
+from .skinned_object import SkinnedObject
+from .update import update
+
+log = logging.getLogger("sinew")
+
+Pairs = list[tuple[bpy.types.Object, SkinnedObject]]
+
+
+@dataclass
+class Session:
+    """What is known of the open file. Objects are referred to between events only; undo and loading make all
+    references void, so both forget everything.
+
+    objects           those that have Sinew; None where that has to be found out
+    object_count      how many objects the file had then
+    skinned           what is known of those that are on, by session_uid
+    pairs             both
+    depsgraph         the address of the one last seen
+    waiting           the session_uid of those that wait for another evaluation
+    missed            changes of evaluations that were not reacted to
+    expected          meshes that Blender lists as changed because a setting of Sinew's was
+    on_before_saving  the objects that Sinew deformed before the file was prepared for saving
+    is_saving         Blender writes the file: nothing may change
+    is_rendering      between the events of a render's start and end
+    must_refresh      something waits for the end of a render
+    seen              the meshes that had changed before functions behind Sinew's were called
+    all_use_builtin   Armature modifiers deform all of them, and only an event that is listened to can change
+                      that
+    """
+
+    objects: list[bpy.types.Object] | None = None
+    object_count: int = 0
+    skinned: dict[int, SkinnedObject] = field(default_factory=dict)
+    pairs: Pairs = field(default_factory=list)
+    depsgraph: int = 0
+    waiting: set[int] = field(default_factory=set)
+    gate: Gate = field(default_factory=Gate)
+    missed: Changes | None = None
+    expected: set[int] = field(default_factory=set)
+    on_before_saving: set[int] = field(default_factory=set)
+    is_saving: bool = False
+    is_rendering: bool = False
+    must_refresh: bool = False
+    seen: set[str] | None = None
+    all_use_builtin: bool = False
+
+    @property
+    def is_idle(self) -> bool:
+        """No object has Sinew, and none has come since that was seen."""
+        return self.objects == [] and self.object_count == len(bpy.data.objects)
+
+
+current = Session()
+requests = DepsgraphRequests()
+
+
+def forget() -> None:
+    """Everything is read anew with the next event."""
+    current.gate.restore()
+    current.objects = None
+    subscribe_to_frames()
+    current.depsgraph = 0
+    current.waiting = set()
+    current.missed = None
+    current.seen = None
+    current.expected = set()
+    current.skinned.clear()
+    current.pairs = []
+    requests.set_objects({})
+
+
+def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
+    """What is known of an object; None before its first frame, and where it has no Sinew."""
+    return current.skinned.get(obj.session_uid)
+
+
+def states_of(
+    objects: Iterable[bpy.types.Object] | None, depsgraph: bpy.types.Depsgraph | None
+) -> list[tuple[bpy.types.Object, SkinnedObject]]:
+    """Those of the objects that Sinew deforms now, or would if their Armature modifiers did not, with what is
+    known of them from this evaluation; none without one."""
+    if depsgraph is None:
+        return []
+    pairs = []
+    for obj in objects or ():
+        state = state_of(obj) if properties.of(obj).enabled else None
+        if state is not None:
+            with contextlib.suppress(SinewError):
+                after_update.bring_up_to_date(obj, state, depsgraph)
+                pairs.append((obj, state))
+    return [(obj, state) for obj, state in pairs if state.shown.frames is not None]
+
+
+# --- Which of Blender's changes of frame have to be listened to
+
+
+def subscribe_to_frames() -> None:
+    """Blender calls at each change of frame, until it is known that there is nothing to do."""
+    current.all_use_builtin = False
+    events.subscribe_all(events.FRAME_HANDLERS)
+
+
+def _subscribe_to_needed_frames() -> None:
+    if current.objects:
+        events.subscribe("frame_change_post", events.FRAME_HANDLERS["frame_change_post"])
+    if not current.all_use_builtin:
+        events.subscribe("frame_change_pre", events.FRAME_HANDLERS["frame_change_pre"])
+
+
+def unsubscribe_from_frames() -> None:
+    """Without what is not needed: a function of Python's takes 3 to 10 us of a frame in any case."""
+    if current.is_idle and events.IMPORTS_ARE_ANNOUNCED:
+        events.unsubscribe_all(events.FRAME_HANDLERS)
+    elif current.all_use_builtin:
+        events.unsubscribe("frame_change_pre", events.FRAME_HANDLERS["frame_change_pre"])
+
+
+# --- Settings
+
+
+def refresh(context: bpy.types.Context) -> None:
+    """Deforms all skinned objects at the current frame, as after a change of settings."""
+    if is_rendering_in_window():
+        # Without waiting for the render's thread, which would make its next frame beside what follows.
+        current.must_refresh = True
+        return
+    with reaction() as may_react:
+        if not may_react or current.is_saving:
+            # Suspended, or a handler switched an object off: who did that goes on.
+            return
+        current.objects = None
+        for state in current.skinned.values():
+            state.needs_apply = True
+        depsgraph = context.evaluated_depsgraph_get()
+        update_all(depsgraph, Changes())
+        unsubscribe_from_frames()
+        # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
+        if bpy.app.background:
+            # Where nothing waits, only what was just changed is new: that needs no other reaction now.
+            with contextlib.nullcontext() if waiting() else updates_suspended():
+                context.view_layer.update()
+
+
+@contextlib.contextmanager
+def changing(context: bpy.types.Context) -> Iterator[None]:
+    """Settings are changed inside, and nothing else; all is deformed by them at the end."""
+    # What others changed before is seen apart from it.
+    context.evaluated_depsgraph_get()
+    with updates_suspended():
+        yield
+    for obj in filter(properties.has_sinew, bpy.data.objects):
+        _expect_mesh_update(obj)
+    refresh(context)
+
+
+@contextlib.contextmanager
+def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
+    """The same for a file that was opened to be saved so: at the end it is prepared for that, too. To go on
+    with it, resume_after_save().
+
+    Blender has the poses from opening the file, and has to evaluate only what had Sinew before or has
+    something in front.
+    """
+    with updates_suspended():
+        yield
+        current.objects = None
+        depsgraph, changes = context.view_layer.depsgraph, Changes()
+        had_sinew = depsgraph is not None and any(
+            properties.has_sinew(obj.evaluated_get(depsgraph)) for obj in objects_with_sinew(changes)
+        )
+        if depsgraph is None or had_sinew:
+            depsgraph = context.evaluated_depsgraph_get()
+        update_all(depsgraph, changes)
+        if waiting():
+            update_all(context.evaluated_depsgraph_get(), changes)
+        prepare_for_save()
+
+
+def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    """One of Sinew's settings of an object was changed: its shape may differ."""
+    refresh(context)
+    # Blender touches the object's mesh next. In a window that is an evaluation of its own; a script may
+    # change weights before.
+    if not bpy.app.background:
+        _expect_mesh_update(obj)
+
+
+def enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    """It was switched on or off."""
+    settings = properties.of(obj)
+    if not settings.enabled and not is_rendering_in_window():
+        apply_plan.apply(obj, apply_plan.plan_of(obj))
+    settings.error = ""
+    setting_changed(obj, context)
+
+
+def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
+    """Reads everything of the object anew: mesh, weights, bones. Switches it on again after an error."""
+    current.skinned.pop(obj.session_uid, None)
+    settings = properties.of(obj)
+    settings.error = ""
+    if not settings.enabled:
+        settings.enabled = True  # refreshes
+    else:
+        refresh(context)
+
+
+# --- Saving
+
+
+def prepare_for_save() -> None:
+    """The file is made one that a Blender without Sinew plays, by the nearest shape that it has."""
+    current.gate.restore()
+    objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
+    current.on_before_saving = set()
+    with updates_suspended():
+        for obj in objects:
+            try:
+                if attach.prepare_for_save(obj):
+                    current.on_before_saving.add(obj.session_uid)
+                overrides.keep(obj)
+            except Exception as error:
+                # The others are in the same file.
+                log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
+        note.write([obj for obj in objects if properties.of(obj).is_saved])
+
+
+def resume_after_save(context: bpy.types.Context) -> None:
+    """The way back from prepare_for_save()."""
+    note.remove()
+    with updates_suspended():
+        for obj in filter(properties.has_sinew, bpy.data.objects):
+            _expect_mesh_update(obj)
+            if obj.is_editable and stack.sinew_modifier(obj) is not None:
+                attach.switch(obj, on=obj.session_uid in current.on_before_saving)
+    refresh(context)
+
+
+# --- Reactions to an evaluation
+
+
+def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
+    """Brings all objects up to date with an evaluation and what it changed, and tells the subscribers."""
+    with updates_suspended():
+        if current.missed is not None:
+            changes.add(current.missed)
+            current.missed = None
+        read_later = _drop_expected(changes)
+        _adopt_copied_modifiers(changes)
+        for obj in objects_with_sinew(changes):
+            _update_or_switch_off(obj, depsgraph, changes)
+            state = state_of(obj)
+            if state is not None and obj.data.session_uid in read_later:
+                state.needs_recheck = True
+        states = [(obj, state_of(obj)) for obj in objects_with_sinew(Changes())]
+        current.pairs = [(obj, state) for obj, state in states if state is not None]
+        requests.set_objects({obj.name: state for obj, state in current.pairs})
+        current.all_use_builtin = _do_all_use_builtin()
+        _subscribe_to_needed_frames()
+        notify(subscribers.deformed, current.objects or [], depsgraph)
+        notify(subscribers.frame_shown)
+
+
+def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
+    """Found out anew where objects may have come or gone."""
+    if current.objects is None or changes.structure or len(bpy.data.objects) != current.object_count:
+        current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+        current.object_count = len(bpy.data.objects)
+        notify(subscribers.objects_changed, current.objects)
+        point_store.unshare(current.objects)
+        uids = {obj.session_uid for obj in current.objects}
+        current.skinned = {uid: state for uid, state in current.skinned.items() if uid in uids}
+    return current.objects
+
+
+def waiting() -> set[int]:
+    """The session_uid of each object that waits for what Blender makes of the modifiers in front."""
+    unknown = [(obj, properties.of(obj)) for obj in objects_with_sinew(Changes()) if state_of(obj) is None]
+    return {obj.session_uid for obj, settings in unknown if settings.enabled and settings.replaces_modifiers}
+
+
+def were_all_deformed(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether the evaluation gave all skinned objects their points, and nothing else has to be looked at."""
+    if (
+        current.objects is None
+        or current.depsgraph != depsgraph.as_pointer()
+        or not Changes.are_of_meshes_only(depsgraph)
+    ):
+        return False
+    # Objects that use their Armature modifiers do not need to know which they are, and listing takes long.
+    meshes = set() if current.all_use_builtin else Changes.meshes_in(depsgraph)
+    try:
+        if not all(_was_deformed(obj, depsgraph, meshes) for obj in current.objects):
+            return False
+    except ReferenceError:
+        # Deleted since the objects were listed.
+        return False
+    notify(subscribers.frame_shown)
+    return True
+
+
+def _was_deformed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, meshes: set[int] | None) -> bool:
+    state = state_of(obj)
+    if state is None:
+        return not properties.of(obj).enabled
+    if state.plan.state is State.OFF:
+        return True
+    return (
+        state.was_deformed(obj, depsgraph)
+        and state.is_untouched_by_frame(obj, meshes)
+        # Up to Blender 5.1 the points are requested for a modifier without its node group, too.
+        and state.is_attached(obj)
+    )
+
+
+def _do_all_use_builtin() -> bool:
+    """Whether frames have nothing for Sinew, as long as nothing but poses changes."""
+    try:
+        on = [obj for obj in current.objects or () if properties.of(obj).enabled]
+        return all(
+            (state := state_of(obj)) is not None and state.uses_builtin and obj.animation_data is None
+            for obj in on
+        )
+    except ReferenceError:
+        return False
+
+
+def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
+    try:
+        if _follow_removal(obj, changes):
+            return
+        if not properties.of(obj).enabled:
+            state = state_of(obj)
+            if state is not None:
+                state.plan, state.needs_apply = Plan(State.OFF), True
+            if properties.of(obj).replaces_modifiers and obj.is_editable and not is_rendering_in_window():
+                # It was switched off while a window rendered.
+                apply_plan.apply(obj, apply_plan.plan_of(obj))
+        else:
+            state = update(obj, state_of(obj), depsgraph, changes)
+            if state is None:
+                current.skinned.pop(obj.session_uid, None)
+            else:
+                current.skinned[obj.session_uid] = state
+    except ReferenceError:
+        # Deleted since the objects were listed.
+        current.objects = None
+    except Exception as error:
+        _switch_off(obj, properties.of(obj), error)
+
+
+def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
+    """Whether the object has lost Sinew's modifier; then it has no Sinew from now on."""
+    state = state_of(obj)
+    is_named = changes.structure or obj.session_uid in changes.objects or not changes.complete
+    if not is_named and (state is None or state.is_attached(obj)):
+        return False
+    if not obj.is_editable or is_rendering_in_window():
+        return False
+    if not apply_plan.has_lost_modifier(obj):
+        return False
+    # The last shape is computed only here: not at each pose.
+    rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
+    apply_plan.follow_removal(obj, rest, shown)
+    current.skinned.pop(obj.session_uid, None)
+    current.objects = None
+    return True
+
+
+def _switch_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: Exception) -> None:
+    """Gives a failing object back to its Armature modifier, and says why once."""
+    current.skinned.pop(obj.session_uid, None)
+    if is_rendering_in_window():
+        log.error("%s: %s; the last shape stays until the end of the render", obj.name, error)
+        current.must_refresh = True
+        return
+    settings.enabled = False
+    if isinstance(error, SinewError):
+        settings.error = str(error)
+        log.error("%s", error)
+    else:
+        settings.error = f"{obj.name}: {type(error).__name__}: {error}; press Rebind, or Remove"
+        log.error("%s", settings.error, exc_info=error)
+
+
+def _adopt_copied_modifiers(changes: Changes) -> None:
+    for obj in changes.edited if not is_rendering_in_window() else ():
+        # It may have been deleted since.
+        with contextlib.suppress(ReferenceError):
+            is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
+            if is_plain and not properties.has_sinew(obj) and not properties.is_copy(obj):
+                changes.structure |= apply_plan.adopt_copied_modifier(obj)
+
+
+def _expect_mesh_update(obj: bpy.types.Object) -> None:
+    """The next evaluation lists the object's mesh for what Sinew does itself."""
+    current.expected.add(obj.data.session_uid)
+
+
+def _drop_expected(changes: Changes) -> set[int]:
+    """Takes the meshes out of the changes that are listed for what Sinew did. They are returned where
+    somebody else may have changed them in the same moment: then they are read with the next event."""
+    expected, current.expected = changes.meshes & current.expected, set()
+    if changes.frame:
+        return set()
+    changes.meshes -= expected
+    return expected if events.others_are_subscribed() or not bpy.app.background else set()
