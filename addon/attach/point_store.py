@@ -67,7 +67,7 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
 
 
 def set_rest_points(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
-    """The point buffer gets the rest points, for an evaluation to move: where their number differs, or anew."""
+    """Gives the point buffer the rest points, which an evaluation moves: if their number differs, or anew."""
     if anew or not are_written(obj, len(rest)):
         write(obj, rest, rest)
 

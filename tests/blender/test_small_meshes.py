@@ -187,7 +187,7 @@ def test_on_and_off_and_removed(tmp_path):
 def test_frames_cost_nothing_of_sinews(arm, monkeypatch):
     scenes.shapes(arm[0], FRAMES)
     looked_at = []
-    monkeypatch.setattr(handlers.skinned, "update", lambda *arguments: looked_at.append(arguments))
+    monkeypatch.setattr(session, "update", lambda *arguments: looked_at.append(arguments))
     scenes.shapes(arm[0], FRAMES)
     assert looked_at == []
 
@@ -218,7 +218,7 @@ def test_frames_are_not_looked_at_for_what_goes_on_beside(monkeypatch, leave, be
     properties.of(obj).leave_small = leave
     scenes.shapes(obj, FRAMES)
     looked_at = []
-    monkeypatch.setattr(handlers.skinned, "update", lambda *arguments: looked_at.append(arguments))
+    monkeypatch.setattr(session, "update", lambda *arguments: looked_at.append(arguments))
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
     assert looked_at == []
 
