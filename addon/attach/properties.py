@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 import sinew
 
-from ..core import inbetween
 from ..core.scale_rule import SCALE_RULES
 from . import stage_settings
 from .stage_settings import OFF
@@ -30,7 +28,6 @@ class Listeners:
 
     method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
-    inbetween_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     object_requested: Callable[[bpy.types.Object], None] | None = None
     mesh_requested: Callable[[bpy.types.Mesh], None] | None = None
     heat_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
@@ -320,67 +317,18 @@ def clear(obj: bpy.types.Object) -> None:
     obj.property_unset("sinew")
 
 
-def _inbetween_changed(armature: bpy.types.Object, context: bpy.types.Context) -> None:
-    if listeners.inbetween_changed is not None:
-        listeners.inbetween_changed(armature, context)
-
-
-class SinewActionHold(bpy.types.PropertyGroup):
-    """A slot of an action whose bones Sinew plays; its name is the slot's handle, 0 where there are none."""
-
-    muted: bpy.props.StringProperty(description="The curves that the artist had muted")
-
-    def muted_by_artist(self) -> set[tuple[str, int]]:
-        return {(path, index) for path, index in json.loads(self.muted or "[]")}
-
-    def set_muted_by_artist(self, curves: set[tuple[str, int]]) -> None:
-        text = json.dumps(sorted(curves)) if curves else ""
-        if self.muted != text:
-            self.muted = text
-
-
-CLASSES = (SinewReplacedModifier, *STAGE_GROUPS.values(), SinewSettings, SinewActionHold)
+CLASSES = (SinewReplacedModifier, *STAGE_GROUPS.values(), SinewSettings)
 
 # A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
 MESH_REQUEST = bpy.props.FloatProperty(
     get=_mesh_requested, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
 )
 
-# Properties of objects themselves, as a group that the linked file does not have is lost from a library
-# override on saving (Blender 5.0 and 5.2).
-INBETWEEN = {
-    "sinew_inbetween": bpy.props.EnumProperty(
-        name="In-betweens",
-        description="How the bones move between the keyed poses of the action",
-        items=[
-            (inbetween.BLENDER, "Blender's Curves", "Each channel by its own curve, as without Sinew", 0),
-            *((m.name, m.label, m.description, m.number) for m in inbetween.METHODS.values()),
-        ],
-        default=inbetween.BLENDER,
-        options=set(),
-        override=OVERRIDABLE,
-        update=_inbetween_changed,
-    ),
-    "sinew_inbetween_path": bpy.props.EnumProperty(
-        name="Path",
-        description="Which keyed poses shape the way from one to the next",
-        items=[
-            (
-                inbetween.STRAIGHT,
-                "Key to Key",
-                "The two neighbours, at the pace of the keys' own interpolation",
-                0,
-            ),
-            (
-                inbetween.SPLINE,
-                "Spline",
-                "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace",
-                1,
-            ),
-        ],
-        default=inbetween.STRAIGHT,
-        options=set(),
-        override=OVERRIDABLE,
-        update=_inbetween_changed,
-    ),
-}
+
+def register() -> None:
+    bpy.types.Object.sinew = bpy.props.PointerProperty(type=SinewSettings, override=OVERRIDABLE)
+    bpy.types.Mesh.sinew_asked = MESH_REQUEST
+
+
+def unregister() -> None:
+    del bpy.types.Object.sinew, bpy.types.Mesh.sinew_asked

@@ -9,6 +9,7 @@ channels alone, and everything else in the action plays on. What the artist had 
 from __future__ import annotations
 
 import functools
+import json
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -27,6 +28,20 @@ COLUMNS = {
 _BONE_PATH = re.compile(rf'pose\.bones\["(.*)"\]\.({"|".join(COLUMNS)})')
 
 REPEATING = {"REPEAT", "REPEAT_OFFSET"}
+
+
+class SinewActionHold(bpy.types.PropertyGroup):
+    """A slot of an action whose bones Sinew plays; its name is the slot's handle, 0 where there are none."""
+
+    muted: bpy.props.StringProperty(description="The curves that the artist had muted")
+
+    def muted_by_artist(self) -> set[tuple[str, int]]:
+        return {(path, index) for path, index in json.loads(self.muted or "[]")}
+
+    def set_muted_by_artist(self, curves: set[tuple[str, int]]) -> None:
+        text = json.dumps(sorted(curves)) if curves else ""
+        if self.muted != text:
+            self.muted = text
 
 
 class Channel(NamedTuple):

@@ -156,11 +156,3 @@ def _vertices(count: int) -> str:
 
 
 CLASSES = (SINEW_OT_check, SINEW_OT_check_frames, SINEW_OT_select_finding, SINEW_PT_diagnostics)
-
-
-def register() -> None:
-    diagnose.register()
-
-
-def unregister() -> None:
-    diagnose.unregister()

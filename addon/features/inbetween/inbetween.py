@@ -1,14 +1,77 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an armature object has chosen for its in-betweens, and whether it can have it."""
+"""What an armature object has chosen for its in-betweens, in the .blend file, and whether it can have it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import bpy
 
+from ...attach import properties
+from ...core import inbetween as core
 from ...core.inbetween import BLENDER
 from ...io import actions
+
+
+class Listener:
+    """Who reacts to another choice; set on registration, as what reacts also reads it."""
+
+    changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
+
+
+def _changed(armature: bpy.types.Object, context: bpy.types.Context) -> None:
+    if Listener.changed is not None:
+        Listener.changed(armature, context)
+
+
+# Of objects themselves, as a group that the linked file does not have is lost from a library override on
+# saving (Blender 5.0 and 5.2).
+_PROPERTIES = {
+    "sinew_inbetween": bpy.props.EnumProperty(
+        name="In-betweens",
+        description="How the bones move between the keyed poses of the action",
+        items=[
+            (core.BLENDER, "Blender's Curves", "Each channel by its own curve, as without Sinew", 0),
+            *((m.name, m.label, m.description, m.number) for m in core.METHODS.values()),
+        ],
+        default=core.BLENDER,
+        options=set(),
+        override=properties.OVERRIDABLE,
+        update=_changed,
+    ),
+    "sinew_inbetween_path": bpy.props.EnumProperty(
+        name="Path",
+        description="Which keyed poses shape the way from one to the next",
+        items=[
+            (
+                core.STRAIGHT,
+                "Key to Key",
+                "The two neighbours, at the pace of the keys' own interpolation",
+                0,
+            ),
+            (
+                core.SPLINE,
+                "Spline",
+                "Catmull-Rom through four keyed poses: smooth at keys, at the spline's pace",
+                1,
+            ),
+        ],
+        default=core.STRAIGHT,
+        options=set(),
+        override=properties.OVERRIDABLE,
+        update=_changed,
+    ),
+}
+
+
+def register() -> None:
+    for name, choice in _PROPERTIES.items():
+        setattr(bpy.types.Object, name, choice)
+
+
+def unregister() -> None:
+    for name in _PROPERTIES:
+        delattr(bpy.types.Object, name)
 
 
 def is_on(armature: bpy.types.Object) -> bool:

@@ -15,7 +15,6 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...attach import properties
 from ...core.inbetween import BLENDER
 from ...deform import events
 from ...io import actions, pose_io
@@ -317,7 +316,7 @@ if events.IMPORTS_ARE_ANNOUNCED:
 
 def register() -> None:
     session.forget()
-    properties.listeners.inbetween_changed = _changed
+    inbetween.Listener.changed = _changed
     events.subscribe_all(_HANDLERS)
 
 

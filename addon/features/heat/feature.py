@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How heat maps take part in what Sinew does with its objects."""
+"""What Blender gets of heat maps, and how they take part in what Sinew does with its objects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from ...attach import properties
 from ...attach.subscribers import subscribers
 from ...attach.updates import is_rendering_in_window
 from ...deform import session
-from . import heat_legend, heat_map, heat_nodes, heat_view, measures, redraw
+from . import heat_legend, heat_map, heat_nodes, heat_panel, heat_view, measures, redraw
+
+CLASSES = (*measures.CLASSES, *heat_panel.CLASSES)
 
 
 def register() -> None:
