@@ -184,11 +184,8 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         _show(nodes, viewport or keyed, render or keyed)
     elif settings.replaces_modifiers:
         restore_builtin(obj)
-        for modifier in stack.armature_modifiers(obj):
-            replaced = _replaced_modifier(obj, modifier)
-            # What an animation sets was left alone.
-            if not is_visibility_animated(obj, modifier):
-                _show(modifier, replaced.show_viewport, replaced.show_render)
+        for modifier, replaced in replaced_modifiers(obj):
+            _restore_visibility(modifier, replaced)
         _show(nodes, False, False)
     properties.store(settings, "standing_in", on)
 
@@ -230,12 +227,24 @@ def _switch_off(obj: bpy.types.Object) -> None:
     for modifier, replaced in replaced_modifiers(obj):
         ours = ((False, False), (replaced.show_viewport, False))
         flags = (modifier.show_viewport, modifier.show_render)
-        if not properties.of(obj).replaces_modifiers or flags not in ours:
+        if not properties.of(obj).replaces_modifiers or flags not in ours or replaced.visibility_is_keyed:
             properties.store(replaced, "show_viewport", modifier.show_viewport)
             properties.store(replaced, "show_render", modifier.show_render)
         # What an animation sets, it would set again with the next frame; until then it counts.
-        if not is_visibility_animated(obj, modifier):
+        is_keyed = is_visibility_animated(obj, modifier)
+        # While the object is hidden, no animation sets what Sinew has switched off.
+        if not is_keyed or obj.visible_get():
+            properties.store(replaced, "visibility_is_keyed", is_keyed)
+        if not is_keyed:
             _show(modifier, keeps_modifiers_on(obj) and replaced.show_viewport, False)
+
+
+def _restore_visibility(
+    modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
+) -> None:
+    """What an animation sets, or has set last, Sinew did not change."""
+    if not replaced.visibility_is_keyed:
+        _show(modifier, replaced.show_viewport, replaced.show_render)
 
 
 def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
@@ -249,18 +258,13 @@ def _replaced_modifier(
     obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier
 ) -> properties.SinewReplacedModifier:
     """What Sinew keeps of an Armature modifier, made where it is missing."""
-    replaced_modifiers, run = properties.of(obj).replaced_modifiers, stack.armature_modifiers(obj)
-    found = replaced_modifiers.get(modifier.name)
-    if found is None and run:
-        # Renamed: as many as there were, so this is the one that had its place.
-        names, place = [m.name for m in run], run.index(modifier)
-        if len(replaced_modifiers) == len(run) and replaced_modifiers[place].name not in names:
-            found = replaced_modifiers[place]
-            found.name = modifier.name
+    replaced_modifiers = properties.of(obj).replaced_modifiers
+    found = next((s for s in replaced_modifiers if stack.modifier_of(obj, s) == modifier), None)
     if found is None:
         found = replaced_modifiers.add()
-        found.name = modifier.name
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
+    properties.store(found, "name", modifier.name)
+    properties.store(found, "uid", modifier.persistent_uid)
     return found
 
 
@@ -292,7 +296,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
         modifier = obj.modifiers.get(name)
         if settings.replaces_modifiers and modifier is not None and modifier.type == "ARMATURE":
             _restore_pointer(modifier, kept[name])
-            _show(modifier, kept[name].show_viewport, kept[name].show_render)
+            _restore_visibility(modifier, kept[name])
         kept.remove(kept.find(name))
     for place, name in enumerate(names):
         kept.move(kept.find(name), place)
@@ -308,11 +312,28 @@ def _position_modifier(obj: bpy.types.Object) -> None:
     it, as it moves each vertex to its point whatever came before."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
-    if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj):
+    if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj) or _is_chained_to_parent(obj):
         if own != last + 1:
             obj.modifiers.move(own, last if own < last else last + 1)
     elif own + 1 != first:
         obj.modifiers.move(own, first if own > first else first - 1)
+
+
+def move_out_of_chain(obj: bpy.types.Object) -> None:
+    """While the Armature modifiers deform, Sinew's is not among them: Blender does not chain Multi Modifiers
+    across another one, be it off."""
+    run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
+    if nodes is None or not run:
+        return
+    own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
+    if first < own < last or (own < first and _is_chained_to_parent(obj)):
+        obj.modifiers.move(own, last)
+
+
+def _is_chained_to_parent(obj: bpy.types.Object) -> bool:
+    """Whether the first Armature modifier is a Multi Modifier to a parent that deforms, too."""
+    first = armature_modifier(obj)
+    return first is not None and first.use_multi_modifier and stack.parent_deforms(obj)
 
 
 def keeps_modifiers_on(obj: bpy.types.Object) -> bool:

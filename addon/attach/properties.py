@@ -87,9 +87,20 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         poll=lambda _self, obj: obj.type == "ARMATURE",
         override=OVERRIDABLE,
     )
+    uid: bpy.props.IntProperty(
+        description="By which the Armature modifier is known however it is moved and renamed; 0 where it is "
+        "known by its name",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     # The Armature modifier's own flags, given back on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    visibility_is_keyed: bpy.props.BoolProperty(
+        description="An animation has set the Armature modifier's flags, and not Sinew",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     preserve_volume: bpy.props.BoolProperty(
         description="The Armature modifier's own choice, while a saved file has the one nearest to Sinew's",
         options={"HIDDEN"},
@@ -305,7 +316,7 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
                 setattr(target, name, value)
 
 
-def store(group: bpy.types.PropertyGroup, name: str, value: bool) -> None:
+def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:
     """Sets what Sinew keeps for itself: telling Blender would touch the object's mesh, as its weights' change
     does."""
     if getattr(group, name) != value:

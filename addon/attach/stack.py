@@ -53,10 +53,10 @@ def _start(obj: bpy.types.Object) -> int:
         candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
         return _index(obj, min(candidates, key=lambda m: not _can_be_on(obj, m), default=None))
     behind_own = _index(obj, sinew_modifier(obj)) + 1
-    names = {replaced.name for replaced in properties.of(obj).replaced_modifiers}
-    known = [i for i, m in enumerate(modifiers) if m.type == "ARMATURE" and m.name in names]
+    found = [modifier_of(obj, replaced) for replaced in properties.of(obj).replaced_modifiers]
+    known = sorted(_index(obj, modifier) for modifier in found if modifier is not None)
     start = next(iter(known), behind_own)
-    # Renamed, or new: between our own modifier and the first that is known.
+    # New: between our own modifier and the first that is known.
     between = modifiers[behind_own:start]
     if between and all(m.type == "ARMATURE" for m in between):
         start = behind_own
@@ -64,10 +64,19 @@ def _start(obj: bpy.types.Object) -> int:
     ahead = min(start, len(modifiers)) - 1
     if ahead >= 0 and modifiers[ahead] == sinew_modifier(obj):
         ahead -= 1
-    # Or renamed, where Sinew is behind them: Sinew has switched those off.
+    # Or others in the place of those that are gone, where Sinew is behind them: it has switched those off.
     while ahead >= 0 and (_deforms(modifiers[ahead]) or (not known and modifiers[ahead].type == "ARMATURE")):
         start, ahead = ahead, ahead - 1
     return start
+
+
+def modifier_of(
+    obj: bpy.types.Object, replaced: properties.SinewReplacedModifier
+) -> bpy.types.ArmatureModifier | None:
+    """The Armature modifier that was replaced, however it was moved and renamed; else one of its name."""
+    armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
+    same = (m for m in armatures if m.persistent_uid == replaced.uid)
+    return next(same, None) or next((m for m in armatures if m.name == replaced.name), None)
 
 
 def _deforms(modifier: bpy.types.Modifier) -> bool:

@@ -50,6 +50,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
     """Raises SinewError where what stands in front can not be evaluated apart."""
     if wanted.uses_builtin:
         attach.switch(obj, on=False)
+        attach.move_out_of_chain(obj)
         attach.adopt_pointers(obj)
         if wanted.state is State.OFF:
             point_store.remove_point_attributes(obj)
@@ -65,7 +66,9 @@ def has_lost_modifier(obj: bpy.types.Object) -> bool:
     """Whether Sinew's modifier, or the one that deforms the mesh meanwhile, is gone."""
     if obj.data.is_editmode:
         return False
-    uses_builtin = not properties.of(obj).replaces_modifiers
+    settings = properties.of(obj)
+    # One that was switched off because its Armature modifier is gone stays, with the sentence that says so.
+    uses_builtin = not (settings.replaces_modifiers or settings.error)
     return stack.sinew_modifier(obj) is None or (uses_builtin and stack.armature_modifier(obj) is None)
 
 

@@ -351,12 +351,7 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
         if _follow_removal(obj, changes):
             return
         if not properties.of(obj).enabled:
-            state = state_of(obj)
-            if state is not None:
-                state.plan, state.needs_apply = Plan(State.OFF), True
-            if properties.of(obj).replaces_modifiers and obj.is_editable and not is_rendering_in_window():
-                # It was switched off while a window rendered.
-                apply_plan.apply(obj, apply_plan.plan_of(obj))
+            _keep_off(obj, changes)
         else:
             state = update(obj, state_of(obj), depsgraph, changes)
             if state is None:
@@ -370,11 +365,24 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
         _switch_off(obj, properties.of(obj), error)
 
 
+def _keep_off(obj: bpy.types.Object, changes: Changes) -> None:
+    """An object that is switched off."""
+    state = state_of(obj)
+    if state is not None:
+        state.plan, state.needs_apply = Plan(State.OFF), True
+    if not obj.is_editable or is_rendering_in_window():
+        return
+    if properties.of(obj).replaces_modifiers:
+        # It was switched off while a window rendered.
+        apply_plan.apply(obj, apply_plan.plan_of(obj))
+    elif _is_named(obj, changes):
+        attach.move_out_of_chain(obj)
+
+
 def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
     """Whether the object has lost Sinew's modifier; then it has no Sinew from now on."""
     state = state_of(obj)
-    is_named = changes.structure or obj.session_uid in changes.objects or not changes.complete
-    if not is_named and (state is None or state.is_attached(obj)):
+    if not _is_named(obj, changes) and (state is None or state.is_attached(obj)):
         return False
     if not obj.is_editable or is_rendering_in_window():
         return False
@@ -386,6 +394,11 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
     current.skinned.pop(obj.session_uid, None)
     current.objects = None
     return True
+
+
+def _is_named(obj: bpy.types.Object, changes: Changes) -> bool:
+    """Whether the object's modifiers may be others since."""
+    return changes.structure or obj.session_uid in changes.objects or not changes.complete
 
 
 def _switch_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: Exception) -> None:

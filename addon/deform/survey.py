@@ -17,16 +17,19 @@ from . import group_uses
 
 def describe(
     obj: bpy.types.Object,
-    armature: bpy.types.Object,
+    armature: bpy.types.Object | None,
     weighting: Weighting,
     points: np.ndarray,
     depsgraph: bpy.types.Depsgraph,
 ) -> RigFacts:
     """Counts, and warnings of what is missing in the rig or not reproduced.
 
-    points  [vertices, 3], rest points in object space
+    armature  of its first Armature modifier; None where it was deleted, and others deform the mesh
+    points    [vertices, 3], rest points in object space
     """
-    space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+    space = None
+    if armature is not None:
+        space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     if space is not None and weighting.depends_on_points:
         points = transformed(points, space)
     boneless = weighting.bones.without_one([group.name for group in obj.vertex_groups])

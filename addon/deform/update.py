@@ -64,7 +64,7 @@ def update(
     # without what animation had set.
     is_same = not skinned.bound.is_of_another_stack(known) and skinned.bound.source.equals(known.source)
     if skinned.plan.state is State.IN_DEPSGRAPH:
-        _request_points(obj, skinned, is_new_plan=plan != before, is_same=is_same)
+        _request_points(obj, skinned, changes, is_new_plan=plan != before, is_same=is_same)
     elif skinned.plan.state is State.AFTER_UPDATE:
         is_first = before is None or before.state is not State.AFTER_UPDATE
         with skinned.lock:
@@ -213,14 +213,18 @@ def _bind(
     return skinned
 
 
-def _request_points(obj: bpy.types.Object, skinned: SkinnedObject, is_new_plan: bool, is_same: bool) -> None:
+def _request_points(
+    obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes, is_new_plan: bool, is_same: bool
+) -> None:
     """Has Blender evaluate the object once more, and so request its points, where they may differ."""
     skinned.dirtied_by_frames = False
     if skinned.plan.in_buffer:
         point_store.set_rest_points(obj, skinned.bound.source.points, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
-        obj.update_tag(refresh={"OBJECT"})
+        # The object is copied anew then: what the change of frame has set is set again, as else a render of
+        # what is hidden has it from nowhere.
+        obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
 
 
 def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject) -> None:

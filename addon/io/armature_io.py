@@ -52,6 +52,8 @@ def paths_to_wait_for(armature: bpy.types.Object, names: Sequence[str]) -> list[
     """Properties of an armature object that Blender reads, for a driver, no sooner than it has posed all of
     `names`, with the joints of bendy ones and the bones that shape these."""
     bones = armature.data.bones
+    # In edit mode bones can be gone that are still in `names`.
+    names = [name for name in names if name in bones]
     bendy = [name for name in names if bones[name].bbone_segments > 1]
     wanted = dict.fromkeys([*names, *_handles_of(armature, bendy)])
     above = set()

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 import bpy
 import numpy as np
@@ -92,3 +93,40 @@ def arm(tmp_path):
     path.parent.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return obj, path
+
+
+class KeepingEngine(bpy.types.RenderEngine):
+    """Draws nothing, and keeps what it is given of each mesh."""
+
+    bl_idname = "SINEW_KEEPING"
+    bl_label = "Keeping"
+    shapes: ClassVar[dict[str, np.ndarray]] = {}
+
+    def render(self, depsgraph):
+        for obj in depsgraph.objects:
+            if obj.type == "MESH":
+                points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+                obj.data.vertices.foreach_get("co", points.ravel())
+                self.shapes[obj.name] = points
+        self.end_result(self.begin_result(0, 0, 4, 4))
+
+
+@pytest.fixture
+def rendered_points():
+    """rendered_points(object): float32 [vertices, 3], what a render is given of it at this frame."""
+    bpy.utils.register_class(KeepingEngine)
+
+    def render(obj: bpy.types.Object) -> np.ndarray:
+        scene = bpy.context.scene
+        if scene.camera is None:
+            scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+            scene.collection.objects.link(scene.camera)
+        scene.render.engine = KeepingEngine.bl_idname
+        scene.render.resolution_x = scene.render.resolution_y = 4
+        KeepingEngine.shapes.clear()
+        bpy.ops.render.render()
+        return KeepingEngine.shapes[obj.name]
+
+    yield render
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    bpy.utils.unregister_class(KeepingEngine)

@@ -6,11 +6,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+import routes
 import scenes
 import sinew_addon
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import apply_plan, evaluate, safe_mode, session
-from sinew_addon.io import mesh_io
+from sinew_addon.io import animation_paths, mesh_io
 from test_editing import assert_follows
 
 
@@ -364,3 +365,116 @@ def test_a_heat_map_of_a_mesh_that_two_objects_have():
     properties.of(obj).heat = True
     bpy.context.view_layer.update()
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("heat", [False, True])
+def test_the_first_of_two_armatures_is_deleted(heat):
+    obj, armature = scenes.make_arm()
+    _other, other_armature = scenes.make_arm(name="Other")
+    obj.modifiers.new("Second", "ARMATURE").object = other_armature
+    scenes.add_sinew(obj)
+    properties.of(obj).heat = heat
+    bpy.data.objects.remove(armature)
+    bpy.context.view_layer.update()
+    assert properties.of(obj).error == ""
+    assert_follows(obj)
+
+
+def test_a_bone_is_deleted_while_its_armature_is_in_edit_mode():
+    obj, armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones.remove(armature.data.edit_bones[2])
+    armature.update_from_editmode()
+    obj.vertex_groups.new(name="another")
+    obj.update_tag()
+    bpy.context.view_layer.update()
+    assert properties.of(obj).error == ""
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_follows(obj)
+
+
+@pytest.mark.parametrize("then", ["on", "off", "removed"])
+def test_keys_of_visibility_go_and_leave_the_modifier_as_they_set_it(then):
+    obj, _armature = scenes.make_arm()
+    modifier = obj.modifiers["Armature"]
+    for frame, shown in ((1, False), (5, True)):
+        modifier.show_viewport = shown
+        modifier.keyframe_insert("show_viewport", frame=frame)
+    bpy.context.scene.frame_set(11)
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(4)
+    obj.animation_data_clear()
+    if then == "off":
+        properties.of(obj).enabled = False
+    elif then == "removed":
+        attach.remove(obj)
+    bpy.context.scene.frame_set(6)
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
+    if then != "on":
+        assert not modifier.show_viewport
+
+
+def test_keys_of_visibility_of_a_hidden_object_begin_with_what_the_artist_had():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    obj.hide_viewport = True
+    bpy.context.view_layer.update()
+    obj.modifiers["Armature"].keyframe_insert("show_viewport", frame=3)
+    bpy.context.scene.frame_set(4)
+    properties.of(obj).enabled = False
+    obj.animation_data_clear()
+    assert obj.modifiers["Armature"].show_viewport
+
+
+def test_what_is_said_of_a_deleted_modifier_stays():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    obj.modifiers.remove(obj.modifiers["Armature"])
+    for frame in (3, 4):
+        bpy.context.scene.frame_set(frame)
+        obj.update_tag()
+        bpy.context.view_layer.update()
+        assert "Armature modifier was deleted" in properties.of(obj).error
+
+
+def test_a_render_of_a_hidden_mesh_has_its_weights_and_its_keyed_method(rendered_points):
+    obj, _armature = scenes.make_arm()
+    settings = properties.of(obj)
+    scenes.add_sinew(obj, "dq")
+    for frame in (5, 11):
+        settings.keyframe_insert("method", frame=frame)
+    settings.method = "lbs"
+    obj.hide_viewport = True
+    bpy.context.view_layer.update()
+    obj.vertex_groups[1].add(list(range(60, 140)), 0.3, "REPLACE")
+    bpy.context.scene.frame_set(9)
+    got = rendered_points(obj)
+    obj.animation_data_clear()
+    settings.method = "dq"
+    assert scenes.worst(got, rendered_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    settings.method = "lbs"
+    assert scenes.worst(got, rendered_points(obj)) > 0.01
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_visibility_that_is_keyed_while_sinew_is_on(route):
+    obj, armature = scenes.make_arm()
+    scenes.forget_keys(armature)
+    scenes.add_sinew(obj)
+    routes.force(route)
+    try:
+        modifier = obj.modifiers["Armature"]
+        for path in ("show_viewport", "show_render"):
+            for frame in (2, 3):
+                modifier.keyframe_insert(path, frame=frame)
+        for curve in animation_paths.curves_of(obj):
+            if ".show_" in curve.data_path:
+                curve.keyframe_points[1].co.y = 1.0
+        bpy.context.scene.frame_set(1)
+        scenes.bend(armature, 90.0)
+        bpy.context.view_layer.update()
+        assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
+    finally:
+        safe_mode.set_forced(None)

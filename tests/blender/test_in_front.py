@@ -57,6 +57,9 @@ def test_a_multi_modifier_behind_a_deforming_parent_is_refused():
     bpy.context.view_layer.update()
     assert "its parent deforms it" in properties.of(obj).error
     assert obj.modifiers["Armature"].show_viewport
+    got = scenes.final_points(obj)
+    attach.remove(obj)
+    assert scenes.worst(got, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 def test_mirrored_groups_take_the_other_side():

@@ -207,3 +207,46 @@ def test_one_moved_in_front_and_back_while_visibility_is_keyed():
         bpy.context.view_layer.update()
     assert [m.name for m in obj.modifiers] == ["Armature", "Sinew", "Solidify"]
     assert scenes.worst(scenes.shapes(obj, [11]), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("on", [False, True])
+def test_moved_and_renamed_before_anybody_sees_it(on):
+    """As a script does both, or an artist while Sinew is off."""
+    obj = make_chained(False, True)
+    obj.modifiers.new("Cast", "CAST").factor = 0.2
+    scenes.add_sinew(obj)
+    properties.of(obj).enabled = on
+    obj.modifiers.move(names(obj).index("Cast"), 1)
+    obj.modifiers["Armature"].name = "Third"
+    obj.modifiers["Second"].name = "Armature"
+    bpy.context.view_layer.update()
+    got = scenes.shapes(obj, FRAMES)
+    assert [replaced.name for replaced in properties.of(obj).replaced_modifiers] == (
+        ["Third", "Armature"] if on else ["Armature", "Second"]
+    )
+    properties.of(obj).enabled = True
+    assert [replaced.name for replaced in properties.of(obj).replaced_modifiers] == ["Third", "Armature"]
+    again = scenes.shapes(obj, FRAMES)
+    assert properties.of(obj).error == ""
+    attach.remove(obj)
+    session.refresh(bpy.context)
+    for shapes in (got, again):
+        assert scenes.worst(shapes, scenes.shapes(obj, FRAMES)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_a_multi_modifier_is_chained_while_sinew_is_off():
+    obj = make_chained(False, False)
+    obj.modifiers["Armature"].use_multi_modifier = True
+    put(obj, "Second", "Armature")
+    chained = scenes.shapes(obj, FRAMES)
+    put(obj, "Armature", "Second")
+    armature = obj.modifiers["Second"].object
+    obj.modifiers.remove(obj.modifiers["Second"])
+    scenes.add_sinew(obj)
+    properties.of(obj).enabled = False
+    obj.modifiers.new("Second", "ARMATURE").object = armature
+    obj.modifiers.move(names(obj).index("Second"), 0)
+    bpy.context.view_layer.update()
+    got = scenes.shapes(obj, FRAMES)
+    assert names(obj) == ["Second", "Armature", "Sinew"]
+    assert scenes.worst(got, chained) <= scenes.TOLERANCE * scenes.diagonal(obj)

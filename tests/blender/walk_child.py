@@ -81,6 +81,9 @@ class Child:
         # Sinew's side says how it is set before this operation and after it.
         self.claims = request.get("claims_before") or {}
         self.wrong = []
+        if not self.side.is_sinew:
+            # Which objects an operation can choose depends on it.
+            self.side.adopt(self.claims)
         numbers = random.Random(seed)
         operation = self.operations.OPERATIONS[name]
         self.walker.rendered = {}
@@ -194,8 +197,10 @@ class Child:
                 return True
         if not side.is_on(obj):
             return False
-        if side.method(obj) == "qv":
-            return True
+        return side.method(obj) == "qv" or self.has_other_scale(obj)
+
+    def has_other_scale(self, obj) -> bool:
+        """Whether Sinew makes something else of scaled bones than the modifier does."""
         rule = (self.claims.get(obj.name_full) or {"rule": ""})["rule"]
         scaled = any(
             tuple(round(s, 5) for s in bone.scale) != (1, 1, 1)
@@ -223,6 +228,7 @@ class Child:
                 any(".show_" in path for path in animated)
                 or len(modifiers) != 1
                 or method == "qv"
+                or (method != "blender" and self.has_other_scale(obj))
                 or obj.data.is_editmode
                 or not obj.visible_get()
             ):

@@ -160,6 +160,9 @@ class Walker:
 
     def push_undo(self) -> None:
         if self.unpushed:
+            # Where data was made or deleted, as Sinew does for itself, a step of edit mode comes with one of
+            # the whole file.
+            bpy.data.texts.remove(bpy.data.texts.new("walk"))
             bpy.ops.ed.undo_push(message="step")
         self.unpushed = False
 
@@ -372,6 +375,8 @@ def scale_rule(w: Walker, r: random.Random) -> str | None:
     if w.side.is_sinew:
         rules = [item.identifier for item in obj.sinew.bl_rna.properties["scale_rule"].enum_items]
         obj.sinew.scale_rule = rules[number]
+    else:
+        w.side.set_option(obj, "scale_rule", number)
     return f"{obj.name}: scale rule {number}"
 
 
@@ -395,7 +400,15 @@ def heat(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def compare(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: bool(armature_modifiers(o)) and o.override_library is None)
+    obj = w.mesh(
+        r,
+        lambda o: (
+            bool(armature_modifiers(o))
+            and o.override_library is None
+            # Which Sinew refuses.
+            and not (o.parent_type == "ARMATURE" and armature_modifiers(o)[0].use_multi_modifier)
+        ),
+    )
     methods = r.sample((*METHODS, "blender"), r.randint(1, 2))
     if obj is None or not obj.visible_get():
         return None
@@ -660,6 +673,8 @@ def parent(w: Walker, r: random.Random) -> str | None:
     obj.parent = None if kind == "none" else rig
     if kind == "none":
         obj.parent_type = "OBJECT"
+        # Blender by itself goes on with the shape that a parent of type Armature made.
+        obj.update_tag()
         return f"{obj.name} without a parent"
     obj.parent_type = kind
     if kind == "BONE":
@@ -1452,6 +1467,8 @@ def scene(w: Walker, r: random.Random) -> str | None:
     if r.random() < 0.3:
         other.frame_set(r.randint(*FRAMES))
         return f"frame {other.frame_current} in scene {other.name}"
+    w.before_evaluation()
+    bpy.context.view_layer.update()
     bpy.context.window.scene = other
     return f"scene {other.name}"
 
@@ -1463,6 +1480,9 @@ def view_layer(w: Walker, r: random.Random) -> str | None:
     if len(layers) == 1:
         layers.new("Second")
     other = next(layer for layer in layers if layer != bpy.context.view_layer)
+    # As a window does: of the first evaluation of a view layer Blender tells nobody.
+    w.before_evaluation()
+    bpy.context.view_layer.update()
     bpy.context.window.view_layer = other
     return f"view layer {other.name}"
 
@@ -1505,6 +1525,14 @@ def save_copy(w: Walker, r: random.Random) -> str | None:
     return "save a copy"
 
 
+def _read_keys_of_hidden() -> None:
+    """Sinew has Blender read all keys with the first evaluation of a file. What is hidden and comes into a
+    later one has those values then, and without Sinew what the file was saved with."""
+    for obj in bpy.data.objects:
+        if obj.animation_data is not None:
+            obj.update_tag(refresh={"TIME"})
+
+
 @operation(1)
 def save_and_load(w: Walker, r: random.Random) -> str | None:
     w.object_mode()
@@ -1512,6 +1540,7 @@ def save_and_load(w: Walker, r: random.Random) -> str | None:
     path = str(w.folder / "walk.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
+    _read_keys_of_hidden()
     return "save and open"
 
 
@@ -1520,6 +1549,7 @@ def revert(w: Walker, r: random.Random) -> str | None:
     if Path(bpy.data.filepath).name != "walk.blend":
         return None
     bpy.ops.wm.revert_mainfile()
+    _read_keys_of_hidden()
     return "revert"
 
 

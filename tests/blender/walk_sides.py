@@ -15,7 +15,8 @@ import bpy
 
 METHODS = ("lbs", "dq", "qv")
 # Bits of the pass index. ADOPTED: what Sinew makes of it, and when, is its own choice, until it is put on.
-DRIVEN, ON, DQ, QV, KEYED, ADOPTED = 1, 2, 4, 8, 16, 32
+# CHANGED: other settings differ from before, as Blender's undo looks whether anything does.
+DRIVEN, ON, DQ, QV, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16, 32, 64
 OBJECT_MODES_OF_THE_MODIFIER = {"EDIT", "SCULPT"}
 
 
@@ -151,9 +152,10 @@ class BlenderSide:
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         """One that changes no shape."""
+        obj.pass_index ^= CHANGED
 
     def set_heat(self, obj: bpy.types.Object, on: bool, quantity: str) -> None:
-        pass
+        self.set_option(obj, "heat", on)
 
     def set_safe(self, on: bool) -> None:
         pass
@@ -197,9 +199,15 @@ class BlenderSide:
         obj.pass_index = 0
 
     def apply(self, obj: bpy.types.Object) -> None:
+        # Where it is off in the viewport, it is the Armature modifier that is applied with Sinew, too: Sinew
+        # says that it is gone.
+        is_shown = all(modifier.show_viewport for modifier in armature_modifiers(obj))
         for modifier in armature_modifiers(obj):
             bpy.ops.object.modifier_apply(modifier=modifier.name)
-        obj.pass_index = 0
+        if is_shown:
+            obj.pass_index = 0
+        else:
+            self._set(obj, ADOPTED, True)
 
     def bring_in_line(self, claims: dict[str, dict]) -> list[str]:
         """Makes the modifiers blend as Sinew's side says it is set; a line for each object where what Sinew
@@ -228,8 +236,16 @@ class BlenderSide:
                     modifier.use_deform_preserve_volume = wanted
         return wrong
 
+    def adopt(self, claims: dict[str, dict]) -> None:
+        """Sets what is Sinew's own choice as Sinew's side says."""
+        for obj in bpy.data.objects:
+            if obj.type == "MESH" and obj.library is None and obj.pass_index & ADOPTED:
+                self._adopt(obj, claims.get(obj.name_full))
+
     def _adopt(self, obj: bpy.types.Object, claim: dict | None) -> list[str]:
         if obj.pass_index & ADOPTED:
+            if claim is None and self.is_method_keyed(obj):
+                self.unkey_method(obj, self.method(obj))
             self._set(obj, DRIVEN, claim is not None)
             self._set(obj, ON, claim is not None and claim["on"])
             if claim is not None:

@@ -154,6 +154,9 @@ def _space(part: Part, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     if frame is not None:
         return frame.bones_from_model
     armature = properties.of(part.obj).armature
+    if armature is None:
+        # Deleted: others deform the mesh.
+        return np.identity(4)
     space = armature_io.bones_from_model(part.obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     return np.identity(4) if space is None else space
 
@@ -215,7 +218,10 @@ def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
     return FrameOfRig(subject.rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
 
-def _world(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+def _world(obj: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+    """The identity for an armature that was deleted: its bones are none."""
+    if obj is None:
+        return np.identity(4)
     return np.array(obj.evaluated_get(depsgraph).matrix_world, dtype=np.float64)
 
 
