@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender in a process of its own that does one task after the other, watched from here.
+"""A Blender in a process of its own that does one task after the other, supervised by this process.
 
-Starting Blender takes 0.5 to 2 s, opening a file 10 ms and more: so a process is kept for the next file,
-which replaces all of the last one. One that crashes, hangs or grows too large is ended, and the next file
-gets a fresh one.
+Starting Blender takes 0.5 to 2 s, opening a file 10 ms and more: so a process is reused for the next file,
+which replaces the last one. A process that crashes, hangs or grows too large is ended, and the next file gets
+a new one.
 """
 
 from __future__ import annotations
@@ -24,19 +24,20 @@ from dataclasses import dataclass
 from .core.errors import SinewError
 from .core.scratch import ScratchFolder
 
-# A file in the folder of a Blender that says what it is doing: an object of JSON, and blanks.
+# The name of the file in which a Blender reports what it is doing: a JSON object, padded with blanks.
 DOING = "doing"
-# Environment variable: the processors to start on, where they are told.
+# Environment variable: the numbers of the processors to start on, if it is set.
 PROCESSORS = "SINEW_PROCESSORS"
 START_LIMIT = 180.0
-# How often a busy process is looked at.
+# Seconds between two checks of a busy process.
 INTERVAL = 0.1
-# What worker.py says first.
+# The first message of worker.py.
 GREETINGS = (b'{"ready"', b'{"refused"')
 
 
 class BlenderLost(Exception):  # noqa: N818
-    """The process ended, or had to be ended, before the file was done: why, as the end of a sentence."""
+    """The process ended, or had to be ended, before the file was done. The message is the end of a
+    sentence."""
 
 
 class Stopped(Exception):  # noqa: N818
@@ -45,11 +46,11 @@ class Stopped(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class Limits:
-    """What one file may take.
+    """Limits for one file.
 
-    timeout  seconds; 0: any time
-    memory   bytes; 0: all there is
-    threads  of Blender at a time, where the system can tell it; 0: as many as there are processors
+    timeout  seconds; 0: no limit
+    memory   bytes; 0: no limit
+    threads  of Blender, where the system can set them; 0: one for each processor
     verbose  show what Blender prints
     """
 
@@ -60,13 +61,13 @@ class Limits:
 
 
 class BlenderProcess:
-    """One Blender, for one thread at a time: of this Python, or another of the one that this is inside of.
+    """One Blender, for one thread at a time: bpy in this Python, or the Blender program that runs this code.
 
-    wait  until it is there; raises SinewError where it can not be started. Otherwise its first task does
+    wait  until it has started; raises SinewError where it can not be started. Without it, run() does so
     """
 
     def __init__(self, limits: Limits, wait: bool = True) -> None:
-        # Blender keeps a folder there that it leaves behind when it is ended.
+        # Blender's own temporary folder goes in here: it remains when Blender is ended by force.
         self._folder = ScratchFolder()
         own = str(self._folder.path)
         try:
@@ -82,83 +83,84 @@ class BlenderProcess:
         except OSError as error:
             self._folder.remove()
             raise SinewError(f"no Blender can be started: {error.strerror or error}") from None
-        self._is_there = False
-        # Of what it is busy with, if it is; why it had to be ended.
+        self._has_started = False
+        # The limits of the current task, if there is one; the limit that was exceeded.
         self._limits: Limits | None = None
         self._since = 0.0
         self._excess: str | None = None
-        # Bytes, when it was looked at last.
+        # Bytes of memory at the last check.
         self._size = 0
         self._lock = threading.Lock()
         self._ended = threading.Event()
         threading.Thread(target=self._watch, daemon=True).start()
         self._begin(Limits(START_LIMIT))
         if wait:
-            self._greet()
+            self._await_start()
 
     def run(self, task: dict, limits: Limits) -> dict:
-        """What became of the file. Raises BlenderLost; the process is of no more use then."""
-        if not self._is_there:
-            self._greet()
+        """The outcome of the task. Raises BlenderLost; the process can not be used any more then."""
+        if not self._has_started:
+            self._await_start()
         self._begin(limits)
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
         except OSError:
-            raise BlenderLost(self._epitaph()) from None
-        return self._answer()
+            raise BlenderLost(self._cause_of_end()) from None
+        return self._read_reply()
 
     def follow(self, task: dict, limits: Limits) -> Iterator[dict]:
-        """What it says of what it is doing, every INTERVAL s, and at last what run() gives. Raises as that;
-        closed before, it ends the process."""
+        """Its reports on the task, every INTERVAL s, and at last the outcome. Raises as run() does; closing
+        the iterator before the outcome ends the process."""
         aside = futures.ThreadPoolExecutor(1)
         outcome = aside.submit(self.run, task, limits)
         aside.shutdown(wait=False)
         try:
             while not futures.wait([outcome], INTERVAL).done:
-                yield self._said()
+                yield self._progress_report()
         finally:
             if not outcome.done():
                 self.end()
         yield outcome.result()
 
     def is_spent(self, limits: Limits) -> bool:
-        """Whether the next file had better have a fresh process: what Blender does not give back adds up."""
+        """Whether the next file should get a new process: memory that Blender does not free adds up."""
         return self._excess is not None or 0 < limits.memory / 2 < self._size
 
     def end(self) -> None:
-        """Ends the process by force: an idle one has nothing to lose, and takes 0.2 s to end by itself."""
+        """Ends the process by force: it has no unsaved work, and would take 0.2 s to end by itself."""
         self._process.kill()
-        self._bury()
+        self._clean_up()
 
     def _begin(self, limits: Limits) -> None:
         with self._lock:
             self._limits, self._since = limits, time.monotonic()
 
-    def _greet(self) -> None:
-        answer = self._answer()
-        self._is_there = True
-        if "refused" in answer:
+    def _await_start(self) -> None:
+        reply = self._read_reply()
+        self._has_started = True
+        if "refused" in reply:
             self.end()
-            raise SinewError(answer["refused"])
+            raise SinewError(reply["refused"])
 
-    def _answer(self) -> dict:
+    def _read_reply(self) -> dict:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
-        # Before the worker is there, Blender and what it runs at its start print what they like.
-        while line and not self._is_there and not line.startswith(GREETINGS):
+        # Before the worker starts, Blender and its startup scripts can print anything.
+        while line and not self._has_started and not line.startswith(GREETINGS):
             line = self._process.stdout.readline()
         with self._lock:
             self._limits = None
         if not line.endswith(b"\n"):
-            raise BlenderLost(self._epitaph())
+            raise BlenderLost(self._cause_of_end())
         return json.loads(line)
 
     def _watch(self) -> None:
-        """Ends the process where a file takes more than it may."""
+        """Ends the process where a file exceeds a limit."""
         while not self._ended.wait(INTERVAL):
-            # Either this or the file's end comes first: what was done in time is not lost.
+            # The lock decides whether the limit or the end of the file came first: a file done in time is
+            # kept.
             with self._lock:
                 if self._limits is not None:
                     self._excess = self._found_excess(self._limits)
@@ -175,26 +177,26 @@ class BlenderProcess:
             return f"needed more than {limits.memory / 2**20:,.0f} MiB of memory while {self._doing()}"
         return None
 
-    def _epitaph(self) -> str:
+    def _cause_of_end(self) -> str:
         status = self._process.wait()
         try:
             how = signal.Signals(-status).name
         except ValueError:
             how = f"status {status}"
         doing = self._doing()
-        self._bury()
+        self._clean_up()
         return self._excess or f"Blender crashed ({how}) while {doing}"
 
-    def _bury(self) -> None:
+    def _clean_up(self) -> None:
         self._process.wait()
         self._ended.set()
         self._folder.remove()
 
     def _doing(self) -> str:
-        return self._said().get("doing", "starting")
+        return self._progress_report().get("doing", "starting")
 
-    def _said(self) -> dict:
-        """Its task as "doing", and how far it is; nothing before its first word."""
+    def _progress_report(self) -> dict:
+        """What it is doing, as "doing", and its progress; empty before its first report."""
         with contextlib.suppress(OSError, ValueError):
             return json.loads((self._folder.path / DOING).read_bytes())
         return {}
@@ -215,25 +217,26 @@ def _command() -> list[str]:
     bpy, package = sys.modules.get("bpy"), __package__
     if bpy is None or not bpy.app.binary_path:
         return [sys.executable, "-m", f"{package}.worker"]
-    as_here = ["--factory-startup"] if bpy.app.factory_startup else []
-    # The user's preferences as saved need not have it on.
+    factory = ["--factory-startup"] if bpy.app.factory_startup else []
+    # The extension need not be enabled in the saved preferences.
     with_sinew = ["--addons", package, "--python-expr", f"from {package}.worker import main; main()"]
-    return [bpy.app.binary_path, "--background", *as_here, "--python-exit-code", "1", *with_sinew]
+    return [bpy.app.binary_path, "--background", *factory, "--python-exit-code", "1", *with_sinew]
 
 
 def _environment(limits: Limits) -> dict[str, str]:
-    """As of this process, with what `limits` says of threads."""
+    """The environment of this process, with the number of threads of `limits`."""
     if not limits.threads:
         return dict(os.environ)
-    # Mesa's OpenGL without graphics hardware has threads, too: 0 are faster than 1.
+    # Mesa's software OpenGL has threads, too: 0 of them are faster than 1.
     drawing = {"LP_NUM_THREADS": str(limits.threads if limits.threads > 1 else 0)}
     return {**drawing, **os.environ, PROCESSORS: " ".join(map(str, _first_processors(limits)))}
 
 
 def _first_processors(limits: Limits) -> list[int]:
-    """Those to start a Blender on, each on others: it makes a thread for each that it may use then."""
+    """The processors to start a Blender on, different ones for each: it makes a thread for each of them."""
     if not hasattr(os, "sched_getaffinity"):
         return []
-    there = sorted(os.sched_getaffinity(0))
+    processors = sorted(os.sched_getaffinity(0))
     first = limits.threads * next(_started)
-    return [there[(first + index) % len(there)] for index in range(min(limits.threads, len(there)))]
+    count = len(processors)
+    return [processors[(first + index) % count] for index in range(min(limits.threads, count))]

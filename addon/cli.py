@@ -19,14 +19,14 @@ from .prepare import leave_blender, prepare_blender
 if TYPE_CHECKING:
     from .commands.console import Console
 
-# The batches have Blenders of their own, or ask for this one; a report without Blender has no pictures.
+# Batches start Blenders of their own, or prepare this one later; a report without Blender has no pictures.
 WITHOUT_BLENDER = ("methods", "check", "report", "reskin", "restore")
 
 _commands: list[object] = []
 
 
 class Command(Protocol):
-    """What a module of commands/ has."""
+    """The functions that a module of commands/ defines."""
 
     def add_parser(self, subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser: ...
 
@@ -86,16 +86,16 @@ def main(argv: list[str]) -> int:
             output = console.take_over_output()
         if args.command not in WITHOUT_BLENDER:
             prepare_blender()
-        with interrupt.heard():
+        with interrupt.deferred():
             return modules[args.command].run(args, output)
     except SystemExit as stop:
-        # Of the parser: inside Blender an exit would skip its own ending.
+        # Raised by the parser: within Blender, an exit would skip Blender's own cleanup.
         return stop.code if isinstance(stop.code, int) else 2
     except SinewError as error:
         output.complain(error)
         return 2 if isinstance(error, WrongUse) else 1
     except OSError as error:
-        # Whatever a path or a disk can be that nobody has thought of.
+        # Errors of paths and disks that no command expects.
         output.complain(output_sentence(error))
         return 1
     except KeyboardInterrupt as stop:
@@ -108,7 +108,7 @@ def main(argv: list[str]) -> int:
 
 
 def _with_signed_frames(argv: list[str]) -> list[str]:
-    """Frames such as -5-3 belong to --frames: by themselves argparse takes them for an option."""
+    """Joins frames such as -5-3 with --frames: argparse takes them for an option otherwise."""
     joined: list[str] = []
     for argument in argv:
         if joined and joined[-1] in ("--frames", "--frame") and re.fullmatch(r"-[\d.][\d.,\s-]*", argument):
@@ -131,7 +131,8 @@ def register_command() -> None:
     import bpy
 
     _commands.append(bpy.utils.register_cli_command("sinew", main))
-    # As in blender/registration.py: left registered at the end of a process with bpy as a module, it crashes.
+    # As in blender/registration.py: a command still registered at the end of a process with bpy as a module
+    # crashes it.
     atexit.register(unregister_command)
 
 

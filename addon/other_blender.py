@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Asks another Blender, as its user has set it up, whether Sinew is there."""
+"""Finds out whether another Blender, with its user's preferences, has Sinew."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from .core.errors import SinewError
 
-MARK = "SINEW-ANSWER "
-# Runs there, where nothing of ours need be: with its own preferences, in the background.
-_QUESTION = f"""
+MARK = "SINEW-STATUS "
+# Runs in the other Blender, in the background, which need not have any of this package.
+_SCRIPT = f"""
 import importlib, json, pathlib, sys, tomllib
 import bpy
 
@@ -26,24 +26,29 @@ def manifest_of(name):
     except (OSError, ValueError):
         return {{}}
 
-answer = {{"blender": bpy.app.version_string, "sinew": None, "problem": "the extension is not enabled"}}
+status = {{"blender": bpy.app.version_string, "sinew": None, "problem": "the extension is not enabled"}}
 for name in bpy.context.preferences.addons.keys():
     manifest = manifest_of(name)
     if manifest.get("id") == "sinew":
-        answer["sinew"], answer["problem"] = manifest.get("version"), None
+        status["sinew"], status["problem"] = manifest.get("version"), None
         if not hasattr(bpy.types.Object, "sinew"):
-            answer["problem"] = importlib.import_module(name + ".native").load_error()
+            status["problem"] = importlib.import_module(name + ".native").load_error()
         break
     if name.rpartition(".")[2] == "sinew":
-        answer["problem"] = "the extension is enabled and does not load"
-print("\\n{MARK}" + json.dumps(answer), flush=True)
+        status["problem"] = "the extension is enabled and does not load"
+print("\\n{MARK}" + json.dumps(status), flush=True)
 """
 
 
 @dataclass(frozen=True)
-class Answer:
-    """blender: its version; sinew: that of the extension, None where there is none; problem: why it is of no
-    use there, as the end of a sentence, or None."""
+class BlenderStatus:
+    """Whether a Blender has Sinew.
+
+    program  as given
+    blender  its version
+    sinew    the extension's version, None without the extension
+    problem  why the extension can not be used there, as the end of a sentence, or None
+    """
 
     program: str
     blender: str
@@ -51,34 +56,35 @@ class Answer:
     problem: str | None
 
 
-def ask(program: str, limit: float) -> Answer:
-    """Starts `program` in the background and asks it; ends it after `limit` seconds, 0: never.
+def blender_status(program: str, limit: float) -> BlenderStatus:
+    """Starts `program` in the background and reads its status; ends it after `limit` seconds, 0: never.
 
-    Raises SinewError where it does not answer.
+    Raises SinewError where it reports none.
     """
-    command = [program, "--background", "--python-exit-code", "1", "--python-expr", _QUESTION]
+    command = [program, "--background", "--python-exit-code", "1", "--python-expr", _SCRIPT]
     try:
         process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            # Its own, to end it with all that it has started, as a script that starts Blender does.
+            # A session of its own, so that _end() ends all that it has started, as a script that starts
+            # Blender does.
             start_new_session=True,
         )
     except OSError as error:
         raise SinewError(f"--blender {program}: can not be started: {error.strerror or error}") from None
     try:
-        said, _nothing = process.communicate(timeout=limit or None)
+        output, _nothing = process.communicate(timeout=limit or None)
     except subprocess.TimeoutExpired:
         raise SinewError(f"--blender {program}: no answer after {limit:g} s") from None
     finally:
         _end(process)
-    lines = said.decode("utf-8", errors="replace").splitlines()
+    lines = output.decode("utf-8", errors="replace").splitlines()
     for line in reversed(lines):
         if line.startswith(MARK):
             with contextlib.suppress(ValueError, TypeError):
-                return Answer(program, **json.loads(line.removeprefix(MARK)))
+                return BlenderStatus(program, **json.loads(line.removeprefix(MARK)))
     how = f"status {process.returncode}"
     with contextlib.suppress(ValueError):
         how = signal.Signals(-process.returncode).name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes a plain Python with bpy ready for the commands, and ends it."""
+"""Prepares a plain Python with bpy for the commands, and ends its process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .core.errors import SinewError
 
 
 def prepare_blender() -> None:
-    """Makes Sinew's own properties known to Blender. Raises SinewError where there is no Blender."""
+    """Registers Sinew in Blender. Raises SinewError where this Python has no Blender."""
     try:
         import bpy
     except ImportError as error:
@@ -22,15 +22,15 @@ def prepare_blender() -> None:
     reason = native.load_error()
     if reason is not None:
         raise SinewError(reason)
-    # What commands compare, save and bake is Sinew's own.
+    # Commands compare, save and bake Sinew's own deformation, also of small meshes.
     small_meshes.is_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
 
 
 def leave_blender(status: int) -> NoReturn:
-    """Ends the process at once, all work done, without the ending of Blender as a module: having exported
-    glTF, 4.2 crashes there, and 4.5 can hang."""
+    """Ends the process without the cleanup of Blender as a module: after an export of glTF, 4.2 crashes in
+    it, and 4.5 can hang."""
     import bpy
 
     shutil.rmtree(bpy.app.tempdir, ignore_errors=True)

@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.getgroup("sinew").addoption(
         "--sinew-update",
         action="store_true",
-        help="draw golden pictures anew where sinew_render would compare with them",
+        help="make golden pictures again instead of comparing with them",
     )
 
 
@@ -63,7 +63,7 @@ def sinew_render(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[...
             arguments += ["--against", pictures, "--out", tmp_path / f"render-{next(calls)}"]
             if tolerance is not None:
                 arguments += ["--tolerance", tolerance]
-        # A process of its own: it opens files, and the test may have one open.
+        # In a process of its own: it opens files, and the test may have one open.
         result = subprocess.run(
             [sys.executable, "-c", PROGRAM, *map(str, arguments)],
             stdin=subprocess.DEVNULL,
@@ -84,6 +84,6 @@ def _as_arguments(options: dict[str, object]) -> list[object]:
         if value is True:
             arguments.append(f"--{name.replace('_', '-')}")
         elif value not in (None, False):
-            # In one: by itself, a name that begins with a dash would be an option.
+            # In one argument: a value that begins with a dash would be taken for an option.
             arguments.append(f"--{name.replace('_', '-')}={value}")
     return arguments

@@ -6,7 +6,7 @@ from setuptools.command.build_py import build_py
 
 
 class Modules(build_py):
-    """All but this file, which setuptools knows as the build's only where it is run as a program."""
+    """All modules but this file, which setuptools leaves out only where it is run as a program."""
 
     def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
         return [found for found in super().find_package_modules(package, package_dir) if found[1] != "setup"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blender behind blender_process.py: tasks come in as lines of JSON, outcomes go out."""
+"""Runs in the Blender of blender_process.py: reads tasks as lines of JSON, writes outcomes."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .core.errors import SinewError
 from .jobs.journal import content_hash
 
 Report = Callable[..., None]
-"""Told what is being done to the file, such as "opening it", and by keyword what else there is to know."""
+"""Called with what is being done to the file, such as "opening it", and with details by keyword."""
 
 
 def run(task: dict, report: Report) -> dict:
-    """Does one task in this process: what became of it, and the hash of what was read."""
+    """Does one task in this process; returns its outcome with the hash of the file that was read."""
     from .features.bake import bake_apart
     from .jobs.tasks import preflight, reskin
 
@@ -33,7 +33,7 @@ def run(task: dict, report: Report) -> dict:
         "check": preflight.check,
     }
     try:
-        # First: what is written to the file afterwards is then known to have changed it.
+        # Hashed first, so that a later change of the file is noticed.
         read = {"hash": content_hash(Path(task["source"]))}
         return actions[task["command"]](task, report) | read
     except SinewError as error:
@@ -44,14 +44,15 @@ def run(task: dict, report: Report) -> dict:
 
 
 def main() -> None:
-    # Blender prints to standard output whenever it likes, and what it runs may read standard input.
-    tasks, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
+    # Blender may print to standard output at any time, and scripts may read standard input: both are
+    # replaced.
+    tasks, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
     nowhere = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nowhere, 0)
     os.dup2(2, 1)
 
-    def answer(message: dict) -> None:
-        answers.write(json.dumps(message).encode() + b"\n")
+    def reply(message: dict) -> None:
+        replies.write(json.dumps(message).encode() + b"\n")
 
     _end_with_parent()
     try:
@@ -60,26 +61,26 @@ def main() -> None:
         with _only_on({int(number) for number in os.environ.get(PROCESSORS, "").split()}):
             prepare_blender()
     except SinewError as error:
-        answer({"refused": str(error)})
+        reply({"refused": str(error)})
         return
-    answer({"ready": True})
+    reply({"ready": True})
     with Path(tempfile.gettempdir(), DOING).open("wb", buffering=0) as doing:
 
         def report(what: str, **more: object) -> None:
-            with suppress(OSError):  # as where the disk is full
+            with suppress(OSError):  # a full disk, for example
                 doing.seek(0)
-                # At once, for it is read at any moment; blanks over what was there.
+                # In one write, because it can be read at any moment; blanks cover the last report.
                 doing.write(json.dumps({"doing": what, **more}).ljust(120).encode())
 
         for line in tasks:
             report("starting on it")
-            answer(run(json.loads(line), report))
+            reply(run(json.loads(line), report))
 
 
 @contextmanager
 def _only_on(processors: Collection[int]) -> Iterator[None]:
-    """A context in which this process has only those processors, if any are named: Blender makes threads for
-    those that it finds when it starts, and keeps to as many."""
+    """A context in which this process may use only those processors, if any are given: Blender makes a thread
+    for each processor that it finds when it starts."""
     if not processors:
         yield
         return
@@ -94,7 +95,8 @@ def _only_on(processors: Collection[int]) -> Iterator[None]:
 
 
 def _end_with_parent() -> None:
-    """A Blender that hangs would outlive a batch that was killed: where the system can, it goes along."""
+    """Has the system end this process with its parent, where it can: a Blender that hangs would otherwise
+    outlive a batch that is killed."""
     if sys.platform == "linux":
         import ctypes
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all measurements share: the machine's description, alternating candidates, JSON and tables."""
+"""Shared by all measurements: the machine's description, alternating candidates, JSON and tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from importlib import metadata
 from pathlib import Path
 
 RESULTS = Path(__file__).parent / "results"
-METHODS = ("lbs", "qv", "dq")
 
 
 def machine() -> dict:
@@ -37,25 +36,25 @@ def version_of(distribution: str) -> str | None:
 
 
 def spread(times: list[float]) -> dict:
-    """The least and the median; a neighbour's load falls on the median, hardly on the least."""
+    """The least and the median; the load of other programs changes the median, and hardly the least."""
     return {"least": min(times), "median": statistics.median(times), "runs": len(times)}
 
 
 def alternate(candidates: dict, seconds: float) -> dict:
-    """Calls each of {name: function} in turn, for `seconds` for each of them: {name: spread() of seconds a
-    call}. A turn is some calls long, as each finds in the caches what the one before it has left there."""
+    """Calls the functions of {name: function} alternately, for `seconds` each: {name: spread() of seconds a
+    call}. Each runs for some calls at a time: the first of these has to fill the caches again."""
     times = {name: [] for name in candidates}
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end:
         for name, call in candidates.items():
-            turn = time.perf_counter() + 0.01
+            round_end = time.perf_counter() + 0.01
             call()
             while True:
                 start = time.perf_counter()
                 call()
                 now = time.perf_counter()
                 times[name].append(now - start)
-                if now > turn:
+                if now > round_end:
                     break
     return {name: spread(of) for name, of in times.items()}
 

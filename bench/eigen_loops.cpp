@@ -39,14 +39,14 @@ void dq(const Mesh& mesh, const std::vector<glm::dualquat>& palette, glm::vec3* 
         Vector4f dual = Vector4f::Zero();
         for (int k = 0; k < 4; ++k) {
             const glm::dualquat& bone = palette[mesh.bones[v][k]];
-            const float side = first.dot(coefficients_of(bone.real)) < 0.0f ? -1.0f : 1.0f;
-            real += side * mesh.weights[v][k] * coefficients_of(bone.real);
-            dual += side * mesh.weights[v][k] * coefficients_of(bone.dual);
+            const float sign = first.dot(coefficients_of(bone.real)) < 0.0f ? -1.0f : 1.0f;
+            real += sign * mesh.weights[v][k] * coefficients_of(bone.real);
+            dual += sign * mesh.weights[v][k] * coefficients_of(bone.dual);
         }
         const float norm = real.norm();
         const Quaternionf q(Vector4f(real / norm));
-        const Quaternionf shift = Quaternionf(Vector4f(dual / norm)) * q.conjugate();
-        write(q * point_of(mesh.rest_points[v]) + 2.0f * shift.vec(), points[v]);
+        const Quaternionf translation = Quaternionf(Vector4f(dual / norm)) * q.conjugate();
+        write(q * point_of(mesh.rest_points[v]) + 2.0f * translation.vec(), points[v]);
     }
 }
 
@@ -58,8 +58,8 @@ void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations, const std::ve
         Vector3f translation = Vector3f::Zero();
         for (int k = 0; k < 4; ++k) {
             const Map<const Vector4f> bone = coefficients_of(rotations[mesh.bones[v][k]]);
-            const float side = first.dot(bone) < 0.0f ? -1.0f : 1.0f;
-            rotation += side * mesh.weights[v][k] * bone;
+            const float sign = first.dot(bone) < 0.0f ? -1.0f : 1.0f;
+            rotation += sign * mesh.weights[v][k] * bone;
             translation += mesh.weights[v][k] * point_of(translations[mesh.bones[v][k]]);
         }
         const Quaternionf q(rotation.normalized());

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kernels beside plain loops: a table of ratios, and JSON."""
+"""The times of the kernels and of plain loops: a table of ratios, and JSON."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import subprocess
 from pathlib import Path
 
@@ -22,7 +23,7 @@ def run(
 
     seconds  filled by the calls of a repetition
     """
-    # Interleaved, so that a neighbour's load falls on all candidates alike.
+    # Interleaved, so that the load of other programs affects all candidates alike.
     command = [
         program,
         "--benchmark_format=json",
@@ -41,10 +42,13 @@ def run(
 
 
 def rows(kind: str, size: int, times: dict) -> list[str]:
+    """A line for each method that the program measured; nan where a method has no plain loops."""
     lines = []
-    for method in common.METHODS:
-        of = {who: times[f"{who}/{method}/{kind}/{size}"] for who in (*LOOPS, "sinew1", "sinew2")}
-        glm, eigen, one, two = (spread["least"] / size for spread in of.values())
+    for method in dict.fromkeys(name.split("/")[1] for name in times if name.startswith("sinew1/")):
+        glm, eigen, one, two = (
+            times.get(f"{who}/{method}/{kind}/{size}", {"least": math.nan})["least"] / size
+            for who in (*LOOPS, "sinew1", "sinew2")
+        )
         lines.append(
             f"{kind:10}{size:>10,}  {method:5}{glm:8.2f}{eigen:8.2f}{one:8.2f}{two:8.2f}"
             f"{glm / one:9.1f} x{eigen / one:8.1f} x{one / two:8.2f} x"

@@ -12,6 +12,7 @@ import common
 import numpy as np
 import sinew
 
+METHODS = [method.name for method in sinew.methods()]
 BONES = 100
 INFLUENCES = 4
 
@@ -25,8 +26,8 @@ class Scene:
     def __init__(self, vertices: int) -> None:
         random = np.random.default_rng(1)
         along = np.arange(vertices) / vertices * BONES
-        turn = random.uniform(0, 2 * np.pi, vertices)
-        self.rest = np.stack([np.cos(turn), np.sin(turn), along], axis=1).astype(np.float32)
+        angle = random.uniform(0, 2 * np.pi, vertices)
+        self.rest = np.stack([np.cos(angle), np.sin(angle), along], axis=1).astype(np.float32)
         first = np.clip(np.floor(along) - 1, 0, BONES - INFLUENCES).astype(np.int32)
         self.bones = first[:, None] + np.arange(INFLUENCES, dtype=np.int32)
         away = self.bones + 0.5 - along[:, None]
@@ -64,8 +65,8 @@ def numpy_candidates(scene: Scene) -> dict:
 
     def signed(quats: np.ndarray) -> np.ndarray:
         of = quats[bones]
-        side = np.sign(np.einsum("vi,vki->vk", of[:, 0, :4], of[..., :4]))
-        return np.where(side < 0, -weights, weights)
+        sign = np.sign(np.einsum("vi,vki->vk", of[:, 0, :4], of[..., :4]))
+        return np.where(sign < 0, -weights, weights)
 
     def lbs() -> np.ndarray:
         blend = np.einsum("vk,vkij->vij", weights, scene.pose[bones, :3])
@@ -132,7 +133,7 @@ def sinew_candidates(scene: Scene) -> dict:
             "sinew": candidate(scene.deformer(method), 1),
             "sinew, threads": candidate(scene.deformer(method), None),
         }
-        for method in common.METHODS
+        for method in METHODS
     }
 
 
@@ -146,7 +147,7 @@ PEERS = {
 
 def collect(scene: Scene) -> tuple[dict, dict, dict]:
     """({method: {name: function}}, {distribution: version}, {distribution: why it is missing})."""
-    candidates = {method: {} for method in common.METHODS}
+    candidates = {method: {} for method in METHODS}
     versions, missing = {}, {}
     for distribution, make in PEERS.items():
         try:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What one writes first with GLM, one vertex after the other: the measure that the kernels are held to.
+// What one writes first with GLM, one vertex after the other: the baseline of the kernels.
 #define GLM_ENABLE_EXPERIMENTAL
 #include "plain_loops.h"
 
@@ -22,8 +22,8 @@ void dq(const Mesh& mesh, const std::vector<glm::dualquat>& palette, glm::vec3* 
         glm::dualquat blend = palette[bones.x] * weights.x;
         for (int k = 1; k < 4; ++k) {
             const glm::dualquat& bone = palette[bones[k]];
-            const float side = glm::dot(palette[bones.x].real, bone.real) < 0.0f ? -1.0f : 1.0f;
-            blend = blend + bone * (side * weights[k]);
+            const float sign = glm::dot(palette[bones.x].real, bone.real) < 0.0f ? -1.0f : 1.0f;
+            blend = blend + bone * (sign * weights[k]);
         }
         points[v] = glm::normalize(blend) * mesh.rest_points[v];
     }
@@ -38,8 +38,8 @@ void qv(const Mesh& mesh, const std::vector<glm::quat>& rotations, const std::ve
         glm::vec3 translation = translations[bones.x] * weights.x;
         for (int k = 1; k < 4; ++k) {
             const glm::quat& bone = rotations[bones[k]];
-            const float side = glm::dot(rotations[bones.x], bone) < 0.0f ? -1.0f : 1.0f;
-            rotation = rotation + bone * (side * weights[k]);
+            const float sign = glm::dot(rotations[bones.x], bone) < 0.0f ? -1.0f : 1.0f;
+            rotation = rotation + bone * (sign * weights[k]);
             translation += translations[bones[k]] * weights[k];
         }
         points[v] = glm::normalize(rotation) * mesh.rest_points[v] + translation;

@@ -14,12 +14,13 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-COLOURS = {"lbs": "#4477aa", "qv": "#ccbb44", "dq": "#ee6677"}
-MARKERS = {"lbs": "o", "qv": "s", "dq": "^"}
+# In the order of the methods (P. Tol's bright scheme, which people of all kinds of colour vision tell apart).
+COLOURS = ("#4477aa", "#ccbb44", "#ee6677", "#228833", "#66ccee", "#aa3377", "#bbbbbb")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 INFLUENCES = ("1", "2", "3", "4", "6", "8", "mixed")
 BONES = (10, 30, 100, 300, 1000)
 VERTICES = 100_000
-# What people call Highway's AVX3.
+# The usual name of Highway's AVX3.
 SETS = {"AVX3": "AVX-512"}
 
 
@@ -39,16 +40,21 @@ def costs(program: Path, simd: str | None) -> tuple[dict, dict]:
     return context, found
 
 
+def methods_of(found: dict) -> list[str]:
+    """The methods that the program measured, in its order, which is that of the library's list."""
+    return list(dict.fromkeys(name.split("/")[0] for costs_of in found.values() for name in costs_of))
+
+
 def draw(name: str, label: str, ticks: tuple, positions: tuple, keys: list[str], found: dict) -> None:
     """A panel for each instruction set, on one scale."""
     figure, panels = plt.subplots(
         1, len(found), figsize=(4.2 * len(found), 3.4), layout="constrained", sharey=True, squeeze=False
     )
     for axes, (simd, costs_of) in zip(panels[0], found.items(), strict=True):
-        for method in common.METHODS:
+        for number, method in enumerate(methods_of(found)):
             values = [costs_of[f"{method}/{key}"] for key in keys]
             joined = [i for i, tick in enumerate(ticks) if tick != "mixed"]
-            style = {"color": COLOURS[method], "marker": MARKERS[method]}
+            style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
             axes.plot([positions[i] for i in joined], [values[i] for i in joined], label=method, **style)
             for i in set(range(len(ticks))) - set(joined):
                 axes.plot(positions[i], values[i], linestyle="none", **style)
@@ -71,13 +77,14 @@ def draw(name: str, label: str, ticks: tuple, positions: tuple, keys: list[str],
 
 
 def table(found: dict) -> list[str]:
-    sets = [f"{method}, {SETS.get(simd, simd)}" for simd in found for method in common.METHODS]
+    methods = methods_of(found)
+    sets = [f"{method}, {SETS.get(simd, simd)}" for simd in found for method in methods]
     head = ["influences", "bones", *sets]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for influences, bones in pairs():
         cells = [influences, f"{bones:,}"]
         for costs_of in found.values():
-            cells += [f"{costs_of[f'{method}/{influences}/{bones}']:.2f}" for method in common.METHODS]
+            cells += [f"{costs_of[f'{method}/{influences}/{bones}']:.2f}" for method in methods]
         lines.append("| " + " | ".join(cells) + " |")
     return lines
 

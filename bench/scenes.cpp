@@ -74,7 +74,7 @@ Scene make_scene(const Shape& shape) {
     for (const std::size_t i : order) {
         const float along =
             static_cast<float>(i) / static_cast<float>(shape.vertices) * static_cast<float>(shape.bones);
-        const float turn = unit(engine) * 6.2831853f;
+        const float angle = unit(engine) * 6.2831853f;
         if (shape.kind == Kind::character) {
             if (patch_left == 0) {
                 // Means of 1.85 influences and of 24 vertices a patch, as in human.blend.
@@ -97,7 +97,7 @@ Scene make_scene(const Shape& shape) {
             const float away = static_cast<float>(of[k]) + 0.5f - along;
             share[k] = std::exp(-away * away) + 0.02f + 0.05f * unit(engine);
         }
-        scene.add_vertex({std::cos(turn), std::sin(turn), along}, count, of, share);
+        scene.add_vertex({std::cos(angle), std::sin(angle), along}, count, of, share);
     }
     scene.points.resize(shape.vertices);
     return scene;

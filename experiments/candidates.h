@@ -130,8 +130,8 @@ struct GlmPair {
     }
     static Point apply(const Transform& a, const Point& point) { return a.rotation * point + a.translation; }
     static Transform nlerp(const Transform& a, const Transform& b, float t) {
-        const float side = glm::dot(a.rotation, b.rotation) < 0.0f ? -1.0f : 1.0f;
-        return {glm::normalize(a.rotation * (1.0f - t) + b.rotation * (side * t)),
+        const float sign = glm::dot(a.rotation, b.rotation) < 0.0f ? -1.0f : 1.0f;
+        return {glm::normalize(a.rotation * (1.0f - t) + b.rotation * (sign * t)),
                 glm::mix(a.translation, b.translation, t)};
     }
     static Transform slerp(const Transform& a, const Transform& b, float t) {
@@ -140,8 +140,8 @@ struct GlmPair {
     static Transform blend(const Transform* transforms, const Weights& weights) {
         Transform sum{transforms[0].rotation * weights[0], transforms[0].translation * weights[0]};
         for (std::size_t k = 1; k < weights.size(); ++k) {
-            const float side = glm::dot(transforms[0].rotation, transforms[k].rotation) < 0.0f ? -1.0f : 1.0f;
-            sum.rotation = sum.rotation + transforms[k].rotation * (side * weights[k]);
+            const float sign = glm::dot(transforms[0].rotation, transforms[k].rotation) < 0.0f ? -1.0f : 1.0f;
+            sum.rotation = sum.rotation + transforms[k].rotation * (sign * weights[k]);
             sum.translation += transforms[k].translation * weights[k];
         }
         return {glm::normalize(sum.rotation), sum.translation};
@@ -164,8 +164,8 @@ struct GlmDualQuat {
     static Transform blend(const Transform* transforms, const Weights& weights) {
         Transform sum = transforms[0] * weights[0];
         for (std::size_t k = 1; k < weights.size(); ++k) {
-            const float side = glm::dot(transforms[0].real, transforms[k].real) < 0.0f ? -1.0f : 1.0f;
-            sum = sum + transforms[k] * (side * weights[k]);
+            const float sign = glm::dot(transforms[0].real, transforms[k].real) < 0.0f ? -1.0f : 1.0f;
+            sum = sum + transforms[k] * (sign * weights[k]);
         }
         return glm::normalize(sum);
     }
@@ -235,10 +235,10 @@ struct EigenPair {
     }
     static Point apply(const Transform& a, const Point& point) { return a.rotation * point + a.translation; }
     static Transform nlerp(const Transform& a, const Transform& b, float t) {
-        const float side = a.rotation.dot(b.rotation) < 0.0f ? -1.0f : 1.0f;
+        const float sign = a.rotation.dot(b.rotation) < 0.0f ? -1.0f : 1.0f;
         Transform between{Eigen::Quaternionf(), (1.0f - t) * a.translation + t * b.translation};
         between.rotation.coeffs() =
-            ((1.0f - t) * a.rotation.coeffs() + (side * t) * b.rotation.coeffs()).normalized();
+            ((1.0f - t) * a.rotation.coeffs() + (sign * t) * b.rotation.coeffs()).normalized();
         return between;
     }
     static Transform slerp(const Transform& a, const Transform& b, float t) {
@@ -248,8 +248,8 @@ struct EigenPair {
         Eigen::Vector4f rotation = weights[0] * transforms[0].rotation.coeffs();
         Eigen::Vector3f translation = weights[0] * transforms[0].translation;
         for (std::size_t k = 1; k < weights.size(); ++k) {
-            const float side = transforms[0].rotation.dot(transforms[k].rotation) < 0.0f ? -1.0f : 1.0f;
-            rotation += (side * weights[k]) * transforms[k].rotation.coeffs();
+            const float sign = transforms[0].rotation.dot(transforms[k].rotation) < 0.0f ? -1.0f : 1.0f;
+            rotation += (sign * weights[k]) * transforms[k].rotation.coeffs();
             translation += weights[k] * transforms[k].translation;
         }
         return {Eigen::Quaternionf(rotation.normalized()), translation};

@@ -51,7 +51,7 @@ inline sinew::Affine<Counted> input(const sinew::Affine<double>& a) {
     return result;
 }
 
-/// Three motions of no special angle or axis, no two more than a quarter turn apart.
+/// Three motions of no special angle or axis, no two more than 90 degrees apart.
 template <template <class> class Transform>
 std::array<Transform<Counted>, 3> inputs() {
     const auto motion = [](double angle, double x, double y, double z) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Types of arguments that several commands have."""
+"""Arguments that several commands have."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def count(text: str) -> int:
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
-    """--set, whose values are those of parameters.parse()."""
+    """Adds --set, whose value is the dictionary of parameters.parse()."""
     parser.add_argument(
         "--set",
         action=_Set,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..features.bake.bake import Started
 
 HELP = """\
-Writes what Sinew makes of every armature-deformed mesh as data that plays without it. Inputs are never
+Writes Sinew's deformation of every armature-deformed mesh as data that plays without it. Inputs are never
 written to. A folder stands for all .blend files below it.
 
 shape-keys  a .blend with one shape key a frame and keyed values
@@ -111,13 +111,13 @@ def _bake(
     meshes = attach.deformed_meshes(list(scene.objects))
     if not meshes:
         raise SinewError(f"{source}: no mesh is deformed by an armature; nothing written")
-    elsewhere = [obj for obj in attach.deformed_meshes(list(bpy.data.objects)) if obj.library is None]
+    other_scenes = [obj for obj in attach.deformed_meshes(list(bpy.data.objects)) if obj.library is None]
     outcome.left_out += [
-        f"{obj.name} is not in the scene {scene.name}" for obj in elsewhere if obj not in meshes
+        f"{obj.name} is not in the scene {scene.name}" for obj in other_scenes if obj not in meshes
     ]
     evaluate.set_parameters(args.set)
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
-    # What is hidden is baked as well, and hidden in the copy.
+    # Hidden objects are baked as well, and hidden in the copy.
     with evaluate.shown(meshes):
         errors = evaluate.use_methods([(obj, args.method) for obj in meshes])
         outcome.left_out += [str(error) for error in errors if error is not None]
@@ -128,7 +128,8 @@ def _bake(
             started = bake.start(taken, args.to, chosen, target, args.overwrite)
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
-        # An exporter takes all frames in one call, that nothing stops, and can crash where a disk is full.
+        # An exporter writes all frames in one call, which can not be interrupted and can crash on a full
+        # disk: it runs in a process of its own.
         shares = started.sample() if isinstance(started, bake.Bake) else bake_apart.sample(started)
         with (
             _whole_or_nothing(started, source),

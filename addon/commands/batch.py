@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `sinew reskin` and `sinew restore` have in common: inputs, workers, journal, progress, report."""
+"""The common part of `sinew reskin` and `sinew restore`: inputs, workers, journal, progress, report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..core.errors import SinewError, WrongUse
 from ..core.output import folder_to_write, writing
 from ..jobs.inputs import STANDARD_INPUT, Job, plan_jobs
 from ..jobs.job_file import JobFile, Settings, read_job_file
-from ..jobs.journal import Journal, tells_all
+from ..jobs.journal import Journal, is_complete
 from ..jobs.report import PICTURES, write_report
 from ..jobs.workers import run_here, run_in_dask, run_on_this_machine
 from .arguments import count, seconds
@@ -32,10 +32,10 @@ class Action:
     """What is done to each file.
 
     command   a command of worker.py
-    done      what a file is afterwards, as in "3 of 4 files re-skinned"
+    done      a participle for the summary, as in "3 of 4 files re-skinned"
     settings  those given on the command line
     job       path of a job file
-    methods   those that can be chosen; none where no method is needed
+    methods   names of methods that can be chosen; empty where no method is needed
     """
 
     command: str
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
     started = time.monotonic()
     with Journal(out) as journal:
         journal.recover()
-        journal.clear_away(job.target for job in jobs)
+        journal.remove_unfinished(job.target for job in jobs)
         tasks, results = [], {}
         for job, wanted in zip(jobs, settings, strict=True):
             task = _task(args, action, job, wanted, journal)
@@ -132,13 +132,13 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
                 for task, outcome in outcomes:
                     result = _keep(journal, task, outcome)
                     results[Path(task["target"])] = result
-                    _tell(console, progress, task, result)
+                    _show_result(console, progress, task, result)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(
                 f"{len(results)} of {len(jobs)} files are done; --resume does the others"
             ) from None
         finally:
-            journal.clear_away(job.target for job in jobs)
+            journal.remove_unfinished(job.target for job in jobs)
         seconds = time.monotonic() - started
         rows = [_row(job, journal.name_of(job.target), results[job.target]) for job in jobs]
         summary = _summary(action, rows, seconds)
@@ -158,7 +158,7 @@ def _check_bakes(jobs: list[Job], settings: list[Settings]) -> None:
 
 
 class _Workers:
-    """Who does the work; checked before anything is done."""
+    """The workers of a batch; the constructor checks the options before anything is done."""
 
     def __init__(self, args: argparse.Namespace, files: int, console: Console) -> None:
         self._args, self._console = args, console
@@ -177,7 +177,7 @@ class _Workers:
         self._limits = Limits(
             timeout=1800.0 if args.timeout is None else args.timeout,
             memory=self._memory(args.memory),
-            # More only wait for each other.
+            # More threads would only wait for each other.
             threads=0 if args.scheduler is not None else max(1, _processors() // self._jobs),
             verbose=console.verbose,
         )
@@ -213,12 +213,12 @@ class _Workers:
 
 
 def _lines_given() -> Iterator[str]:
-    """Of standard input, where a path need not be text."""
+    """The lines of standard input; paths need not be valid text."""
     return map(os.fsdecode, sys.stdin.buffer)
 
 
 def _processors() -> int:
-    """How many this process may use."""
+    """The number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -252,9 +252,10 @@ def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings
 
 
 def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> dict | None:
-    """What the source must still be for its copy to stand. Raises SinewError where a copy is in the way."""
+    """The hash and the versions with which the copy is up to date; None where it must be written. Raises
+    SinewError where it must not be replaced."""
     record = journal.latest.get(journal.name_of(job.target))
-    may_react = journal.holds(job.target, record)
+    may_react = journal.matches(job.target, record)
     if job.target.exists() and not args.overwrite and not (args.resume and may_react):
         if args.resume and record is not None:
             raise SinewError(f"{job.target}: was changed since it was written; use --overwrite to replace it")
@@ -264,14 +265,14 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
     same = ("command", "source", "settings")
     if record is None or not args.resume or not may_react or "error" in record:
         return None
-    stands = journal.holds_all(job.target, record) and tells_all(record)
-    if stands and all(record.get(k) == task[k] for k in same):
+    is_current = journal.matches_with_bakes(job.target, record) and is_complete(record)
+    if is_current and all(record.get(k) == task[k] for k in same):
         return {"hash": record["hash"], "versions": record["versions"]}
     return None
 
 
 def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
-    """Records what became of a file, and gives its copy its name: the record."""
+    """Records the outcome of a task, and renames its copy; returns the record."""
     target = Path(task["target"])
     before = journal.latest.get(journal.name_of(target), {})
     if "unchanged" in outcome:
@@ -296,7 +297,7 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
 
 def _record_failure(journal: Journal, target: Path, record: dict, before: dict) -> None:
     record.pop("unfinished", None)
-    # The older copy is still ours.
+    # The older copy still exists, and is this batch's own.
     for key in ("written", "beside"):
         record.pop(key, None)
         if key in before:
@@ -304,7 +305,7 @@ def _record_failure(journal: Journal, target: Path, record: dict, before: dict) 
     journal.record(target, record)
 
 
-def _tell(console: Console, progress: BatchProgress, task: dict, result: dict) -> None:
+def _show_result(console: Console, progress: BatchProgress, task: dict, result: dict) -> None:
     failed = "error" in result or bool(result["left_out"])
     meshes = 0 if "error" in result else len(result["meshes"])
     if "error" in result:
@@ -321,7 +322,7 @@ def _tell(console: Console, progress: BatchProgress, task: dict, result: dict) -
 
 
 def _row(job: Job, name: str, result: dict) -> dict:
-    """What the report says of a file."""
+    """The entry of a file in the report."""
     status = "failed" if "error" in result else "unchanged" if "unchanged" in result else "written"
     shown = ("error", "meshes", "left_out", "bakes", "notes", "versions", "seconds", "attempts", "pictures")
     return {"source": str(job.source), "file": name, "status": status} | {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew check`: whether files can be rendered where they are to be, ahead of a farm."""
+"""`sinew check`: whether files can be rendered, before they are sent to a farm."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ import sinew
 from ..blender_process import BlenderLost, BlenderProcess, Limits
 from ..core.errors import WrongUse
 from ..jobs.inputs import blend_files_below
-from ..other_blender import Answer, ask
+from ..other_blender import BlenderStatus, blender_status
 from .arguments import seconds
 from .console import Console
 
 HELP = """\
-Says of each file, in one line, whether Sinew deforms anything in it, and what is in the way of that: objects
-that Sinew can not drive, what is left of Sinew without its settings, a Blender without Sinew. Files are only
-read; a file that crashes or hangs Blender is told as such.
+Prints a line for each file: whether Sinew deforms anything in it, and what prevents that: objects that Sinew
+can not deform, data of Sinew without its settings, a Blender without Sinew. Files are only read; a file that
+crashes or hangs Blender is reported as such.
 
-Exit status 0: all can be rendered; 1: something is wrong with a file, as told; 2: wrong use."""
+Exit status 0: all can be rendered; 1: a file has a problem; 2: wrong use."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         "check",
-        help="say whether Sinew is there for files that need it, and can do what they ask: ahead of a farm",
+        help="check that files can be rendered with Sinew, before they are sent to a farm",
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -41,7 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--blender",
         metavar="PROGRAM",
         help="the Blender that will render, if it is another: it is started in the background with its own "
-        "preferences and asked for Sinew (default: the Blender that runs this)",
+        "preferences and checked for Sinew (default: the Blender that runs this)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument(
@@ -49,23 +49,23 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         type=seconds,
         default=300.0,
         metavar="SECONDS",
-        help="how long the Blender asked, and each file, may take (default: %(default)g; 0: any time)",
+        help="how long --blender, and each file, may take (default: %(default)g; 0: any time)",
     )
     return parser
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     paths = [path for given in args.files for path in _files_of(given)]
-    answer = ask(args.blender, args.timeout) if args.blender is not None else None
+    status = blender_status(args.blender, args.timeout) if args.blender is not None else None
     reports = []
     with closing(_checked(paths, Limits(timeout=args.timeout, verbose=console.verbose))) as outcomes:
         for path, outcome in outcomes:
-            reports.append(_report(path, outcome, answer))
+            reports.append(_report(path, outcome, status))
             if not args.json:
                 console.say(_line(reports[-1]))
     if args.json:
-        asked = None if answer is None else asdict(answer)
-        console.say(json.dumps({"blender": asked, "files": reports}, indent=2, ensure_ascii=False))
+        blender = None if status is None else asdict(status)
+        console.say(json.dumps({"blender": blender, "files": reports}, indent=2, ensure_ascii=False))
     return 1 if any(report["problems"] for report in reports) else 0
 
 
@@ -79,8 +79,8 @@ def _files_of(given: Path) -> list[Path]:
 
 
 def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], None, None]:
-    """Each file and what was found, by a Blender of its own that is started again where it is lost. Raises
-    SinewError where none can be had."""
+    """Each file and its outcome, by a Blender process that is started again where it crashes or is ended.
+    Raises SinewError where none can be started."""
     blender = None
     try:
         for path in paths:
@@ -95,14 +95,14 @@ def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], 
             blender.end()
 
 
-def _report(path: Path, outcome: dict, answer: Answer | None) -> dict:
+def _report(path: Path, outcome: dict, status: BlenderStatus | None) -> dict:
     meshes, inbetweens = outcome.get("meshes", []), outcome.get("inbetweens", [])
     problems = list(outcome.get("problems", []))
     if "error" in outcome:
         problems.append(outcome["error"].removeprefix(f"{path.absolute()}: "))
     needs_sinew = bool(meshes or inbetweens)
-    if needs_sinew and answer is not None:
-        problems = [*_missing(answer), *problems]
+    if needs_sinew and status is not None:
+        problems = [*_missing(status), *problems]
     return {
         "file": str(path),
         "needs_sinew": needs_sinew,
@@ -113,33 +113,33 @@ def _report(path: Path, outcome: dict, answer: Answer | None) -> dict:
     }
 
 
-def _missing(answer: Answer) -> list[str]:
-    """Why the other Blender can not do what Sinew does in this one."""
-    there = f"{answer.program} (Blender {answer.blender})"
-    if answer.problem is not None:
-        return [f"needs Sinew, which {there} does not have: {answer.problem}; install and enable it there"]
-    if answer.sinew != sinew.__version__:
-        return [f"{there} has Sinew {answer.sinew}, this is {sinew.__version__}; install the same"]
+def _missing(status: BlenderStatus) -> list[str]:
+    """Why the other Blender can not deform as this one does."""
+    name = f"{status.program} (Blender {status.blender})"
+    if status.problem is not None:
+        return [f"needs Sinew, which {name} does not have: {status.problem}; install and enable it there"]
+    if status.sinew != sinew.__version__:
+        return [f"{name} has Sinew {status.sinew}, this is {sinew.__version__}; install the same"]
     return []
 
 
 def _line(report: dict) -> str:
     if report["problems"]:
-        said = "; ".join(report["problems"])
+        text = "; ".join(report["problems"])
     elif report["needs_sinew"]:
-        said = f"ok: {_deformed(report)}"
+        text = f"ok: {_deformed(report)}"
     else:
-        said = "ok: does not need Sinew"
+        text = "ok: does not need Sinew"
     notes = f" ({'; '.join(report['notes'])})" if report["notes"] else ""
-    return f"{report['file']}: {said}{notes}"
+    return f"{report['file']}: {text}{notes}"
 
 
 def _deformed(report: dict) -> str:
     meshes, armatures = report["meshes"], report["inbetweens"]
-    said = []
+    parts = []
     if meshes:
         methods = ", ".join(sorted({mesh["method"] for mesh in meshes}))
-        said.append(f"Sinew deforms {len(meshes)} mesh{'' if len(meshes) == 1 else 'es'} by {methods}")
+        parts.append(f"Sinew deforms {len(meshes)} mesh{'' if len(meshes) == 1 else 'es'} by {methods}")
     if armatures:
-        said.append(f"Sinew poses {', '.join(armatures)} between keys")
-    return ", ".join(said)
+        parts.append(f"Sinew poses {', '.join(armatures)} between keys")
+    return ", ".join(parts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the command line says and shows: results on standard output, all else on standard error."""
+"""Output of the command line: results on standard output, everything else on standard error."""
 
 from __future__ import annotations
 
@@ -37,22 +37,23 @@ class Console:
             self._rich = RichConsole(file=err, highlight=False)
 
     def say(self, text: str) -> None:
-        """A result, on standard output. Raises SinewError where nobody takes it, as on a full disk."""
-        with self._given_out():
+        """Prints a result on standard output. Raises SinewError where it can not be written, as on a full
+        disk."""
+        with self._writing_results():
             print(_shown(text) if self.out.isatty() else text, file=self.out, flush=True)
 
     def note(self, text: str) -> None:
-        """A word about the work, on standard error."""
+        """Prints a note about the work on standard error."""
         if self._has_bar and self._rich is not None:
-            # Above the bar, which would otherwise be written into.
+            # rich prints it above the bar.
             self._rich.print(_shown(text), markup=False, soft_wrap=True)
         else:
-            # What nobody hears is no reason to stop.
+            # A note that can not be printed is no reason to stop.
             with suppress(OSError):
                 print(_shown(text), file=self.err, flush=True)
 
     def complain(self, text: object) -> None:
-        """One sentence on what went wrong, on standard error."""
+        """Prints one sentence about a failure on standard error."""
         self.note(f"sinew: {text}")
 
     def table(self, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -61,13 +62,13 @@ class Console:
             import rich.table
             import rich.text
 
-            # A path is nothing without its end.
+            # Folded, not cut: the end of a path matters.
             table = rich.table.Table(*(rich.table.Column(name, overflow="fold") for name in columns))
             for row in rows:
                 table.add_row(*(rich.text.Text(_shown(cell)) for cell in row))
             # Not cut to 80 columns where there is no terminal to fit.
             width = None if self.out.isatty() else 200
-            with self._given_out():
+            with self._writing_results():
                 rich.console.Console(file=self.out, highlight=False, width=width).print(table)
             return
         widths = [max(len(row[i]) for row in [columns, *rows]) for i in range(len(columns))]
@@ -84,8 +85,8 @@ class Console:
 
     @contextmanager
     def bar(self, what: str, total: int) -> Iterator[Callable[[float], None]]:
-        """Shows how far a work of `total` parts gets on: call what it gives with the share that is done, 0 to
-        1. A bar on a terminal, one line elsewhere."""
+        """Shows the progress of a work of `total` parts: a bar on a terminal, one line elsewhere. Call the
+        returned function with the share that is done, 0 to 1."""
         if self._rich is None or not self._rich.is_terminal:
             self.note(f"{what} ({total})")
             yield lambda _share: None
@@ -101,11 +102,11 @@ class Console:
                 self._close_bar = None
 
     @contextmanager
-    def _given_out(self) -> Iterator[None]:
+    def _writing_results(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            # The rest of it would be tried again, with a traceback, at the end of the process.
+            # Python would try to write the rest again at the end of the process, with a traceback.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
             raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
 
@@ -118,7 +119,8 @@ class Console:
 
     @contextmanager
     def batch(self, what: str, total: int) -> Iterator[BatchProgress]:
-        """Shows how a batch of `total` files gets on: a bar on a terminal, a line for each file elsewhere."""
+        """Shows the progress of a batch of `total` files: a bar on a terminal, a line for each file
+        elsewhere."""
         if self._rich is None or not self._rich.is_terminal:
             yield BatchProgress(self, total)
             return
@@ -126,7 +128,7 @@ class Console:
 
         columns = (
             TextColumn("{task.description}"),
-            # Room for a terminal's ^C in 80 columns: where that wraps, the bar is drawn twice.
+            # Leaves space for a terminal's ^C in 80 columns: where that wraps, the bar is drawn twice.
             BarColumn(bar_width=20),
             MofNCompleteColumn(),
             TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
@@ -141,12 +143,12 @@ class Console:
 
 
 def _shown(text: str) -> str:
-    """Without what would steer a terminal: names in files can hold anything."""
+    """The text without control characters, which would act on a terminal: names in files can have any."""
     return _CONTROLS.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
 class BatchProgress:
-    """Counts of a batch at work."""
+    """Counts of a running batch."""
 
     def __init__(
         self,
@@ -159,7 +161,7 @@ class BatchProgress:
         self._console, self._total, self._bar, self._bar_task = console, total, bar, bar_task
 
     def step(self, line: str | None, meshes: int, failed: bool) -> None:
-        """One more file: what to say of it, if that is not said."""
+        """Counts one more file; `line` describes it, None where it was printed already."""
         self.done += 1
         self.meshes += meshes
         self.failed += failed
@@ -170,24 +172,24 @@ class BatchProgress:
 
 
 def take_over_output() -> Console:
-    """Keeps standard output and error for Sinew alone: what Blender prints goes nowhere.
+    """Standard output and error for Sinew only: what Blender prints is discarded.
 
-    Blender writes to the file descriptors themselves, so they are pointed elsewhere for good; it still
-    prints at the end of the process.
+    Blender writes to the file descriptors themselves, so these are redirected until the end of the process,
+    when it still prints.
     """
     sys.stdout.flush()
     sys.stderr.flush()
     out = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace")
     err = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="replace")
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.dup2(nowhere, 2)
-    os.close(nowhere)
-    # A traceback of ours is a bug and must be seen.
+    discard = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(discard, 1)
+    os.dup2(discard, 2)
+    os.close(discard)
+    # A traceback of Sinew's is a bug and must be shown.
     sys.stderr = err
     return Console(out, err)
 
 
 def keep_output() -> Console:
-    """Leaves Blender's output where it was, for `--verbose`."""
+    """Standard output and error shared with Blender, for `--verbose`."""
     return Console(sys.stdout, sys.stderr, verbose=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew info`: what is known of each armature-deformed mesh."""
+"""`sinew info`: facts and warnings of each armature-deformed mesh."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
     for obj in attach.deformed_meshes(list(bpy.data.objects)):
         armature = attach.armature_of(obj)
         if armature is None:
-            raise SinewError(f"{path}: {obj.name} was driven by Sinew, and its armature is gone")
+            raise SinewError(f"{path}: {obj.name} was deformed by Sinew, and its armature is missing")
         facts = survey.describe_undriven(obj)
         meshes.append(
             {
@@ -69,7 +69,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
 
 
 def left_to_blender() -> list[str]:
-    """The open file's objects that an armature deforms and that are no meshes."""
+    """The open file's objects other than meshes that an armature deforms."""
     import bpy
 
     from ..attach import attach

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _facts(row: sinew.Method | sinew.Stage) -> dict:
-    """Of a method or a stage; its parameters by the names that --set takes."""
+    """The facts of a method or a stage; its parameters by the names that --set takes."""
     facts = {"name": row.name, "label": row.label, "description": row.description, "source": row.source}
     return facts | {"parameters": _parameters(row)}
 

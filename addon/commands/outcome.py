@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What became of one of a command's files."""
+"""The outcome of one of a command's files."""
 
 from __future__ import annotations
 

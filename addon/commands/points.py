@@ -66,7 +66,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             failed = True
             console.complain(f"{args.file}: left out: {error}")
     if not taken:
-        raise SinewError(f"{args.file}: no mesh that Sinew can drive")
+        raise SinewError(f"{args.file}: no mesh that Sinew can deform")
 
     if "frames" in (obj.name for obj in taken):
         raise SinewError(f"{args.file}: an object is called frames, as the array of frames is; rename it")
@@ -100,7 +100,7 @@ def _stack(name: str, per_frame: list[np.ndarray], frames: list[float]) -> np.nd
 
 def _write(path: Path, arrays: dict[str, np.ndarray]) -> None:
     def write(unfinished: Path) -> None:
-        # Not np.savez, whose own arguments' names an object could have.
+        # Not np.savez: an object could have the name of one of its arguments.
         with zipfile.ZipFile(unfinished, "w") as archive:
             for name, array in arrays.items():
                 with archive.open(f"{as_file_name(name)}.npy", "w", force_zip64=True) as member:

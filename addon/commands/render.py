@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew render`: pictures of frames under one method, and their comparison with golden ones."""
+"""`sinew render`: pictures of frames under one method, compared with golden ones."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def _check_fits(args: argparse.Namespace, golden: RenderSettings, frames: list[f
 
 
 def _check_free(out: Path, frames: list[float]) -> None:
-    """Raises SinewError where pictures are in the way that somebody else made: names such as 0001.png are not
-    ours alone."""
+    """Raises SinewError where files of these names exist that `sinew render` did not make: others use names
+    such as 0001.png, too."""
     if (out / SETTINGS).exists():
         return
     for frame in frames:
@@ -148,7 +148,7 @@ def _draw(
         studio = render.Studio(scene, meshes, engine, size)
     names = [obj.name for obj in meshes]
     settings = RenderSettings(args.file.name, method, frames, engine, size, args.own_look, names, views)
-    # First: it tells that the pictures are ours, also where this is stopped half-way.
+    # Written first: it marks the pictures as made by this command, also where it is interrupted.
     write_text(args.out / SETTINGS, settings.to_json())
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
         evaluate.set_frame(scene, frame)

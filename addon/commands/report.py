@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew report`: the experiments of the report that Sinew implements, on one page."""
+"""`sinew report`: the experiments of Smith 2013 again, on one page."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "they agree. An installed Sinew computes Tables 3.1 and 3.6 to 3.8 and, with matplotlib, Figures "
         "3.4 and 3.5. Operation counts and times (Tables 3.2 to 3.5, 3.9, 3.10) take programs that are "
         "built against GLM and Eigen, and pictures (Figures 3.6 to 3.11) Sinew's example rigs: ./dev report "
-        "in a checkout builds the ones and passes on both. The page says what was left out and why.",
+        "in a checkout builds the programs and passes on both. The page says what was left out and why.",
     )
     parser.add_argument("--out", required=True, type=folder_to_write, metavar="FOLDER")
     parser.add_argument(
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
-    """Figures 3.6 to 3.11; where this installation can not draw, why."""
+    """Figures 3.6 to 3.11, or the reason why this installation can not draw them."""
     from ..core.report import meshes
     from ..prepare import prepare_blender
 

@@ -11,16 +11,16 @@ from ..core.errors import WrongUse
 from ..core.frames import parse_frames
 from ..core.scratch import scratch_folder
 from ..core.sheet import Column, require_pillow, write_sheet
-from ..core.views import close_view, place_of_difference
+from ..core.views import close_view, most_different_vertex
 from .console import Console
 
-# Other names are those of folders.
+# Suffixes of a picture; other paths are folders.
 PICTURES = {".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf"}
 
 
 def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
-    """A column for each method, the same camera for all, framed on the mesh, with a close-up of the place
-    where the methods differ most and the volume against the rest pose."""
+    """A column for each method, with the same camera for all, a close-up of the vertex at which the methods
+    differ most, and the volume relative to the rest pose."""
     import bpy
 
     from ..attach import properties
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     rest = subject.gauge.rest.volume
     volumes = {method: subject.gauge.measure(points).shape.volume for method, points in shapes.items()}
     views = [("Whole", evaluate.whole_views(meshes, methods, [frame])[0])]
-    vertex = place_of_difference(list(shapes.values()))
+    vertex = most_different_vertex(list(shapes.values()))
     if vertex is not None:
         positions = np.stack([points[vertex] for points in shapes.values()])
         character = subject.character_of(vertex, shapes[methods[0]])

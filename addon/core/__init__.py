@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Sinew computes around the library, without Blender: numpy in, numpy out."""
+"""Computations on top of the native library, without Blender: numpy in, numpy out."""

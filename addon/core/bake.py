@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that baked points go to: MDD and PC2 point caches, and the room for them."""
+"""Point caches of baked frames, MDD and PC2; which frames a bake can have; the disk space that it needs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from .errors import SinewError, WrongUse
 from .output import remove, writing
 
-# Bakes that a .blend plays, and those that are files of their own.
+# Bakes that play in a .blend, and bakes that are files for other programs.
 IN_FILE = ("shape-keys", "mdd", "pc2")
 EXPORTS = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 KINDS = (*IN_FILE, *EXPORTS)
@@ -23,7 +23,8 @@ BAKED = ".baked.blend"
 
 
 def bake_path(copy: Path, kind: str) -> Path:
-    """What a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for all that a .blend plays."""
+    """The file that a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for bakes that a .blend
+    plays."""
     return copy.with_suffix(EXPORTS.get(kind, BAKED))
 
 
@@ -39,7 +40,7 @@ def pc2_header(frames: Sequence[float], vertices: int, _rate: float) -> bytes:
     return struct.pack("<12siiffi", b"POINTCACHE2\0", 1, vertices, frames[0], step, len(frames))
 
 
-# What a format starts with, and how it holds a coordinate.
+# By format: its header, and the type of a coordinate.
 FORMATS: dict[str, tuple[Callable[[Sequence[float], int, float], bytes], str]] = {
     "mdd": (mdd_header, ">f4"),
     "pc2": (pc2_header, "<f4"),
@@ -47,7 +48,7 @@ FORMATS: dict[str, tuple[Callable[[Sequence[float], int, float], bytes], str]] =
 
 
 class PointCache:
-    """A point cache that is written frame by frame beside its `path`, and takes its place in publish().
+    """A point cache that is written frame by frame to a temporary file; publish() renames it to `path`.
 
     frames  of the samples to come
     rate    frames a second
@@ -69,13 +70,13 @@ class PointCache:
             self._file.write(points.astype(self._coordinate).tobytes())
 
     def close(self) -> None:
-        """All samples are on disk from here on."""
+        """Ends the file; its samples are written."""
         with writing(self.path):
             self._file.close()
 
     def discard(self) -> None:
-        """Leaves nothing behind, also where the disk is full."""
-        # What could not be written is not wanted.
+        """Removes the temporary file, also where the disk is full."""
+        # Closing flushes the buffer, which fails on a full disk; the file is removed anyway.
         with suppress(OSError):
             self._file.close()
         remove(self.unfinished)
@@ -87,7 +88,7 @@ def publish(unfinished: Path, path: Path) -> None:
 
 
 def check_space(folder: Path, needed: int) -> None:
-    """Raises SinewError where `folder`, which need not be there yet, can not take so many bytes."""
+    """Raises SinewError where `folder`, which need not exist yet, has fewer than `needed` bytes free."""
     existing = next(parent for parent in (folder.resolve(), *folder.resolve().parents) if parent.exists())
     free = shutil.disk_usage(existing).free
     if free < needed:
@@ -109,19 +110,19 @@ def check_frames(kind: str, frames: Sequence[float]) -> None:
 
 
 def is_whole(path: Path, kind: str) -> bool:
-    """Whether all that an exporter wrote is in its file: of USD Blender does not notice that a disk is full
-    (seen on 4.5)."""
+    """Whether an exported file is complete. Blender's USD exporter reports no error on a full disk (4.5)."""
     with path.open("rb") as file:
         start = file.read(24)
         size = file.seek(0, os.SEEK_END)
         if len(start) < 24:
             return False
         if kind == "alembic":
-            # Ogawa: the sixth byte is set when the file is closed.
+            # Ogawa sets the sixth byte when the file is closed.
             return start[:6] == b"Ogawa\xff"
         if kind == "gltf":
             return start[:4] == b"glTF" and struct.unpack("<I", start[8:12])[0] == size
-        # USD's crate: where its table of contents is, which comes last; how many parts it lists, of 32 bytes.
+        # A USD crate's header gives the offset of its table of contents, which ends the file: a count, then
+        # 32 bytes each.
         (contents,) = struct.unpack("<q", start[16:])
         if start[:8] != b"PXR-USDC" or not 24 <= contents <= size - 8:
             return False
@@ -137,12 +138,12 @@ def is_even(frames: Sequence[float], step: float | None = None) -> bool:
 
 
 def ramps(frames: Sequence[float]) -> list[tuple[list[float], list[float]]]:
-    """For each frame the times and values of the keys of its shape: 1 at that frame, 0 at its neighbours, so
-    that straight lines between the keys mix two neighbours at a time, and all values sum to 1."""
+    """For each frame, times and values of the keys of its shape: 1 at that frame, 0 at its neighbours. With
+    linear interpolation between the keys, two neighbours are mixed at a time and all values sum to 1."""
     result = []
     for number in range(len(frames)):
-        near = range(max(number - 1, 0), min(number + 2, len(frames)))
-        result.append(([frames[i] for i in near], [float(i == number) for i in near]))
+        neighbours = range(max(number - 1, 0), min(number + 2, len(frames)))
+        result.append(([frames[i] for i in neighbours], [float(i == number) for i in neighbours]))
     return result
 
 

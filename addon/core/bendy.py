@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bendy bones: n segments move vertices by n + 1 joints along the bone, each vertex by the two beside it.
+"""Bendy bones: n segments have n + 1 joints along the bone; a vertex is moved by the two joints next to it.
+
+A joint is what Blender calls so (PoseBone.bbone_segment_matrix): the transform between two segments.
 
 Based on: what Blender's Armature modifier does; for the curved mapping, the description of its "B-Bone vertex
 mapping" in Blender's developer documentation and its change 110758, whose constants it shares.
@@ -11,8 +13,8 @@ import numpy as np
 
 from .influences import Influences
 
-# How wide the curved mapping smooths at the plane in the middle, how fast the pull towards the ideal slope
-# grows, and how sharply it ends.
+# The curved mapping's smoothing: its width at the middle plane, how fast the correction towards the ideal
+# slope grows, and how sharply it ends.
 WIDTH, SLOPE, SHARPNESS = 0.222, 3.0, 7.0
 
 
@@ -25,7 +27,7 @@ def spread_over_joints(
     first_joints: np.ndarray,
     curved: np.ndarray,
 ) -> Influences:
-    """The influences with each one of a bendy bone shared between the two joints beside the vertex.
+    """The influences, each one of a bendy bone split between the two joints next to the vertex.
 
     points        float [vertices, 3], rest points in armature space
     rest          float [bones + joints, 4, 4], armature space, Y along the bone
@@ -39,51 +41,53 @@ def spread_over_joints(
     bones = influences.bones
     bends = segments[bones] > 1
     bent = bones[bends]
-    here = points[vertices[bends]].astype(np.float64)
+    positions = points[vertices[bends]].astype(np.float64)
     share = np.empty(len(bent))
     for bone in np.unique(bent):
         of_bone = bent == bone
         if curved[bone]:
             joints = rest[first_joints[bone] :][: segments[bone] + 1].astype(np.float64)
-            share[of_bone] = share_along_curve(here[of_bone], joints)
+            share[of_bone] = share_along_curve(positions[of_bone], joints)
         else:
             bone_from_armature = np.linalg.inv(rest[bone].astype(np.float64))
-            along = here[of_bone] @ bone_from_armature[1, :3] + bone_from_armature[1, 3]
-            share[of_bone] = along / lengths[bone]
-    position = np.clip(share, 0.0, 1.0) * segments[bent]
-    joint = np.clip(np.floor(position).astype(np.int64), 0, segments[bent] - 1)
-    second_share = np.clip(position - joint, 0.0, 1.0)
+            distances = positions[of_bone] @ bone_from_armature[1, :3] + bone_from_armature[1, 3]
+            share[of_bone] = distances / lengths[bone]
+    along = np.clip(share, 0.0, 1.0) * segments[bent]
+    joint = np.clip(np.floor(along).astype(np.int64), 0, segments[bent] - 1)
+    second_share = np.clip(along - joint, 0.0, 1.0)
 
-    # Two entries for every influence, the second of weight 0 for bones that do not bend, then those out.
-    # The order stays that of the influences: dual quaternions depend on it.
-    slots = np.stack([bones, bones], axis=1)
+    # Two entries for every influence; the second has weight 0 for bones that do not bend, and is then
+    # dropped. The order stays that of the influences: dual quaternions depend on it.
+    targets = np.stack([bones, bones], axis=1)
     weights = np.stack([influences.weights, np.zeros_like(influences.weights)], axis=1)
-    slots[bends, 0] = first_joints[bent] + joint
-    slots[bends, 1] = first_joints[bent] + joint + 1
+    targets[bends, 0] = first_joints[bent] + joint
+    targets[bends, 1] = first_joints[bent] + joint + 1
     weights[bends, 0] = influences.weights[bends] * (1.0 - second_share)
     weights[bends, 1] = influences.weights[bends] * second_share
     kept = weights.ravel() > 0.0
     offsets = np.zeros(len(counts) + 1, dtype=np.int32)
     np.cumsum(np.bincount(np.repeat(vertices, 2)[kept], minlength=len(counts)), out=offsets[1:])
-    return Influences(offsets, slots.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32))
+    return Influences(
+        offsets, targets.ravel()[kept].astype(np.int32), weights.ravel()[kept].astype(np.float32)
+    )
 
 
 def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:
     """float64 [n]: where along a bendy bone's curve each point lies, 0 at its head, 1 at its tail.
 
-    A binary search among the planes through the joints finds the segment; then, from the last plane asked
-    to the first, points inside a bend are pulled towards the plane to take out the jump that they make there.
+    A binary search among the planes through the joints finds the segment. Inside a bend the share would jump
+    at these planes: it is smoothed at each plane that the search tested, from the last to the first.
 
     points  float64 [n, 3]
     joints  float64 [segments + 1, 4, 4] at rest, Y along the curve, same space
     """
     segments = len(joints) - 1
     normals = joints[:, :3, 1] / np.linalg.norm(joints[:, :3, 1], axis=1, keepdims=True)
-    places = joints[:, :3, 3]
-    distances = points @ normals.T - np.einsum("ij,ij->i", normals, places)
-    arc_length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    centres = joints[:, :3, 3]
+    distances = points @ normals.T - np.einsum("ij,ij->i", normals, centres)
+    arc_length = np.linalg.norm(np.diff(centres, axis=0), axis=1).sum()
 
-    asked, first, last = _search(distances, segments)
+    tested, first, last = _search(distances, segments)
     nearer, farther = (
         np.abs(np.take_along_axis(distances, np.clip(plane, 0, segments)[:, None], axis=1)[:, 0])
         for plane in (first, last)
@@ -91,33 +95,33 @@ def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:
     between = np.divide(nearer, nearer + farther, out=np.zeros_like(nearer), where=nearer + farther > 0.0)
     share = np.where(last <= 0, 0.0, np.where(first >= segments, 1.0, (first + between) / segments))
 
-    straightness = np.linalg.norm(places[-1] - places[0]) / arc_length
+    straightness = np.linalg.norm(centres[-1] - centres[0]) / arc_length
     scales = _smoothing_scales(segments, segments * straightness * WIDTH)
-    for plane, scale in reversed(list(zip(asked, scales, strict=False))):
+    for plane, scale in reversed(list(zip(tested, scales, strict=False))):
         share = _pull_to_plane(share, plane, distances / arc_length, segments, scale)
     return share
 
 
 def _search(distances: np.ndarray, segments: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
-    """The planes asked at each step, -1 for points whose search is over, and the two that enclose a point:
+    """The planes tested at each step, -1 for points whose search has ended, and the two that enclose a point:
     -1 before the first plane, segments + 1 behind the last."""
     count = len(distances)
     first, last = np.full(count, -1), np.full(count, segments + 1)
     bias = np.zeros(count, dtype=np.int64)
-    asked = []
-    while (going := last - first > 1).any():
-        plane = np.where(going, (first + last + bias) // 2, -1)
+    tested = []
+    while (searching := last - first > 1).any():
+        plane = np.where(searching, (first + last + bias) // 2, -1)
         before = distances[np.arange(count), plane] < 0.0
-        last = np.where(going & before, plane, last)
-        first = np.where(going & ~before, plane, first)
-        # Odd numbers are halved towards the last split, for symmetry.
+        last = np.where(searching & before, plane, last)
+        first = np.where(searching & ~before, plane, first)
+        # Odd numbers are rounded towards the last split, for symmetry.
         bias = before.astype(np.int64)
-        asked.append(plane)
-    return asked, first, last
+        tested.append(plane)
+    return tested, first, last
 
 
 def _smoothing_scales(segments: int, widest: float) -> np.ndarray:
-    """One over the width, in the whole bone's length, that is smoothed at each step of the search."""
+    """1 / width of the smoothing at each step of the search, in lengths of the whole bone."""
     steps = int(np.ceil(np.log2(segments + 2)))
     narrowing = max(widest, 1.0) ** (1.0 / (steps - 1))
     return segments / widest * narrowing ** np.arange(steps)
@@ -126,13 +130,13 @@ def _smoothing_scales(segments: int, widest: float) -> np.ndarray:
 def _pull_to_plane(
     share: np.ndarray, plane: np.ndarray, distances: np.ndarray, segments: int, scale: float
 ) -> np.ndarray:
-    """`share` with points near one plane pulled towards where the ideal slope has them."""
+    """`share`, that of points near one plane moved towards the value that the ideal slope gives."""
     distance = distances[np.arange(len(share)), plane]
-    place = plane / segments
-    gap = np.abs(share - place) - np.abs(distance)
+    at_plane = plane / segments
+    gap = np.abs(share - at_plane) - np.abs(distance)
     nearness = 1.0 - np.abs(distance) * scale
     pulled = (plane >= 0) & (gap > 0.0) & (nearness > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = SLOPE * gap / (SLOPE * gap + np.abs(distance))
         strength = nearness**2 * (SHARPNESS + 1.0) / (SHARPNESS * nearness + 1.0)
-    return np.where(pulled, share + slope * strength * (place + distance - share), share)
+    return np.where(pulled, share + slope * strength * (at_plane + distance - share), share)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a comparison of methods found: numbers of each frame, worst frames, diagnostics; as CSV and JSON."""
+"""The results of a comparison of methods: numbers of each frame, worst frames, diagnostics; as CSV and
+JSON."""
 
 from __future__ import annotations
 
@@ -14,9 +15,9 @@ from dataclasses import asdict, dataclass, fields
 from .diagnostics import Finding
 from .metrics import METRICS, Gauge, Summary
 
-# What is compared where nobody chooses.
+# Compared where the user names none.
 USUAL_METHODS = ("lbs", "qv", "dq")
-# Smaller parts of the diagonal, or of the value at rest, are rounding.
+# Differences below this share of the diagonal, or of the value at rest, are rounding errors.
 ROUNDING = 1e-5
 LENGTHS = {"distance_max", "distance_rms", "bulge_min", "bulge_max", "bulge_worst"}
 
@@ -49,7 +50,7 @@ class RestFacts:
 
     @property
     def note(self) -> str:
-        """What to know of the volume, one sentence; empty for a closed mesh."""
+        """How far the volume can be trusted, one sentence; empty for a closed mesh."""
         if self.clashes:
             return (
                 f"{self.clashes:,} edges have faces that wind against each other, or more than two: the "
@@ -65,7 +66,7 @@ class RestFacts:
 
 @dataclass(frozen=True)
 class Worst:
-    """A frame and method of a measure's largest value."""
+    """The frame and method at which a measure has its largest value."""
 
     measure: str
     frame: float
@@ -82,7 +83,7 @@ class Comparison:
     unit       of lengths
     summaries  by method, for each frame
     times      by method, for each frame: milliseconds that Blender took for the whole frame
-    own        by method, for each frame: milliseconds of these that Sinew took
+    own        by method, for each frame: the milliseconds of these that Sinew took
     findings   by mesh
     """
 
@@ -103,11 +104,11 @@ class Comparison:
         return [getattr(summary, entry) for summary in self.summaries[method]]
 
     def length(self, value: float) -> str:
-        """With its unit; what is rounding is 0."""
+        """As text with its unit; 0 for a rounding error."""
         return f"{value if abs(value) > ROUNDING * self.rest.diagonal else 0.0:.3g}\u00a0{self.unit}"
 
     def shows(self, entry: str, value: float) -> bool:
-        """Whether an entry of the summaries is more than rounding."""
+        """Whether an entry of the summaries is more than a rounding error."""
         return abs(value) > ROUNDING * (self.rest.diagonal if entry in LENGTHS else 1.0)
 
     def worst(self, entry: str) -> Worst:
@@ -122,8 +123,8 @@ class Comparison:
         return max(candidates, key=lambda worst: abs(worst.value), default=nothing)
 
     def worst_frames(self, count: int) -> list[float]:
-        """At most `count` frames, in order: those at which a measure is worst, the measures in turn, but for
-        those next to one that is there already."""
+        """At most `count` frames, in order: those at which a measure is worst, one for each measure, without
+        those close to one that is already chosen."""
         entries = ["distance_max", "volume_change", *(metric.worst for metric in METRICS.values())]
         apart = (max(self.frames) - min(self.frames)) / 10
         chosen: list[float] = []
@@ -153,7 +154,7 @@ class Comparison:
         return text.getvalue()
 
     def to_json(self) -> str:
-        """Everything, the vertices of the findings among it."""
+        """Everything, including the vertices of the findings."""
         return json.dumps(
             {
                 "file": self.file,
@@ -181,15 +182,13 @@ class Comparison:
 
 
 def peaks(values: Sequence[float], count: int) -> list[int]:
-    """At most `count` places of the largest of `values`, largest first: those of no neighbour that is larger,
-    the first of equal neighbours. Frames next to the worst one are as good as the same."""
+    """Indices of at most `count` local maxima of `values`, largest first; the first of equal neighbours.
+    Frames next to the worst one show the same, so they are no peaks of their own."""
     padded = [-math.inf, *values, -math.inf]
-    places = [
-        place for place, value in enumerate(values) if padded[place] < value and value >= padded[place + 2]
-    ]
-    return sorted(places, key=lambda place: -values[place])[:count]
+    indices = [i for i, value in enumerate(values) if padded[i] < value and value >= padded[i + 2]]
+    return sorted(indices, key=lambda i: -values[i])[:count]
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:
-    """JSON knows no NaN and no infinity."""
+    """NaN and infinity as None: JSON has neither."""
     return {name: value if math.isfinite(value) else None for name, value in values.items()}

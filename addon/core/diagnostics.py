@@ -13,28 +13,28 @@ from .influences import SMALLEST_WEIGHT_SUM, GroupWeights, Influences
 from .rig import Weighting
 from .vectors import dots
 
-# Below this sum of weights what was painted by accident decides where a vertex goes.
+# Below this sum, weights painted by accident decide how a vertex moves.
 SMALL_WEIGHT_SUM = 0.01
-# What game engines take without a loss of speed or of influences.
+# Most game engines take so many influences a vertex.
 USUAL_INFLUENCES = 4
-# A bone turned by 180 degrees against the others, give or take this, is about to change sides.
-DEGREES_FROM_HALF_TURN = 5.0
-# Bones of less weight than this do not move a vertex far when they change sides.
-WEIGHT_THAT_SHOWS = 0.05
-# All that six influences can come in; of more, as many are tried.
-MOST_ORDERS = 720
+# A bone rotated by 180 degrees against the others, within this tolerance, is about to change hemisphere.
+DEGREES_FROM_180 = 5.0
+# Bones of a smaller share of the weight do not move a vertex far when they change hemisphere.
+VISIBLE_SHARE = 0.05
+# The number of orders of six influences; of more influences, so many random orders are tried.
+MAX_ORDERS = 720
 
 
 @dataclass(frozen=True)
 class Finding:
     """One kind of fault.
 
-    name      what programs say
-    title     what people read
+    name      for programs
+    title     for people
     vertices  int [n], sorted: the vertices that have it
     meaning   one sentence
     advice    one sentence, what to do
-    groups    the vertex groups that have it, where it is theirs
+    groups    the vertex groups that have it, for faults of groups
     frames    where it was seen, for faults that depend on the pose
     """
 
@@ -73,12 +73,12 @@ def check_weights(
     most_influences: int = USUAL_INFLUENCES,
     masks: Collection[str] = (),
 ) -> list[Finding]:
-    """What is found without looking at a pose; only what there is.
+    """The faults that do not depend on a pose; only those that were found.
 
     points       [vertices, 3], rest points in armature space
     weights      the mesh's groups as stored
     group_names  of those groups
-    masks        names of groups that something else than a bone uses
+    masks        names of groups that a modifier or another feature uses, not a bone
     """
     counts, entries = weighting.influences(points).counts, weighting.entries
     painted = np.bincount(entries.vertices, weights=entries.weights, minlength=len(counts))
@@ -108,16 +108,16 @@ def check_weights(
             f"Use Weights > Limit Total with a limit of {most_influences}, then Normalize All.",
         ),
     ]
-    boneless = [name for name in weighting.bones.without_one(group_names) if name not in masks]
+    boneless = [name for name in weighting.bones.groups_without_bone(group_names) if name not in masks]
     if boneless:
         numbers = [number for number, name in enumerate(group_names) if name in boneless]
         vertices = np.repeat(np.arange(len(weights.counts)), weights.counts)
-        held = vertices[np.isin(weights.groups, numbers) & (weights.weights > 0.0)]
+        affected = vertices[np.isin(weights.groups, numbers) & (weights.weights > 0.0)]
         findings.append(
             Finding(
                 "boneless_groups",
                 "Groups without a bone",
-                np.unique(held),
+                np.unique(affected),
                 "No bone of the armature has the name of these groups, and nothing else uses them: their "
                 "weights do nothing.",
                 "Rename the group to its bone's name, or delete it.",
@@ -131,62 +131,63 @@ def check_weights(
 _OF_POSES = {
     "order_of_groups": (
         "Dual quaternions depend on the order of groups",
-        "Three or more bones are turned so far apart that dual quaternion skinning goes another way round "
+        "Three or more bones are rotated so far apart that dual quaternion skinning rotates the other way "
         "where a vertex's groups were assigned in another order, as copied or mirrored weights may be.",
-        "Take the bone that is turned farthest out of these vertices, or spread the turn over more bones.",
+        "Take the bone with the largest rotation off these vertices, or spread the rotation over more bones.",
     ),
     "near_half_turn": (
-        "Close to a half turn between bones",
-        f"A bone is within {DEGREES_FROM_HALF_TURN:g} degrees of a half turn against the others, where both "
-        "ways round are as short: a small change of the pose makes dual quaternion skinning jump.",
-        "Spread the turn over twist bones, or keep these poses away from a half turn.",
+        "Close to 180 degrees between bones",
+        f"A bone is rotated by 180 degrees against the others, within {DEGREES_FROM_180:g} degrees. Both "
+        "directions are equally short there: a small change of the pose makes dual quaternion skinning jump.",
+        "Spread the rotation over twist bones, or keep these poses away from 180 degrees.",
     ),
     "jumps": (
-        "Dual quaternions change sides in the action",
-        "A bone turns past a half turn against the others: from one frame to the next dual quaternion "
-        "skinning jumps to the other way round.",
-        "Spread the turn over twist bones, keep it below a half turn, or use linear blend here.",
+        "Dual quaternions change hemisphere in the action",
+        "A bone rotates past 180 degrees against the others: from one frame to the next, dual quaternion "
+        "skinning jumps to the other direction of rotation.",
+        "Spread the rotation over twist bones, keep it below 180 degrees, or use linear blend here.",
     ),
 }
 
 
 class PoseCheck:
-    """Looks at poses, one after the other, for vertices whose dual quaternions are about to change sides.
+    """Checks poses, one after the other, for vertices whose dual quaternions are about to change hemisphere.
 
-    A dual quaternion and its negative are one motion. Dual quaternion skinning takes each bone's on the side
-    of the sum of those before it, in the order of the vertex's groups.
+    A dual quaternion and its negative (its antipode) are the same rigid motion. Dual quaternion skinning
+    gives each bone's the sign that brings it into the hemisphere of the sum of those before it, in the order
+    of the vertex's groups.
     """
 
     def __init__(self, influences: Influences) -> None:
-        """influences  over bones and joints, in stored order"""
+        """influences  over bones and joints of bendy bones, in stored order"""
         self._influences = influences
         self._vertices = np.repeat(np.arange(len(influences.counts)), influences.counts)
-        self._shows = self._weighs_enough()
+        self._visible = self._visible_influences()
         self._last: tuple[np.ndarray, np.ndarray] | None = None
         self._seen: dict[str, tuple[np.ndarray, list[float]]] = {
             name: (np.zeros(len(influences.counts), dtype=bool), []) for name in _OF_POSES
         }
 
-    def look(self, rotations: np.ndarray, frame: float) -> None:
+    def add_pose(self, rotations: np.ndarray, frame: float) -> None:
         """One pose of an action, in the order of time.
 
         rotations  unit quaternions [4, bones + joints] of posed_from_rest
         """
         if self._last is not None:
-            # A bone's quaternion may come on either side: here it goes on from where it was.
+            # A bone's quaternion may come with either sign: take the one nearer to the last pose's.
             rotations = rotations * np.where(dots(rotations, self._last[0]) < 0.0, -1.0, 1.0)
         terms = rotations.take(self._influences.bones, axis=1)
-        sides, cosines, lengths = self._sides(terms)
-        half_turn = np.sin(np.radians(0.5 * DEGREES_FROM_HALF_TURN))
-        self._note("order_of_groups", self._depends_on_order(terms, sides), frame)
-        near = self._with(self._shows & (cosines <= half_turn)) | (lengths <= half_turn)
-        self._note("near_half_turn", near, frame)
+        signs, cosines, lengths = self._signs(terms)
+        limit = np.sin(np.radians(0.5 * DEGREES_FROM_180))
+        self._record("order_of_groups", self._depends_on_order(terms, signs), frame)
+        near = self._vertices_with(self._visible & (cosines <= limit)) | (lengths <= limit)
+        self._record("near_half_turn", near, frame)
         if self._last is not None:
-            self._note("jumps", self._with(self._shows & (sides != self._last[1])), frame)
-        self._last = (rotations, sides)
+            self._record("jumps", self._vertices_with(self._visible & (signs != self._last[1])), frame)
+        self._last = (rotations, signs)
 
     def findings(self) -> list[Finding]:
-        """What was seen in all poses; only what there is."""
+        """The faults that were found in any of the poses."""
         return [
             Finding(name, title, np.flatnonzero(seen), meaning, advice, frames=tuple(frames))
             for name, (title, meaning, advice) in _OF_POSES.items()
@@ -194,88 +195,90 @@ class PoseCheck:
             if frames
         ]
 
-    def _note(self, name: str, now: np.ndarray, frame: float) -> None:
+    def _record(self, name: str, now: np.ndarray, frame: float) -> None:
         seen, frames = self._seen[name]
         if now.any():
             seen |= now
             frames.append(frame)
 
-    def _with(self, chosen: np.ndarray) -> np.ndarray:
+    def _vertices_with(self, chosen: np.ndarray) -> np.ndarray:
         """bool [vertices]: those that have a chosen influence."""
         result = np.zeros(len(self._influences.counts), dtype=bool)
         result[self._vertices[chosen]] = True
         return result
 
-    def _weighs_enough(self) -> np.ndarray:
-        """bool [influences]: those that are heavy enough, and come behind enough, to show on either side."""
+    def _visible_influences(self) -> np.ndarray:
+        """bool [influences]: those whose change of sign moves the vertex visibly: both their own weight and
+        the weight before them are at least VISIBLE_SHARE of the vertex's."""
         weights = self._influences.weights.astype(np.float64)
         before = np.cumsum(weights) - weights
         before -= before[self._influences.offsets[self._vertices]]
-        whole = np.bincount(self._vertices, weights=weights, minlength=len(self._influences.counts))
-        return np.minimum(weights, before) >= WEIGHT_THAT_SHOWS * whole[self._vertices]
+        total = np.bincount(self._vertices, weights=weights, minlength=len(self._influences.counts))
+        return np.minimum(weights, before) >= VISIBLE_SHARE * total[self._vertices]
 
-    def _sides(self, terms: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The side of each influence (1 or -1) and the size of its cosine with the sum of those before it,
-        [influences]; the length of each vertex's whole sum as a part of its weights, [vertices]."""
+    def _signs(self, terms: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The sign of each influence (1 or -1) and the magnitude of its cosine with the sum of those before
+        it,
+        [influences]; the length of each vertex's sum of all as a share of its weights, [vertices]."""
         influences = self._influences
-        sides, cosines = np.ones((2, len(influences.bones)))
+        signs, cosines = np.ones((2, len(influences.bones)))
         sums = np.zeros((4, len(influences.counts)))
-        wholes = np.zeros(len(influences.counts))
+        totals = np.zeros(len(influences.counts))
         counts = influences.counts
         for rank in range(int(counts.max(initial=0))):
             vertices = np.flatnonzero(counts > rank)
-            places = influences.offsets[vertices] + rank
-            own, before = terms.take(places, axis=1), sums.take(vertices, axis=1)
+            indices = influences.offsets[vertices] + rank
+            own, before = terms.take(indices, axis=1), sums.take(vertices, axis=1)
             along = dots(own, before)
             if rank > 0:
-                cosines[places] = np.abs(along) / np.maximum(np.sqrt(dots(before, before)), 1e-12)
-            side = np.where(along < 0.0, -1.0, 1.0)
-            sides[places] = side
-            sums[:, vertices] = before + side * influences.weights[places] * own
-            wholes[vertices] += influences.weights[places]
-        shares = np.sqrt(dots(sums, sums)) / np.maximum(wholes, 1e-12)
-        return sides, cosines, np.where(wholes > 0.0, shares, 1.0)
+                cosines[indices] = np.abs(along) / np.maximum(np.sqrt(dots(before, before)), 1e-12)
+            sign = np.where(along < 0.0, -1.0, 1.0)
+            signs[indices] = sign
+            sums[:, vertices] = before + sign * influences.weights[indices] * own
+            totals[vertices] += influences.weights[indices]
+        shares = np.sqrt(dots(sums, sums)) / np.maximum(totals, 1e-12)
+        return signs, cosines, np.where(totals > 0.0, shares, 1.0)
 
-    def _depends_on_order(self, terms: np.ndarray, sides: np.ndarray) -> np.ndarray:
-        """bool [vertices]: another order of the influences puts some on other sides of the others."""
+    def _depends_on_order(self, terms: np.ndarray, signs: np.ndarray) -> np.ndarray:
+        """bool [vertices]: another order of the influences gives some of them other signs."""
         influences = self._influences
         result = np.zeros(len(influences.counts), dtype=bool)
         for count in range(3, int(influences.counts.max(initial=0)) + 1):
             vertices = np.flatnonzero(influences.counts == count)
-            places = influences.offsets[vertices][:, None] + np.arange(count)
-            quaternions = terms[:, places] * sides[places]  # [4, vertices, count]
+            indices = influences.offsets[vertices][:, None] + np.arange(count)
+            quaternions = terms[:, indices] * signs[indices]  # [4, vertices, count]
             products = np.einsum("ivj,ivk->vjk", quaternions, quaternions)
-            # Where all agree in pairs, each lies on the side of any sum of others.
-            unsure = np.flatnonzero((products < 0.0).any(axis=(1, 2)))
-            if len(unsure):
-                weighted = products[unsure] * influences.weights[places[unsure]][:, None, :]
-                result[vertices[unsure]] = _some_order_differs(weighted)
+            # Where all pairs lie in one hemisphere, each lies in that of any sum of others.
+            uncertain = np.flatnonzero((products < 0.0).any(axis=(1, 2)))
+            if len(uncertain):
+                weighted = products[uncertain] * influences.weights[indices[uncertain]][:, None, :]
+                result[vertices[uncertain]] = _some_order_differs(weighted)
         return result
 
 
 def _some_order_differs(products: np.ndarray) -> np.ndarray:
-    """bool [n]: whether taking terms in another order gives one another side.
+    """bool [n]: whether summing the terms in another order gives any of them another sign.
 
-    products  [n, terms, terms]: of row and column, times the column's weight; with all on the sides that the
-              first order gives
+    products  [n, terms, terms]: dot products of row and column, times the column's weight; the terms have the
+              signs that the stored order gives
     """
     count = products.shape[1]
     differs = np.zeros(len(products), dtype=bool)
     for order in _orders(count):
-        sides = np.ones((len(products), count))
+        signs = np.ones((len(products), count))
         for step in range(1, count):
             before = list(order[:step])
-            along = (products[:, order[step], before] * sides[:, before]).sum(axis=1)
-            sides[:, order[step]] = np.where(along < 0.0, -1.0, 1.0)
-        differs |= (sides != sides[:, :1]).any(axis=1)
+            along = (products[:, order[step], before] * signs[:, before]).sum(axis=1)
+            signs[:, order[step]] = np.where(along < 0.0, -1.0, 1.0)
+        differs |= (signs != signs[:, :1]).any(axis=1)
     return differs
 
 
 def _orders(count: int) -> Iterator[Sequence[int]]:
-    """All orders, or MOST_ORDERS from anywhere among them."""
+    """All orders of up to six influences, MAX_ORDERS random ones of more."""
     if count <= 6:
         yield from permutations(range(count))
         return
     generator = np.random.default_rng(count)
-    for _ in range(MOST_ORDERS):
+    for _ in range(MAX_ORDERS):
         yield generator.permutation(count).tolist()

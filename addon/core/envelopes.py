@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bone envelopes: the reach of a bone around its rest segment.
+"""Bone envelopes: the volume around a bone at rest within which it moves vertices.
 
 Based on: what Blender's Armature modifier does with Bone Envelopes and Envelope Multiply.
 """
@@ -18,9 +18,9 @@ class Envelopes:
     """The envelopes of all bones at rest, in armature space.
 
     heads, tails              float32 [bones, 3]
-    head_radii, tail_radii    float32 [bones], wholly inside up to here
-    distances                 float32 [bones], fading to nothing over this
-    weights                   float32 [bones], strength where a vertex has no groups
+    head_radii, tail_radii    float32 [bones], full weight up to this distance from the bone
+    distances                 float32 [bones], the weight falls to 0 over this distance beyond the radius
+    weights                   float32 [bones], weight of a vertex that has no groups
     multiply                  bool [bones], the envelope scales the bone's group weights
     """
 
@@ -36,7 +36,8 @@ class Envelopes:
         return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
     def reach(self, points: np.ndarray, bones: np.ndarray) -> np.ndarray:
-        """float64 [n] in 0..1: how far the envelope of bones[i] holds points[i] ([n, 3], armature space)."""
+        """float64 [n] in 0..1: the weight of points[i] ([n, 3], armature space) in the envelope of
+        bones[i]."""
         head = self.heads[bones].astype(np.float64)
         axis = self.tails[bones] - head
         length = np.linalg.norm(axis, axis=1)
@@ -53,7 +54,7 @@ class Envelopes:
 
 
 def multiply_by_envelopes(entries: Entries, envelopes: Envelopes, points: np.ndarray) -> Entries:
-    """The entries with the weights of Envelope Multiply bones scaled by their reach.
+    """The entries, with the weights of bones that have Envelope Multiply scaled by their envelopes.
 
     points  [vertices, 3], armature space
     """
@@ -67,9 +68,9 @@ def multiply_by_envelopes(entries: Entries, envelopes: Envelopes, points: np.nda
 def fill_from_envelopes(
     entries: Entries, envelopes: Envelopes, deform: np.ndarray, points: np.ndarray
 ) -> Entries:
-    """The entries, and for vertices that have none those of every envelope that reaches them.
+    """The entries; vertices without any get one for every envelope that reaches them.
 
-    A vertex with an entry of weight zero has one: it is not filled.
+    An entry of weight 0 counts as an entry: such a vertex gets none.
 
     deform  bool [bones]
     points  [vertices, 3], armature space
@@ -78,12 +79,12 @@ def fill_from_envelopes(
     candidates = np.flatnonzero(deform)
     vertices, bones = (grid.ravel() for grid in np.meshgrid(bare, candidates, indexing="ij"))
     weights = envelopes.reach(points[vertices].astype(np.float64), bones) * envelopes.weights[bones]
-    held = weights > 0.0
-    # Sorted by vertex, and stable: bones stay in their order, groups in theirs.
-    all_vertices = np.concatenate([entries.vertices, vertices[held]])
+    reached = weights > 0.0
+    # A stable sort by vertex: bones and groups keep their order.
+    all_vertices = np.concatenate([entries.vertices, vertices[reached]])
     order = np.argsort(all_vertices, kind="stable")
     return Entries(
         np.bincount(all_vertices, minlength=len(entries.counts)).astype(np.int32),
-        np.concatenate([entries.bones, bones[held].astype(np.int32)])[order],
-        np.concatenate([entries.weights, weights[held].astype(np.float32)])[order],
+        np.concatenate([entries.bones, bones[reached].astype(np.int32)])[order],
+        np.concatenate([entries.weights, weights[reached].astype(np.float32)])[order],
     )

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The exceptions that carry a sentence for the user."""
+"""Exceptions whose message is one sentence for the user."""
 
 
 class SinewError(Exception):
-    """What is wrong and what to do, in one sentence."""
+    """The message says what is wrong and what to do."""
 
 
 class WrongUse(SinewError):  # noqa: N818
-    """What was asked for makes no sense; nothing has been done."""
+    """The arguments make no sense; nothing has been done."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from .errors import WrongUse
 
-# Blender's own; it would take frames beyond for these.
+# Blender's limits; it clamps frames beyond them without a message.
 FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574
 
 
@@ -18,7 +18,7 @@ def parse_frames(text: str) -> list[float]:
     for part in text.split(","):
         part = part.strip()
         try:
-            # The first character can be a sign, so a range's dash is looked for behind it.
+            # The first character can be a minus sign: a range's dash comes later.
             dash = part.find("-", 1)
             if dash > 0:
                 first: float = int(part[:dash])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures compared with golden ones: a number for how much they differ, and a picture that shows where."""
+"""Comparison of pictures with golden ones: how much they differ, and a picture of where."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .heat import viridis
 from .views import View
 
 SETTINGS = "render.json"
-# A pixel differs when a channel does by more than this part of its range. Along the edges of one mesh,
-# Blender 4.2 and 5.2 differ by up to 0.19.
+# A pixel differs visibly when a channel differs by more than this share of its range. Along the edges of one
+# mesh, pictures of Blender 4.2 and 5.2 differ by up to 0.19.
 VISIBLE = 0.2
 
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """What made a folder of pictures, kept beside them: the same again can be compared with it.
+    """How a folder of pictures was made, stored with them, so that they can be made again in the same way.
 
-    engine   "workbench" or "cycles"; with own_look what the file says
+    engine   "workbench" or "cycles"; with own_look the file's own
     size     pixels of the longer side
     views    one for each frame; none with own_look
     """
@@ -42,7 +42,7 @@ class RenderSettings:
         return json.dumps(asdict(self), indent=1, default=lambda array: array.tolist())
 
     def _check_types(self) -> None:
-        """Raises TypeError or ValueError where a value is none that to_json() wrote."""
+        """Raises TypeError or ValueError for values that to_json() does not write."""
         kinds = {"file": str, "method": str, "engine": str, "size": int, "own_look": bool}
         if not all(isinstance(getattr(self, name), kind) for name, kind in kinds.items()):
             raise TypeError
@@ -76,17 +76,17 @@ class RenderSettings:
 
 
 def picture_name(frame: float) -> str:
-    """Sorts by frame: 0001.png, 0006.50.png; another one for each frame."""
+    """Such as 0001.png, 0006.50.png: different for each frame, and sorted by frame."""
     whole = int(np.floor(frame))
-    # Two digits, and more only where they are needed.
+    # Two decimals, more only where needed.
     exact = f"{Decimal(repr(float(frame))) - whole:f}"[2:]
-    part = f".{exact.ljust(2, '0')}" if frame != whole else ""
-    return f"{whole:04d}{part}.png"
+    decimals = f".{exact.ljust(2, '0')}" if frame != whole else ""
+    return f"{whole:04d}{decimals}.png"
 
 
 def difference(picture: np.ndarray, golden: np.ndarray) -> np.ndarray:
     """float [height, width]: the largest difference of a channel, 0..1, over pixels of [height, width, 4] in
-    0..1 whose alpha is not yet multiplied into their colour."""
+    0..1 with straight alpha."""
     return np.abs(_over_black(picture) - _over_black(golden)).max(axis=2)
 
 

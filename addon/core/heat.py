@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Values as colours: the range that is shown, a perceptually uniform colour map, the legend's numbers."""
+"""Heat map colours: the range of values, a perceptually uniform colour map, the legend's numbers."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ _VIRIDIS = bytes.fromhex(
     "28ae802eb37c35b7793dbc7446c06f50c46a5ac86465cb5e70cf577cd25089d54895d840a2da37b0dd2fbddf26cae11f"
     "d8e219e5e419f1e51dfde725"
 )
-# Ratios beyond this many doublings or halvings share the last colour.
-MOST_DOUBLINGS = 2.0
-LEAST_DOUBLINGS = 0.1
-# Lengths of one method beyond this many times those of all others do so, too.
+# A range of ratios ends at most at this many doublings or halvings, and at least at so many.
+MAX_DOUBLINGS = 2.0
+MIN_DOUBLINGS = 0.1
+# A range of lengths ends at most at this many times the largest of all methods but the one with the largest.
 BEYOND_OTHERS = 2.0
 
 
 def viridis(shares: np.ndarray) -> np.ndarray:
     """float64 [n, 3], sRGB in 0..1: dark violet at 0, green at 0.5, yellow at 1; clipped outside."""
     stops = np.frombuffer(_VIRIDIS, dtype=np.uint8).reshape(-1, 3) / 255.0
-    places = np.clip(shares, 0.0, 1.0) * (len(stops) - 1)
-    first = np.minimum(places.astype(np.intp), len(stops) - 2)
+    positions = np.clip(shares, 0.0, 1.0) * (len(stops) - 1)
+    first = np.minimum(positions.astype(np.intp), len(stops) - 2)
     steps = np.diff(stops, axis=0)
-    return stops.take(first, axis=0) + (places - first)[..., None] * steps.take(first, axis=0)
+    return stops.take(first, axis=0) + (positions - first)[..., None] * steps.take(first, axis=0)
 
 
-# Finer than 8 bits show.
+# Finer than the steps of 8-bit colours.
 _STEPS = 1024
 
 
@@ -44,15 +44,15 @@ def _linear_viridis() -> np.ndarray:
 
 
 def linear(colours: np.ndarray) -> np.ndarray:
-    """Scene-linear colours, as Blender stores them, of sRGB in 0..1."""
+    """sRGB colours in 0..1 as scene-linear ones, which Blender stores."""
     return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
 
 
 @dataclass(frozen=True)
 class HeatScale:
-    """Which values the colours stand for: `low` the first, `high` the last.
+    """The range of values that the colours cover, from `low` to `high`.
 
-    clipped  there are values beyond, which share the first or last colour
+    clipped  some values lie outside the range; they have the first or last colour
     """
 
     metric: Metric
@@ -62,10 +62,11 @@ class HeatScale:
 
     @classmethod
     def over(cls, metric: Metric, methods: Sequence[Sequence[Summary]], diagonal: float) -> HeatScale:
-        """Wide enough for the shapes summed up: those of one frame, or of all, so that colours compare.
+        """A range for all shapes of the summaries, those of one frame or of many, so that colours can be
+        compared.
 
-        methods   for each method its summaries; one that tears the mesh apart does not make all others pale
-        diagonal  of the rest shape: differences below a ten thousandth of it are not blown up
+        methods   for each method its summaries; outliers of a single method are clipped
+        diagonal  of the rest shape: the range of lengths is at least a ten thousandth of it
         """
         return cls._up_to(metric, [_largest(metric, summaries) for summaries in methods], diagonal)
 
@@ -76,7 +77,8 @@ class HeatScale:
 
     @classmethod
     def fixed(cls, metric: Metric, end: float, least: float, most: float) -> HeatScale:
-        """That ends at a length, or at a ratio above 1, for values from `least` to `most`."""
+        """A range that ends at the length, or at the ratio above 1, `end`; for values from `least` to
+        `most`."""
         beyond = _magnitude(metric, [least, most])
         return cls._to(metric, end, beyond > (np.log2(end) if metric.scale == "log" else end))
 
@@ -93,8 +95,8 @@ class HeatScale:
         largest = sorted(largest, reverse=True)
         beyond = max(largest, default=0.0)
         if metric.scale == "log":
-            factor = 2.0 ** float(np.clip(beyond, LEAST_DOUBLINGS, MOST_DOUBLINGS))
-            return cls._to(metric, factor, beyond > MOST_DOUBLINGS)
+            factor = 2.0 ** float(np.clip(beyond, MIN_DOUBLINGS, MAX_DOUBLINGS))
+            return cls._to(metric, factor, beyond > MAX_DOUBLINGS)
         least = max(1e-4 * diagonal, 1e-12)
         most = beyond
         if len(largest) > 1 and largest[1] > least:
@@ -107,15 +109,15 @@ class HeatScale:
         return viridis(self._shares(values))
 
     def linear_colours(self, values: np.ndarray) -> np.ndarray:
-        """float32 [n, 3], the same scene-linear, to 0.002: from a table, for it is asked for every frame."""
+        """float32 [n, 3], scene-linear, to 0.002: from a table, as it is needed for every frame."""
         shares = self._shares(values)
         shares *= _STEPS - 1
         shares += 0.5
-        places = np.clip(shares, 0, _STEPS - 1, out=shares).astype(np.intp)
-        return _linear_viridis().take(places, axis=0)
+        indices = np.clip(shares, 0, _STEPS - 1, out=shares).astype(np.intp)
+        return _linear_viridis().take(indices, axis=0)
 
     def _shares(self, values: np.ndarray) -> np.ndarray:
-        """How far along the scale values lie: 0 to 1, or beyond."""
+        """Where values lie on the scale: 0 at `low`, 1 at `high`."""
         if self.metric.scale == "log":
             values, low, high = np.log(np.maximum(values, 1e-12)), np.log(self.low), np.log(self.high)
         else:
@@ -123,13 +125,13 @@ class HeatScale:
         return (values - low) / (high - low)
 
     def severity(self, values: np.ndarray) -> np.ndarray:
-        """How far each value is from that of an undeformed mesh; largest where it is worst."""
+        """How far each value is from that of an undeformed mesh: the larger, the worse."""
         if self.metric.scale == "log":
             return np.abs(np.log(np.maximum(values, 1e-12)))
         return np.abs(values)
 
     def ticks(self, count: int = 5) -> list[float]:
-        """Values at even distances along the legend, from the low end to the high one."""
+        """Values at equal distances along the legend, from `low` to `high`."""
         if self.metric.scale == "log":
             return np.geomspace(self.low, self.high, count).tolist()
         return np.linspace(self.low, self.high, count).tolist()
@@ -140,7 +142,7 @@ def _largest(metric: Metric, summaries: Sequence[Summary]) -> float:
 
 
 def _magnitude(metric: Metric, values: Sequence[float]) -> float:
-    """The largest; of a ratio in doublings or halvings."""
+    """The largest magnitude; for a ratio, of its doublings or halvings."""
     if metric.scale == "log":
         # A face or an edge may have shrunk to nothing.
         return max((abs(float(np.log2(max(value, 1e-12)))) for value in values), default=0.0)

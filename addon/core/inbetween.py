@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What lies between keyed poses: `sinew.interpolate` and `sinew.spline` on bones that have a scale, too.
+"""Poses between keyed poses: `sinew.interpolate` and `sinew.spline` for bones that also have a scale.
 
-Every bone is on its own, relative to its parent; made from transforms relative to the root, bones would
-leave their parents' ends (Smith 2013, figure 3.3). The method makes the rigid part; the scale is the mean of
-the keyed scales, by the same weights.
+Each bone is interpolated relative to its parent: interpolated relative to the root, bones would separate from
+their parents' tails (Smith 2013, figure 3.3). The method makes the rigid part; the scale is the mean of the
+keyed scales, by the same weights.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import numpy as np
 import sinew
 from sinew import affine, interpolate, quat_vec, spline
 
-# The choice beside METHODS: the action's own curves.
+# The choice of none of METHODS: the action's own curves.
 BLENDER = "blender"
 
-# From key to key, or on a spline through four.
+# Between two keys, or on a spline through four.
 STRAIGHT, SPLINE = "straight", "spline"
 
-# How far past its keys a timing may carry a bone, as a part of the way between them. Easing of type Elastic
-# swings by an amount of its own, however short the way; keys that differ by a rounding are not thrown far.
-FARTHEST = (-10.0, 11.0)
+# The range of progress() beyond its keys. Easing of type Elastic overshoots by a fixed amount, however close
+# the keys: without a limit, keys that differ by a rounding error would overshoot without bound.
+PROGRESS_RANGE = (-10.0, 11.0)
 
 
 class Method(NamedTuple):
@@ -34,14 +34,14 @@ class Method(NamedTuple):
     number: int
 
 
-# The number is what files hold.
+# The numbers are stored in files.
 METHODS = {
     method.name: method
     for method in (
         Method(
             "matrix_linear",
             "Matrix, linear",
-            "Matrices component by component: bones grow thin between keys turned far from each other",
+            "Matrices component by component: bones grow thin between keys rotated far from each other",
             1,
         ),
         Method("matrix_polar", "Matrix, made rigid", "The same, brought back to the nearest rotation", 2),
@@ -52,14 +52,17 @@ METHODS = {
             3,
         ),
         Method(
-            "qv_nlerp", "QV, nlerp", "The shortest turn, at a slightly uneven pace; location goes straight", 4
+            "qv_nlerp",
+            "QV, nlerp",
+            "The shortest rotation, at a slightly uneven pace; location goes straight",
+            4,
         ),
-        Method("qv_slerp", "QV, slerp", "The shortest turn, at an even pace; location goes straight", 5),
+        Method("qv_slerp", "QV, slerp", "The shortest rotation, at an even pace; location goes straight", 5),
         Method("dlb", "DLB", "Dual quaternions, linear: nearly a screw, at a slightly uneven pace", 6),
         Method(
             "sclerp",
             "ScLERP",
-            "The screw from key to key: a bone that turns and moves swings along an arc, at an even pace",
+            "The screw from key to key: a bone that rotates and moves swings along an arc, at an even pace",
             7,
         ),
         Method("dib", "DIB", "ScLERP between two keys; on a spline, all keys blended iteratively", 8),
@@ -67,10 +70,10 @@ METHODS = {
 }
 
 
-# What to say of bones for which the method has no one answer.
+# Warnings for bones whose in-betweens the method does not define uniquely.
 TOO_FAR = {
-    STRAIGHT: "turns by half a turn or more from key to key, and takes the shorter way: key in between",
-    SPLINE: "turns too far for this spline, and may jump: key in between, or choose DLB or QV, nlerp",
+    STRAIGHT: "rotates by 180 degrees or more from key to key, and takes the shorter way: key in between",
+    SPLINE: "rotates too far for this spline, and may jump: key in between, or choose DLB or QV, nlerp",
 }
 
 
@@ -82,7 +85,8 @@ class Poses(NamedTuple):
 
 
 class Inbetweens(NamedTuple):
-    """The poses, and whether the method defines each; sinew.interpolate says what it has if not."""
+    """The poses, and whether the method defines each; sinew.interpolate documents the results that it does
+    not define."""
 
     poses: Poses
     is_defined: np.ndarray
@@ -107,27 +111,28 @@ def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Met
     blended = interpolate.Blended(
         np.array([value.transforms for value in values]), np.array([value.is_defined for value in values])
     )
-    # A shift alone is the mean of the keys' shifts: the scales travel as shifts.
-    shifts = np.zeros_like(keys.rigid) + quat_vec.identity()
-    shifts[..., 4:] = keys.scale
-    roots = sinew.Skeleton(np.full(shifts.shape[1], -1, dtype=np.int32))
-    scale = roots.spline(shifts, times, at, "qv_nlerp")[0][:, 4:]
+    # The translation of a pair is the mean of the keys' translations: the scales are passed as translations.
+    translations = np.zeros_like(keys.rigid) + quat_vec.identity()
+    translations[..., 4:] = keys.scale
+    roots = sinew.Skeleton(np.full(translations.shape[1], -1, dtype=np.int32))
+    scale = roots.spline(translations, times, at, "qv_nlerp")[0][:, 4:]
     return _inbetweens(blended, scale, method)
 
 
 def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """How far along from `a` to `b` each bone is at `now`: [bones], 0 to 1, beyond within FARTHEST.
+    """[bones]: how far each bone is from `a` to `b` at `now`, 0 to 1; overshooting is limited to
+    PROGRESS_RANGE.
 
-    now, a, b  [bones, channels] as Blender's curves have them at this time and at the keys; channels without
-               keys are equal. The mean over the channels, each weighted with how far it goes, so that a bone
-               keeps the easing of its keys. 0 where a and b are equal.
+    now, a, b  [bones, channels], values of Blender's curves at this time and at the keys; channels without
+               keys are equal. The mean over the channels, each weighted with its change, so that a bone keeps
+               the easing of its keys. 0 where a and b are equal.
     """
     change = b - a
-    way = np.abs(change).sum(axis=1)
-    gone = (np.sign(change) * (now - a)).sum(axis=1)
-    # Below: what is left of equal keys in float32.
-    moves = way > 1e-6
-    return np.clip(np.divide(gone, way, out=np.zeros_like(way), where=moves), *FARTHEST)
+    total = np.abs(change).sum(axis=1)
+    covered = (np.sign(change) * (now - a)).sum(axis=1)
+    # Smaller changes are rounding errors of equal keys in float32.
+    moves = total > 1e-6
+    return np.clip(np.divide(covered, total, out=np.zeros_like(total), where=moves), *PROGRESS_RANGE)
 
 
 def _in_layout_of(method: str, rigid: np.ndarray) -> np.ndarray:
@@ -140,7 +145,7 @@ def _inbetweens(blended: interpolate.Blended, scale: np.ndarray, method: str) ->
     transforms = blended.transforms
     if method.startswith("matrix_"):
         if method == "matrix_linear":
-            # A bone has no shear: of a matrix that is not rigid its rotation and its axes' lengths are kept.
+            # A bone has no shear: only the rotation and the lengths of the axes of a matrix are used.
             scale = scale * np.linalg.norm(transforms[..., :3, :3], axis=-2)
             transforms = affine.normalized(transforms)
         rigid = affine.to_quat_vec(transforms)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From vertex groups, as stored, to the influences that a deformer is bound to."""
+"""Vertex groups as stored, and the influences made from them, which a deformer is bound to."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class GroupWeights:
 
 @dataclass(frozen=True)
 class Entries:
-    """Group entries that have a bone, zero weights among them.
+    """Entries of groups that belong to a bone, also those of weight 0.
 
     counts   int32 [vertices], entries of each vertex
     bones    int32 [entries]
@@ -65,8 +65,8 @@ class Entries:
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
     def influences(self) -> Influences:
-        """What deforms: entries of weight zero are left out, and so are all of a vertex whose weights sum to
-        SMALLEST_WEIGHT_SUM or less. Stored order is kept: dual quaternions depend on it."""
+        """The entries that deform: without those of weight 0, and without all of a vertex whose weights sum
+        to SMALLEST_WEIGHT_SUM or less. In stored order, on which dual quaternions depend."""
         vertices = self.vertices
         sums = np.bincount(vertices, weights=self.weights, minlength=len(self.counts))
         kept = (self.weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
@@ -98,9 +98,9 @@ class Influences:
 
 
 def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influences:
-    """Of several meshes as one, their vertices and their bones one after the other.
+    """The influences of several meshes as of one; vertices and bones are concatenated.
 
-    bone_counts  of the bones (and joints) that each part's influences number
+    bone_counts  of each part, including joints of bendy bones
     """
     offsets, bones, first_influence, first_bone = [np.zeros(1, np.int32)], [], 0, 0
     for part, count in zip(parts, bone_counts, strict=True):
@@ -113,12 +113,12 @@ def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influence
 
 
 def entries_of_bones(groups: GroupWeights, bone_of_group: np.ndarray) -> Entries:
-    """The entries of groups that have a bone.
+    """The entries of groups that belong to a bone.
 
-    bone_of_group  int32 [groups], the bone that each group moves with, -1 for none
+    bone_of_group  int32 [groups], the bone of each group, -1 for none
     """
     table = np.append(bone_of_group.astype(np.int32), np.int32(-1))
-    # A group index past the last group can stay behind in a mesh whose groups were deleted.
+    # A mesh whose groups were deleted can still have indices of groups past the last.
     bones = table[np.minimum(groups.groups, len(table) - 1)]
     kept = bones >= 0
     if kept.all():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Locks on files, which the system releases however a process ends."""
+"""File locks, which the system releases when a process ends, also when it is killed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if sys.platform == "win32":
     import msvcrt
 
     def _lock(descriptor: int) -> None:
-        # Beyond any file's end, as Windows lets nobody read what is locked.
+        # A byte beyond any file's end: on Windows others can not read locked bytes.
         os.lseek(descriptor, 1 << 40, os.SEEK_SET)
         msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures of a deformed mesh against its rest shape; docs/metrics.md defines each.
 
-Bind a Gauge to a mesh, tell it each frame's rest shape and bones, measure any number of shapes:
+Bind a Gauge to a mesh, set each frame's rest shape and bones, then measure any number of shapes:
 
     gauge = Gauge(surface, influences)
     gauge.set_frame(frame)
@@ -29,11 +29,11 @@ from .vectors import cross, dots
 class Metric:
     """A measure that each vertex has, to be shown as a heat map.
 
-    name       what programs say, Measured.field among them
-    label      what people read
+    name       for programs, such as Measured.field
+    label      for people
     unit       "length" (that of the points), "ratio" or "share"
     scale      how values become colours: "linear" from 0, "signed" around 0, "log" around 1
-    worst      the entry of a summary that says how bad a frame is: largest by magnitude is worst
+    worst      the entry of a summary by which frames are compared: the largest magnitude is the worst
     text       one sentence
     """
 
@@ -54,7 +54,7 @@ METRICS = {
             "length",
             "linear",
             "distance_max",
-            "How far each vertex lies from where the method compared with puts it.",
+            "The distance of each vertex from its position under the reference method.",
         ),
         Metric(
             "bulge",
@@ -87,7 +87,7 @@ METRICS = {
             "share",
             "linear",
             "flipped_area",
-            "The share of a vertex's faces that are turned against the bones that hold them.",
+            "The share of a vertex's faces that are flipped against the bones that move them.",
         ),
     )
 }
@@ -95,10 +95,10 @@ METRICS = {
 
 @dataclass(frozen=True)
 class FrameOfRig:
-    """What one frame's shapes are measured against; all in one space, whose unit lengths come out in.
+    """The rest shape and the bones of one frame; all in one space, in whose unit lengths are measured.
 
     rest        [vertices, 3], the shape that the bones deform
-    rest_axes   [bones, 2, 3], head and tail of each bone that influences name, at rest
+    rest_axes   [bones, 2, 3], head and tail of each bone that an influence has, at rest
     posed_axes  [bones, 2, 3], the same in the pose
     motions     [bones, 3, 3], linear part of posed_from_rest
     """
@@ -116,7 +116,7 @@ class FrameOfRig:
 
 @dataclass(frozen=True)
 class Summary:
-    """One shape in numbers; docs/metrics.md says how each is defined. Lengths in the unit of the points."""
+    """The numbers of one shape; docs/metrics.md defines each. Lengths in the unit of the points."""
 
     distance_max: float
     distance_rms: float
@@ -140,7 +140,7 @@ class Summary:
         return max(self.bulge_max, -self.bulge_min)
 
     def extremes(self, metric: str) -> tuple[float, float]:
-        """The least and largest value of one of METRICS at any vertex, or beyond."""
+        """Bounds of the values of one of METRICS at all vertices."""
         if metric == "distance":
             return 0.0, self.distance_max
         if metric == "flips":
@@ -166,17 +166,17 @@ class Gauge:
         """influences  of every vertex of the surface, over the bones of FrameOfRig's arrays"""
         self.surface = surface
         self._rest: Shape | None = None
-        self._hold = Hold(surface, influences)
+        self._skin = Skin(surface, influences)
         self._pose: Pose | None = None
 
     def set_frame(self, frame: FrameOfRig) -> None:
-        """What the shapes measured from now on are measured against."""
-        # Unless shape keys move it, or the object moves, it is that of the last frame.
+        """Sets the frame of the shapes to be measured next."""
+        # The rest shape changes only with shape keys or the object's transform.
         same = self._pose is not None and frame.rest is self._pose.frame.rest
         rest = self._rest
         if rest is None or not (same or np.array_equal(frame.rest.T, rest.points)):
             rest = Shape(self.surface, frame.rest)
-        self._rest, self._pose = rest, Pose(self._hold, rest, frame)
+        self._rest, self._pose = rest, Pose(self._skin, rest, frame)
 
     @property
     def rest(self) -> Shape:
@@ -187,87 +187,89 @@ class Gauge:
     def measure(
         self, points: np.ndarray, other: np.ndarray | Callable[[], np.ndarray] | None = None
     ) -> Measured:
-        """A shape [vertices, 3] in the frame set last, and how far it is from the shape `other`, or from what
-        that returns.
+        """Measures of a shape [vertices, 3] in the frame set last. Distances are to the shape `other`, or to
+        the one that it returns.
 
-        What is asked of the result is worked out then.
+        Each measure is computed when it is first read.
         """
         assert self._pose is not None, "set_frame() comes first"
         return Measured(self._pose, Shape(self.surface, points), other)
 
 
-class Hold:
-    """Which bones hold which vertices.
+class Skin:
+    """Which bones move which vertices.
 
-    held      int [held], the vertices that bones hold
-    starts    int64 [held], where the influences of each begin
-    heaviest  int [held], the bone of the largest weight of each, the first of equals
+    weighted  int [weighted], the vertices that have influences
+    starts    int64 [weighted], the index of the first influence of each
+    heaviest  int [weighted], the bone of the largest weight of each, the first of equals
     """
 
     def __init__(self, surface: Surface, influences: Influences) -> None:
         self.surface, self._influences = surface, influences
-        self.held = np.flatnonzero(influences.counts)
-        self.starts = influences.offsets[self.held].astype(np.int64)
-        self.heaviest = _heaviest_bones(influences, self.held, self.starts)
+        self.weighted = np.flatnonzero(influences.counts)
+        self.starts = influences.offsets[self.weighted].astype(np.int64)
+        self.heaviest = _heaviest_bones(influences, self.weighted, self.starts)
 
     def distances_from_axes(self, points: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        """float64 [held]: from the segment of the bone that holds each most, for points [3, vertices]."""
+        """float64 [weighted]: from the axis of each vertex's heaviest bone, for points [3, vertices]."""
         heads = np.ascontiguousarray(axes[:, 0].T, dtype=np.float64)
         bones = np.ascontiguousarray((axes[:, 1] - axes[:, 0]).T, dtype=np.float64)
         along = bones.take(self.heaviest, axis=1)
-        from_head = points.take(self.held, axis=1) - heads.take(self.heaviest, axis=1)
+        from_head = points.take(self.weighted, axis=1) - heads.take(self.heaviest, axis=1)
         squared = dots(along, along)
         share = np.divide(dots(from_head, along), squared, out=np.zeros_like(squared), where=squared > 0.0)
         offset = from_head - share.clip(0.0, 1.0) * along
         return np.sqrt(dots(offset, offset))
 
-    def carried_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """float32 [3, triangles]: normals, of any length, turned with the bones of their corners.
+    def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """float32 [3, triangles]: normals, of any length, rotated with the bones of their corners.
 
         rotations  unit quaternions [4, bones]
         """
-        # Single precision tells on which side a face looks.
+        # Only the sign of a dot product is needed: single precision is enough.
         rotations = rotations.astype(np.float32)
-        turns = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
-        turns[0] = 1.0
-        if len(self.held):
+        vertex_rotations = np.zeros((4, self.surface.vertex_count), dtype=np.float32)
+        vertex_rotations[0] = 1.0
+        if len(self.weighted):
             bones, weights = self._influences.bones, self._influences.weights
-            heaviest = np.repeat(self.heaviest, self._influences.counts[self.held])
+            heaviest = np.repeat(self.heaviest, self._influences.counts[self.weighted])
             terms = rotations.take(bones, axis=1)
-            # All on the side of the heaviest: a sum of two then never cancels.
+            # All in the hemisphere of the heaviest: a sum of two then never cancels.
             terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
             sums = np.add.reduceat(terms, self.starts, axis=1)
-            turns[:, self.held] = sums / np.maximum(np.sqrt(dots(sums, sums)), np.float32(1e-12))
-        first, second, third = (turns.take(corner, axis=1) for corner in self.surface.corners)
+            vertex_rotations[:, self.weighted] = sums / np.maximum(
+                np.sqrt(dots(sums, sums)), np.float32(1e-12)
+            )
+        first, second, third = (vertex_rotations.take(corner, axis=1) for corner in self.surface.corners)
         one = np.float32(1.0)
         total = first + np.where(dots(first, second) < 0.0, -one, one) * second
         total += np.where(dots(first, third) < 0.0, -one, one) * third
         with np.errstate(over="ignore"):
             normals = normals.astype(np.float32)
-        # A face with a point that is no number has no normal.
+        # A face with a coordinate that is not finite has no normal.
         normals[~np.isfinite(normals)] = 0.0
         return rotated(total, normals)
 
 
 class Pose:
-    """What all shapes of one frame are measured against; worked out once, and only where it is asked for."""
+    """What all measures of one frame share; each is computed once, when it is first read."""
 
-    def __init__(self, hold: Hold, rest: Shape, frame: FrameOfRig) -> None:
-        self.hold, self.rest, self.frame = hold, rest, frame
+    def __init__(self, skin: Skin, rest: Shape, frame: FrameOfRig) -> None:
+        self.skin, self.rest, self.frame = skin, rest, frame
 
     @cached_property
     def rest_distances(self) -> np.ndarray:
-        """float64 [held]: from the axes at rest."""
-        return self.hold.distances_from_axes(self.rest.points, self.frame.rest_axes)
+        """float64 [weighted]: from the axes at rest."""
+        return self.skin.distances_from_axes(self.rest.points, self.frame.rest_axes)
 
     @cached_property
-    def carried_normals(self) -> np.ndarray:
-        """float32 [3, triangles]: rest normals as the bones turn them."""
-        return self.hold.carried_normals(self.rest.normals, self.frame.rotations)
+    def rotated_normals(self) -> np.ndarray:
+        """float32 [3, triangles]: rest normals rotated by the bones."""
+        return self.skin.rotated_normals(self.rest.normals, self.frame.rotations)
 
 
 class Shape:
-    """A surface at given points; the rest is worked out where it is asked for.
+    """A surface at given points; each property is computed once, when it is first read.
 
     points  float64 [3, vertices]
     """
@@ -299,7 +301,7 @@ class Shape:
     def volume(self) -> float:
         if len(self.surface.triangles) == 0:
             return 0.0
-        # Far from the origin the terms of a small mesh would be large and cancel.
+        # Far from the origin, the terms of a small mesh would be large and cancel.
         points = self.points - self.points.mean(axis=1, keepdims=True)
         inside = np.einsum("ij,ij->", points.take(self.surface.corners[0], axis=1), self.normals)
         return (float(inside) + self.surface.caps.volume(points)) / 6.0
@@ -315,35 +317,35 @@ class Shape:
 
 
 class Measured:
-    """One shape beside its rest shape: numbers, and the fields of METRICS."""
+    """The measures of one shape: numbers, and the fields of METRICS."""
 
     def __init__(self, pose: Pose, shape: Shape, other: np.ndarray | Callable[[], np.ndarray] | None) -> None:
-        """other  [vertices, 3], or what returns it: where distances are measured to"""
+        """other  [vertices, 3], or a function that returns it: the shape that distances are measured to"""
         self.rest, self.shape = pose.rest, shape
         self._pose, self._other = pose, other
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """float64 [vertices]: from the other shape, 0 where there is none."""
+        """float64 [vertices]: to the other shape; 0 without one."""
         if self._other is None:
             return np.zeros(self.shape.surface.vertex_count)
         other = self._other() if callable(self._other) else self._other
-        apart = self.shape.points - _by_axis(other)
-        return np.sqrt(dots(apart, apart))
+        offset = self.shape.points - _by_axis(other)
+        return np.sqrt(dots(offset, offset))
 
     @cached_property
     def bulge(self) -> np.ndarray:
         """float64 [vertices]"""
         bulge, pose = np.zeros(self.shape.surface.vertex_count), self._pose
-        hold = pose.hold
-        bulge[hold.held] = hold.distances_from_axes(self.shape.points, pose.frame.posed_axes)
-        bulge[hold.held] -= pose.rest_distances
+        skin = pose.skin
+        bulge[skin.weighted] = skin.distances_from_axes(self.shape.points, pose.frame.posed_axes)
+        bulge[skin.weighted] -= pose.rest_distances
         return bulge
 
     @cached_property
     def flipped(self) -> np.ndarray:
         """bool [triangles]"""
-        return dots(self.shape.normals, self._pose.carried_normals) < 0.0
+        return dots(self.shape.normals, self._pose.rotated_normals) < 0.0
 
     @cached_property
     def stretch(self) -> np.ndarray:
@@ -356,7 +358,7 @@ class Measured:
         return _ratios(self.shape.areas, self.rest.areas)
 
     def entry(self, name: str) -> float:
-        """One entry of the summary, or `bulge_worst`, without working out the others."""
+        """One entry of the summary, or `bulge_worst`, without computing the others."""
         return self._ENTRIES[name](self)
 
     def summary(self) -> Summary:
@@ -392,11 +394,16 @@ class Measured:
             return self.bulge
         if name == "stretch":
             return self._most_changed_edges()
-        parts, wholes = (_sums(surface, values) for values in self._per_triangle(name))
-        return np.divide(parts, wholes, out=np.full(len(parts), float(name == "area")), where=wholes > 0.0)
+        numerators, denominators = (_sums(surface, values) for values in self._per_triangle(name))
+        return np.divide(
+            numerators,
+            denominators,
+            out=np.full(len(numerators), float(name == "area")),
+            where=denominators > 0.0,
+        )
 
     def _per_triangle(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """What the vertices' shares are made of: parts and wholes, [triangles]."""
+        """Numerators and denominators of a vertex's ratio, [triangles]."""
         if name == "area":
             return self.shape.areas, self.rest.areas
         if name == "flips":
@@ -415,11 +422,11 @@ class Measured:
 
 
 def bone_axes(bones: Bones, matrices: np.ndarray) -> np.ndarray:
-    """float64 [bones + joints, 2, 3]: where the axis of each begins and ends, in the space of `matrices`.
+    """float64 [bones + joints, 2, 3]: the start and the end of each axis, in the space of `matrices`.
 
     matrices  [bones + joints, 4, 4], of the bones at rest or posed
 
-    The axis of a bendy bone's joint runs to its next joint, that of the last one from the joint before.
+    The axis of a bendy bone's joint ends at the next joint; that of the last joint ends at the one before.
     """
     matrices = matrices.astype(np.float64)
     heads, count = matrices[:, :3, 3], len(bones.names)
@@ -432,28 +439,28 @@ def bone_axes(bones: Bones, matrices: np.ndarray) -> np.ndarray:
 
 
 def _by_axis(points: np.ndarray) -> np.ndarray:
-    """float64 [3, n] of [n, 3]: axis by axis numpy computes, and gathers by take, several times faster."""
+    """float64 [3, n] of [n, 3]: numpy computes and gathers several times faster on contiguous coordinates."""
     return np.ascontiguousarray(points.T, dtype=np.float64)
 
 
-def _heaviest_bones(influences: Influences, held: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """int [held]: the bone of the largest weight of each vertex, the first of equals."""
-    if len(held) == 0:
+def _heaviest_bones(influences: Influences, weighted: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """int [weighted]: the bone of the largest weight of each vertex, the first of equals."""
+    if len(weighted) == 0:
         return np.empty(0, dtype=np.int64)
-    largest = np.repeat(np.maximum.reduceat(influences.weights, starts), influences.counts[held])
-    places = np.where(influences.weights == largest, np.arange(len(largest)), len(largest))
-    return influences.bones[np.minimum.reduceat(places, starts)].astype(np.int64)
+    largest = np.repeat(np.maximum.reduceat(influences.weights, starts), influences.counts[weighted])
+    indices = np.where(influences.weights == largest, np.arange(len(largest)), len(largest))
+    return influences.bones[np.minimum.reduceat(indices, starts)].astype(np.int64)
 
 
 def _ratios(values: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-    """`values` as parts of those at rest; 1 where there was nothing at rest."""
+    """Ratios of `values` to those at rest; 1 where the value at rest is 0."""
     return np.divide(values, at_rest, out=np.ones_like(values), where=at_rest > 0.0)
 
 
 def _rms(values: np.ndarray, weights: np.ndarray | None = None) -> float:
     if weights is None:
         weights = np.ones_like(values)
-    # Not by `@`: BLAS would start its threads for this, which takes longer than the sum.
+    # Not by `@`: BLAS would start its threads, which takes longer than the sum.
     return float(np.sqrt(_share(float((weights * values * values).sum()), float(weights.sum()))))
 
 
@@ -462,7 +469,7 @@ def _share(part: float, whole: float) -> float:
 
 
 def _change(value: float, at_rest: float) -> float:
-    """As a part of that at rest, 0 for none; NaN where there was nothing at rest."""
+    """The relative change; NaN where the value at rest is 0."""
     return value / at_rest - 1.0 if at_rest != 0.0 else float("nan")
 
 

@@ -6,16 +6,16 @@ from __future__ import annotations
 import re
 from fnmatch import fnmatchcase
 
-# What leads to another folder or drive, what no file's name can have, and what would be read as one of these.
+# Path separators and drives, characters that no file's name can have, and text that unquote() would change.
 _NOT_IN_FILE_NAMES = re.compile(r"[/\\\x00-\x1f\x7f]|^\.+$|(?<=^[A-Za-z]):|%(?=[0-9A-Fa-f]{2})")
 
 
 def fits(name: str, pattern: str) -> bool:
-    """Whether `pattern`, as "Cape*", means `name`: also the very name, which can have brackets."""
+    """Whether `name` matches a pattern such as "Cape*", or equals it: a name can have brackets."""
     return name == pattern or fnmatchcase(name, pattern)
 
 
 def as_file_name(name: str) -> str:
-    """A name that people gave to something, as the name of a file: "a/b" is "a%2Fb". Most stay as they are;
-    urllib.parse.unquote gives back each."""
+    """Any name as the name of a file: "a/b" becomes "a%2Fb", most names do not change. The inverse is
+    urllib.parse.unquote."""
     return _NOT_IN_FILE_NAMES.sub(lambda found: "".join(f"%{ord(char):02X}" for char in found[0]), name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether Blender can draw here."""
+"""Whether Blender can draw on this machine."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ _PROBE = (
 )
 
 
-def usual_engine(blender: str = "") -> str:
-    """What pictures are drawn by, unless it is said: "workbench", or "cycles" where that can not render."""
+def default_engine(blender: str = "") -> str:
+    """The default engine of pictures: "workbench", or "cycles" where Workbench can not render."""
     return "workbench" if has_opengl(blender) else "cycles"
 
 
 def has_opengl(blender: str = "") -> bool:
-    """Whether Workbench can render here. Tried in a process of its own, which takes as long as Blender to
-    start: without OpenGL, Blender aborts.
+    """Whether Workbench can render here. It is tried in a new Blender process, which takes as long as Blender
+    to start: without OpenGL, Blender aborts.
 
     blender  the program's path; "" where it is a module of this Python
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes files so that a reader never finds half of one; where that can not be, says so in one sentence."""
+"""Writes whole files: a reader never finds a half-written one. A failure is reported in one sentence."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from .errors import SinewError, WrongUse
 
 
 def remove(path: Path) -> None:
-    """Takes away what is not wanted, if it is there and can be: on a read-only disk even asking fails."""
+    """Removes a file where it exists and can be removed; on a read-only disk even the attempt raises
+    OSError."""
     with suppress(OSError):
         path.unlink(missing_ok=True)
 
 
 def sentence(error: OSError) -> str:
-    """What an error of the system says, with the file that it names."""
+    """The message of an error of the system, with the file that it is about."""
     what = error.strerror or str(error) or type(error).__name__
     return f"{error.filename}: {what}" if error.filename is not None else what
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """A context in which an OSError becomes the SinewError that `path` can not be written."""
+    """A context that raises an OSError as the SinewError that `path` can not be written."""
     try:
         yield
     except OSError as error:
@@ -36,16 +37,16 @@ def writing(path: Path) -> Iterator[None]:
 def folder_to_write(given: str | Path) -> Path:
     """The type of an argument that names a folder to write to.
 
-    Raises SinewError where files can not be written to it, be it there or to be made: known before what takes
-    long.
+    Raises SinewError where files can not be written to it, or where it does not exist and can not be made. So
+    the error comes before a long computation.
     """
     folder = Path(given)
-    nearest = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
+    nearest = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
     if not nearest.is_dir():
         what = "a file" if nearest.exists() else "a link to nothing"
         raise SinewError(f"{folder}: can not be written: {nearest} is {what}")
     try:
-        # Tried, for root has every permission, on a read-only disk and in /proc as well.
+        # Permissions do not tell: root has all of them, also on a read-only disk and in /proc.
         with tempfile.TemporaryFile(dir=nearest):
             pass
     except OSError as error:
@@ -56,8 +57,8 @@ def folder_to_write(given: str | Path) -> Path:
 
 
 def file_to_write(given: str | Path, endings: tuple[str, ...]) -> Path:
-    """The type of an argument that names a file to write, or to replace. Raises as folder_to_write(), and
-    WrongUse where its name has none of the `endings`: a slip of the hand would replace something else."""
+    """The type of an argument that names a file to write or to replace. Raises as folder_to_write() does, and
+    WrongUse where its name has none of the `endings`: a mistyped argument must not replace another file."""
     path = Path(given)
     if path.suffix.lower() not in endings:
         raise WrongUse(f"{path}: expected a name ending in {', '.join(endings)}")
@@ -70,14 +71,15 @@ def file_to_write(given: str | Path, endings: tuple[str, ...]) -> Path:
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Has `write` make a file beside `path`, then renames it; its folder is made where it is missing.
+    """Calls `write` with a temporary path in the folder of `path`, then renames the file; makes missing
+    folders.
 
-    Raises SinewError where it can not be written. Whatever is raised, nothing half-written is left.
+    Raises SinewError where it can not be written. After any exception the temporary file is removed.
     """
-    # The ending stays: some writers go by it.
+    # With the same suffix: some writers choose the format by it.
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     made = [folder for folder in path.parents if not folder.exists()]
-    # A link of that name, in a folder from elsewhere, would be written through.
+    # A symbolic link of that name, in a folder made by somebody else, would be followed.
     remove(unfinished)
     try:
         with writing(path):
@@ -87,11 +89,11 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     except BaseException:
         remove(unfinished)
         for folder in made:
-            with suppress(OSError):  # it has something in it by now
+            with suppress(OSError):  # it is no longer empty
                 folder.rmdir()
         raise
 
 
 def write_text(path: Path, text: str) -> None:
-    """As UTF-8. Names on a disk need not be text: what is not is shown with a ?."""
+    """Writes UTF-8. File names on a disk need not be valid text: other bytes become a "?"."""
     write_whole(path, lambda unfinished: unfinished.write_bytes(text.encode("utf-8", errors="replace")))

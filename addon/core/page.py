@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of a comparison: one HTML file that holds its pictures and needs nothing else."""
+"""The page of a comparison: one HTML file that contains its pictures and needs no other file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ import numpy as np
 
 from .comparison import Comparison
 from .diagnostics import Finding
+from .errors import SinewError
 from .heat import HeatScale, viridis
 from .plots import colour_of, line_plot
 
-# Title, unit and entries of the summaries: a line for each method and entry.
+# Title, unit and entries of the summaries. A plot has a line for each method and entry.
 PLOTS = (
     ("Distance, largest", "length", ("distance_max",)),
     ("Volume change", "percent", ("volume_change",)),
@@ -47,7 +48,7 @@ class Sheet:
 
 
 def page(comparison: Comparison, sheets: Sequence[Sheet], note: str = "") -> str:
-    """note  one sentence for the top: what was not possible"""
+    """note  one sentence for the top of the page, about what was not possible"""
     title = f"{comparison.file}: {', '.join(comparison.meshes)}"
     body = [
         f"<h1>{escape(comparison.file)}</h1>",
@@ -166,7 +167,10 @@ def _plots(comparison: Comparison) -> str:
             for method, label in comparison.methods.items()
         }
         shown = {"length": comparison.unit, "percent": "%"}.get(unit, unit)
-        plots.append(line_plot(title, shown, comparison.frames, lines))
+        try:
+            plots.append(f'<div class="plot">{line_plot(title, shown, comparison.frames, lines)}</div>')
+        except SinewError as error:
+            return f'<h2>Over the frames</h2><p class="note">Not drawn: {escape(str(error))}.</p>'
     keys = "".join(
         f"<span>{_key(number)}{escape(label)}</span>"
         for number, label in enumerate(comparison.methods.values())
@@ -199,10 +203,10 @@ def _legend(scale: HeatScale, unit: str) -> str:
     texts = legend_texts(scale, unit)
     ticks = []
     for number, text in enumerate(texts):
-        place = 100 * number / (len(texts) - 1)
-        # Centred below its colour, but for those at the ends.
-        shift = {0: 0, len(texts) - 1: 100}.get(number, 50)
-        ticks.append(f'<span style="left:{place}%;transform:translateX(-{shift}%)">{escape(text)}</span>')
+        position = 100 * number / (len(texts) - 1)
+        # Centred below its colour; the first and the last are aligned with the ends.
+        offset = {0: 0, len(texts) - 1: 100}.get(number, 50)
+        ticks.append(f'<span style="left:{position}%;transform:translateX(-{offset}%)">{escape(text)}</span>')
     return (
         f'<div class="legend"><div class="ramp" style="background:linear-gradient(to right, {stops})"></div>'
         f'<div class="ticks">{"".join(ticks)}</div></div>'
@@ -210,7 +214,7 @@ def _legend(scale: HeatScale, unit: str) -> str:
 
 
 def legend_texts(scale: HeatScale, unit: str) -> list[str]:
-    """The legend's numbers with their unit, from the low end to the high one."""
+    """The legend's numbers with their unit, from low to high."""
     if scale.metric.unit == "length":
         texts = [f"{value:.3g} {unit}" for value in scale.ticks()]
     elif scale.metric.unit == "share":
@@ -312,10 +316,7 @@ table { border-collapse: collapse; } td, th { padding: 4px 12px 4px 0; text-alig
 .keys > span { margin-right: 20px; } .finding { margin: 10px 0; padding-left: 12px;
   border-left: 3px solid var(--warn); } .finding p { margin: 2px 0; }
 .plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(380px, 1fr)); gap: 12px; }
-.plot { width: 100%; } .plot text { font: 11px system-ui, sans-serif; fill: var(--text); }
-.plot .plot-title { font-size: 13px; font-weight: 600; } .plot .faint { fill: var(--faint); }
-.plot polyline { fill: none; stroke-linejoin: round; }
-.plot .grid { stroke: var(--line); } .plot .axis { stroke: var(--faint); }
+.plot svg { width: 100%; height: auto; }
 .legend { max-width: 560px; margin: 6px 0 10px; } .ramp { height: 14px; border-radius: 3px; }
 .ticks { position: relative; height: 18px; font-size: 12px; }
 .ticks span { position: absolute; white-space: nowrap; }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parameters of methods and stages by the names that commands and job files use, such as mix.group."""
+"""Parameters of methods and stages, by the names that commands and job files use, such as mix.group."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ OFF = "off"
 SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 
-def named() -> dict[str, sinew.Parameter]:
-    """Every parameter by its whole name."""
+def by_full_name() -> dict[str, sinew.Parameter]:
+    """Every parameter by its full name."""
     owners: list[sinew.Method | sinew.Stage] = [*sinew.methods(), *sinew.stages()]
     return {f"{owner.name}.{each.id}": each for owner in owners for each in owner.parameters}
 
 
 def parse(texts: Iterable[str]) -> dict[str, Value]:
-    """What NAME=VALUE texts set, by whole names; later ones win. A stage's name alone is its first parameter.
+    """The values of NAME=VALUE texts by full names; later ones win. A stage's name alone is its first
+    parameter.
 
     Raises WrongUse.
     """
-    parameters = named()
+    parameters = by_full_name()
     short = {stage.name: f"{stage.name}.{stage.parameters[0].id}" for stage in sinew.stages()}
     values: dict[str, Value] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals:
             raise WrongUse(f"expected NAME=VALUE, got {text!r}")
-        whole = short.get(name, name)
-        if whole not in parameters:
+        full_name = short.get(name, name)
+        if full_name not in parameters:
             raise WrongUse(f"expected one of {', '.join((*short, *parameters))}, got {name!r}")
-        values[whole] = _read(name, parameters[whole], value)
+        values[full_name] = _read(name, parameters[full_name], value)
     return values
 
 
@@ -67,8 +68,8 @@ def _read_number(name: str, parameter: sinew.Parameter, text: str) -> float | in
     least = -math.inf if parameter.min is None else parameter.min
     most = math.inf if parameter.max is None else parameter.max
     if not (math.isfinite(number) and least <= number <= most):
-        whole = "a whole number" if parameter.kind == "int" else "a number"
-        raise WrongUse(f"{name}: expected {whole} from {least:g} to {most:g}, got {text!r}")
+        wanted = "a whole number" if parameter.kind == "int" else "a number"
+        raise WrongUse(f"{name}: expected {wanted} from {least:g} to {most:g}, got {text!r}")
     return number
 
 

@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Line plots over frames, as SVG for a page: text, and nothing to install."""
+"""Plots as SVG text for a page, by matplotlib. Blender's own Python does not have it."""
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Mapping, Sequence
-from html import escape
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from .errors import SinewError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Told apart by people of all kinds of colour vision (M. Okabe, K. Ito, 2008); readable on light and dark.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#7f7f7f")
 
-WIDTH, HEIGHT = 460, 240
-LEFT, RIGHT, TOP, BOTTOM = 62, 14, 30, 34
+# Replaced by the page's own colour of text, which is light in a dark page. No other part of a plot has it.
+_TEXT_COLOUR = "#010203"
 
 
 def line_plot(
@@ -20,87 +28,87 @@ def line_plot(
     """An <svg> with the lines of each method in its colour, in the order of `lines`.
 
     lines  by method, one or more lines of a value for each frame; values that are not finite leave gaps
+
+    Raises SinewError where matplotlib is missing.
     """
-    values = [v for own in lines.values() for line in own for v in line if math.isfinite(v)]
-    low, high = min([0.0, *values]), max([0.0, *values])
-    if high - low < 1e-12:
-        high = low + 1.0
-    marks = _round_marks(low, high)
-    low, high = min(low, marks[0]), max(high, marks[-1])
-    first, last = min(frames), max(frames)
-
-    def x(frame: float) -> float:
-        return LEFT + (WIDTH - LEFT - RIGHT) * (0.5 if first == last else (frame - first) / (last - first))
-
-    def y(value: float) -> float:
-        return TOP + (HEIGHT - TOP - BOTTOM) * (high - value) / (high - low)
-
-    parts = [
-        f'<svg class="plot" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">',
-        f"<title>{escape(title)}</title>",
-        f'<text x="{LEFT}" y="18" class="plot-title">{escape(title)}'
-        f'<tspan class="faint"> {escape(unit)}</tspan></text>',
-    ]
-    for mark in marks:
-        kind = "axis" if mark == 0.0 else "grid"
-        parts.append(
-            f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(mark):.1f}" y2="{y(mark):.1f}" class="{kind}"/>'
-            f'<text x="{LEFT - 8}" y="{y(mark) + 4:.1f}" text-anchor="end">{_number(mark, marks)}</text>'
-        )
-    frame_marks = [first] if first == last else _round_marks(first, last, 6)
-    for mark in frame_marks:
-        if first <= mark <= last:
-            parts.append(
-                f'<line x1="{x(mark):.1f}" x2="{x(mark):.1f}" y1="{HEIGHT - BOTTOM}" '
-                f'y2="{HEIGHT - BOTTOM + 4}" class="axis"/>'
-                f'<text x="{x(mark):.1f}" y="{HEIGHT - BOTTOM + 17}" text-anchor="middle">'
-                f"{_number(mark, frame_marks)}</text>"
-            )
-    for number, (method, own) in enumerate(lines.items()):
-        # Where lines lie on each other, the one below still shows on both sides.
-        colour, width = colour_of(number), 1.6 + 1.4 * min(len(lines) - 1 - number, 3)
-        for line in own:
-            for run in _runs(frames, line):
-                points = " ".join(f"{x(frame):.1f},{y(value):.1f}" for frame, value in run)
-                if len(run) == 1:
-                    cx, cy = points.split(",")
-                    parts.append(f'<circle cx="{cx}" cy="{cy}" r="3" fill="{colour}"/>')
-                else:
-                    stroke = f'stroke="{colour}" stroke-width="{width:.1f}"'
-                    name = f"<title>{escape(method)}</title>"
-                    parts.append(f'<polyline points="{points}" {stroke}>{name}</polyline>')
-    parts.append("</svg>")
-    return "".join(parts)
+    settings = {"axes.spines.top": False, "axes.spines.right": False, "lines.markersize": 4}
+    with new_figure(title, (4.6, 2.4), settings) as figure:
+        axes = figure.add_subplot()
+        name = re.sub(r"\W+", "-", title)
+        for number, own in enumerate(lines.values()):
+            # Where lines coincide, those below show at both edges of those above.
+            style: dict[str, Any] = {
+                "color": colour_of(number),
+                "linewidth": 1.6 + 1.4 * min(len(lines) - 1 - number, 3),
+            }
+            for index, line in enumerate(own):
+                finite = [value if math.isfinite(value) else math.nan for value in line]
+                alone = _without_neighbours(finite)
+                axes.plot(frames, finite, gid=f"{name}-line-{number}-{index}", **style)
+                axes.plot(
+                    [frames[i] for i in alone],
+                    [finite[i] for i in alone],
+                    "o",
+                    gid=f"{name}-points-{number}-{index}",
+                    **style,
+                )
+        axes.axhline(0.0, color=_TEXT_COLOUR, linewidth=0.8, zorder=0)
+        axes.grid(axis="y", alpha=0.25, color=_TEXT_COLOUR)
+        axes.locator_params(axis="y", nbins=6)
+        axes.locator_params(axis="x", nbins=7, integer=True)
+        axes.margins(x=0.02)
+        axes.set_title(f"{title} ({unit})" if unit else title, loc="left", parse_math=False)
+        return to_svg(figure).replace(_TEXT_COLOUR, "currentColor")
 
 
 def colour_of(number: int) -> str:
     return COLOURS[number % len(COLOURS)]
 
 
-def _runs(frames: Sequence[float], line: Sequence[float]) -> list[list[tuple[float, float]]]:
-    """The stretches of a line between values that are not finite."""
-    runs: list[list[tuple[float, float]]] = [[]]
-    for frame, value in zip(frames, line, strict=True):
-        if math.isfinite(value):
-            runs[-1].append((frame, value))
-        elif runs[-1]:
-            runs.append([])
-    return [run for run in runs if run]
+def _without_neighbours(line: Sequence[float]) -> list[int]:
+    """The frames, by index, at which a line has a value and no segment."""
+    padded = [math.nan, *line, math.nan]
+    return [
+        i
+        for i, value in enumerate(line)
+        if math.isfinite(value) and not (math.isfinite(padded[i]) or math.isfinite(padded[i + 2]))
+    ]
 
 
-def _round_marks(low: float, high: float, count: int = 5) -> list[float]:
-    """About `count` round numbers that reach over low..high: 1, 2 or 5 times a power of ten apart."""
-    rough = (high - low) / count
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= rough * 0.999)
-    start, stop = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [number * step for number in range(start, stop + 1)]
+@contextmanager
+def new_figure(
+    salt: str, inches: tuple[float, float], settings: Mapping[str, Any] | None = None
+) -> Iterator[Figure]:
+    """A context with a figure that needs no screen. Raises SinewError where matplotlib is missing.
+
+    salt  of the ids in the SVG: they must differ from plot to plot of a page, and be the same in each run
+    """
+    try:
+        import matplotlib
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise SinewError(
+            "plots need matplotlib, which this Python does not have; pip install matplotlib and try again"
+        ) from None
+    # Text stays text, in the page's own font.
+    usual = {"svg.fonttype": "none", "svg.hashsalt": salt, "font.family": "sans-serif", "font.size": 10}
+    text = (
+        "text.color",
+        "axes.edgecolor",
+        "axes.labelcolor",
+        "axes.titlecolor",
+        "xtick.color",
+        "ytick.color",
+    )
+    colours = dict.fromkeys(text, _TEXT_COLOUR) if settings is not None else {}
+    with matplotlib.rc_context({**usual, **colours, **(settings or {})}):
+        yield Figure(figsize=inches, layout="constrained")
 
 
-def _number(value: float, marks: Sequence[float]) -> str:
-    """As many digits as tell the marks apart."""
-    step = abs(marks[1] - marks[0]) if len(marks) > 1 else abs(value) or 1.0
-    digits = max(0, -math.floor(math.log10(step) + 1e-9))
-    if digits > 5:
-        return f"{value:.0e}" if value else "0"
-    return f"{value:.{digits}f}"
+def to_svg(figure: Figure) -> str:
+    """The <svg> element alone, without a background, and with no link to anything outside the page."""
+    file = io.StringIO()
+    metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(file, format="svg", transparent=True, metadata=metadata)
+    text = file.getvalue()
+    return text[text.index("<svg") :]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a mesh is bound to: bones, influences, and what an artist should know of them."""
+"""The bones and influences that a mesh is bound to, and warnings about them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NAMES_SHOWN = 5
 
 @dataclass(frozen=True)
 class Bones:
-    """The bones of an armature at rest, and after them the joints of those that bend.
+    """The bones of an armature at rest, followed by the joints of bendy bones (see bendy.py).
 
     names         all bones, in Blender's order
     deform        bool [bones], those that may move vertices
@@ -26,9 +26,9 @@ class Bones:
     lengths       float32 [bones]
     segments      int32 [bones], 1 for a bone that does not bend
     curved        bool [bones], those that map vertices along their curve
-    first_joints  int32 [bones], where in `rest` the segments + 1 joints of a bending bone begin
+    first_joints  int32 [bones], the index in `rest` of the first of a bendy bone's segments + 1 joints
     envelopes     the reach of every bone
-    complete      false where bendy bones had no joints yet, and count as not bending
+    complete      false where Blender had not computed the joints yet; bendy bones then count as straight
     """
 
     names: tuple[str, ...]
@@ -43,10 +43,10 @@ class Bones:
 
     @classmethod
     def none(cls) -> Bones:
-        """Of no armature, or one whose bones are being edited."""
+        """For a missing armature, or one in edit mode."""
         none, numbers = np.empty(0, dtype=np.float32), np.empty(0, dtype=np.int32)
-        places, flags = np.empty((0, 3), dtype=np.float32), np.empty(0, dtype=bool)
-        envelopes = Envelopes(places, places, none, none, none, none, flags)
+        points, flags = np.empty((0, 3), dtype=np.float32), np.empty(0, dtype=bool)
+        envelopes = Envelopes(points, points, none, none, none, none, flags)
         rest = np.empty((0, 4, 4), dtype=np.float32)
         return cls((), flags, rest, none, numbers, flags, numbers, envelopes)
 
@@ -56,12 +56,12 @@ class Bones:
 
     @cached_property
     def bending(self) -> list[tuple[int, int]]:
-        """The bones that bend, in the order of their joints, and how many segments each has."""
+        """The bendy bones in the order of their joints, each with its number of segments."""
         return [(int(bone), int(self.segments[bone])) for bone in np.flatnonzero(self.segments > 1)]
 
     @cached_property
     def rest_axes(self) -> np.ndarray:
-        """`rest` with axes of unit length: a bendy bone's joints can be scaled at rest."""
+        """`rest` with axes of unit length: joints of a bendy bone can be scaled at rest."""
         axes = self.rest.copy()
         lengths = np.linalg.norm(axes[:, :3, :3], axis=1, keepdims=True)
         axes[:, :3, :3] /= np.where(lengths > 0.0, lengths, 1.0)
@@ -77,8 +77,8 @@ class Bones:
             and self.envelopes.equals(other.envelopes)
         )
 
-    def without_one(self, group_names: Sequence[str]) -> list[str]:
-        """Those of the groups that no bone is called by."""
+    def groups_without_bone(self, group_names: Sequence[str]) -> list[str]:
+        """The groups that have no bone's name."""
         names = set(self.names)
         return [name for name in group_names if name not in names]
 
@@ -90,7 +90,7 @@ class Bones:
 
 @dataclass(frozen=True)
 class Weighting:
-    """From a mesh's group entries to the influences at given rest points.
+    """A mesh's group entries, from which its influences at given rest points are made.
 
     entries        of deforming bones
     use_envelopes  vertices without entries are moved by the envelopes that reach them
@@ -110,8 +110,9 @@ class Weighting:
         return self.entries.influences()
 
     def influences(self, points: np.ndarray) -> Influences:
-        """Over bones alone, for rest points float [vertices, 3]: in armature space where depends_on_points,
-        else any."""
+        """Influences of bones, for rest points float [vertices, 3]: in armature space where
+        depends_on_points,
+        else in any."""
         entries, envelopes = self.entries, self.bones.envelopes
         multiply = envelopes.multiply[entries.bones].any() if envelopes.multiply.any() else False
         if not multiply and not self.use_envelopes:
@@ -123,7 +124,7 @@ class Weighting:
         return entries.influences()
 
     def influences_over_joints(self, points: np.ndarray) -> Influences:
-        """Over bones and the joints of bendy ones."""
+        """Influences of bones and of the joints of bendy bones."""
         influences, bones = self.influences(points), self.bones
         if not bones.bend:
             return influences
@@ -140,7 +141,7 @@ class Weighting:
 
 @dataclass(frozen=True)
 class RigFacts:
-    """What `sinew info` and the panel say of a bound mesh."""
+    """The facts of a bound mesh that `sinew info` and the panel show."""
 
     vertices: int
     bones: int
@@ -154,10 +155,10 @@ class RigFacts:
 
 
 def describe_rig(weighting: Weighting, points: np.ndarray, boneless: Sequence[str]) -> RigFacts:
-    """Counts and warnings. `weighted_bones` counts those that move at least one vertex.
+    """Counts and warnings. `weighted_bones` is the number of bones that move at least one vertex.
 
     points    [vertices, 3], rest points: see Weighting.influences
-    boneless  names of groups that are neither a bone's nor of any other use
+    boneless  names of groups that belong to no bone and have no other use
     """
     influences, bones = weighting.influences(points), weighting.bones
     counts = influences.counts

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations as quaternions (w, x, y, z), component by component: [4, n]. `sinew` does the arithmetic."""
+"""Rotations as quaternions (w, x, y, z), stored component by component: [4, n]. `sinew` does the
+arithmetic."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What becomes of bones' scale: methods other than linear blend move vertices by rigid motions alone."""
+"""Rules for the scale of bones: methods other than linear blend move vertices by rigid motions only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 class ScaleRule:
     """A way to treat scale.
 
-    number  stored in .blend files: never changed, never used again
+    number  stored in .blend files: never changed and never reused
     """
 
     number: int
@@ -19,14 +19,14 @@ class ScaleRule:
     description: str
 
 
-# Each vertex goes where its bones' scales take it one by one, and those places are blended as motions.
+# Each bone's scale moves the vertex, before the rigid motions are blended.
 BLENDER_4 = ScaleRule(
     1,
     "4.0",
     "As Blender 4.0",
     "Each bone scales the vertex about itself before its motion is blended: Blender's rule since 4.0",
 )
-# The scales are blended as matrices, the vertex scaled once, then moved by the blended motion.
+# The scales are blended as matrices; the vertex is scaled once, then moved by the blended motion.
 BLENDER_3 = ScaleRule(
     2,
     "3.x",
@@ -34,7 +34,7 @@ BLENDER_3 = ScaleRule(
     "The bones' scales are blended first, then their motions: Blender's rule up to 3.6",
 )
 IGNORED = ScaleRule(
-    3, "none", "Ignore Scale", "Bones turn and move vertices and never scale them, under every method"
+    3, "none", "Ignore Scale", "Bones rotate and translate vertices and never scale them, under every method"
 )
 
 SCALE_RULES = (BLENDER_4, BLENDER_3, IGNORED)

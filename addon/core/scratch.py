@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders for a while, in the system's temporary folder.
+"""Temporary folders, in the system's temporary folder.
 
-A run that is killed leaves its own behind; the next one takes it away. A lock tells whether a run is alive:
-it holds across containers that share the temporary folder, where the number of a process does not.
+A run that is killed can not remove its folder; the next run does. A file lock tells whether a run is alive:
+it works across containers that share the temporary folder, which the number of a process does not.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ LOCK = ".lock"
 
 
 class ScratchFolder:
-    """A folder that is there until remove(), or until a later run finds its process ended.
+    """A folder that exists until remove(), or until a later run finds that its process has ended.
 
-    Raises OSError where none can be made.
+    Raises OSError where it can not be made.
     """
 
     def __init__(self) -> None:
-        _clear_away()
+        _remove_leftovers()
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
-        # Windows does not rename what is open; elsewhere nobody finds the lock before it is one.
+        # Named last, so that another run finds only a file that is locked. Windows can not rename an open
+        # file.
         name = self.path / (LOCK if os.name == "nt" else f"{LOCK}.new")
         try:
             self._lock = name.open("wb")
@@ -42,7 +43,7 @@ class ScratchFolder:
             name.rename(self.path / LOCK)
 
     def remove(self) -> None:
-        """All that can be removed: Windows keeps what some process has open."""
+        """Removes what can be removed: Windows keeps files that a process has open."""
         self._lock.close()
         shutil.rmtree(self.path, ignore_errors=True)
 
@@ -57,8 +58,8 @@ def scratch_folder() -> Iterator[Path]:
 
 
 @cache
-def _clear_away() -> None:
-    """Removes what dead runs of this user left; once in a process."""
+def _remove_leftovers() -> None:
+    """Removes the folders of this user's runs that were killed; once in a process."""
     with suppress(OSError):
         for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
             with suppress(OSError):
@@ -71,6 +72,6 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _is_dead(folder: Path) -> bool:
-    """Whether no process holds its lock. Without one, as older versions made them, nobody knows."""
+    """Whether no process has its lock. Raises OSError without a lock file: older versions made none."""
     with (folder / LOCK).open("r+b") as lock:
         return try_lock(lock.fileno())

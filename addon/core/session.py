@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One skinned mesh between frames: its bound deformers, what they were last given, and the result."""
+"""One skinned mesh between frames: its bound deformers, their last inputs, and the result."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ LINEAR = "lbs"
 
 @dataclass
 class Frame:
-    """What decides the shape of one frame.
+    """All that the shape of one frame depends on.
 
     method            name of a method
     pose              float32 [bones + joints, 4, 4], armature space, as Blender gives it
     bones_from_model  float64 [4, 4], takes the mesh's object space to armature space
     rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
-    mix               name of the method that the binding's mix weights mix in; empty for none
+    mix               name of the second method, which the binding's mix weights mix in; empty for none
     """
 
     method: str
@@ -38,7 +38,7 @@ class Frame:
 
 
 class Binding:
-    """A mesh bound to bones. Deforms when a frame differs from the last.
+    """A mesh bound to bones. It computes only frames that differ from the last.
 
     mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for none of it
     """
@@ -48,12 +48,13 @@ class Binding:
         self.mix_weights = mix_weights
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # For each purpose the packed mesh, and the deformer, each with the rest points that it has.
+        # By purpose: the packed mesh and the deformer, each with the rest points that it was made from.
         self._packed: dict[str, tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
-        self._is_elsewhere = False
+        # The last frame was written to another array than _points.
+        self._points_outdated = False
 
     @cached_property
     def moving_bones(self) -> list[str]:
@@ -65,22 +66,23 @@ class Binding:
 
     @property
     def last_frame(self) -> Frame | None:
-        """What was deformed last."""
+        """The frame that was computed last."""
         return self._last
 
     @property
     def points(self) -> np.ndarray:
         """The shape of the last frame, float32 [vertices, 3], object space."""
-        if self._is_elsewhere and self._last is not None:
+        if self._points_outdated and self._last is not None:
             self._shape(self._last, self._points)
-            self._is_elsewhere = False
+            # The last frame was written to another array than _points.
+        self._points_outdated = False
         return self._points
 
     def deform(self, frame: Frame, out: np.ndarray | None = None) -> bool:
-        """Brings `points` up to date; false where the frame equals the last one.
+        """Computes `points`; false where the frame equals the last one.
 
-        out   float32 [vertices, 3], C-contiguous: written instead, without looking whether anything differs.
-              `points` are then worked out where they are asked for
+        out   float32 [vertices, 3], C-contiguous: written in any case, instead of `points`, which are then
+              computed when they are read
 
         Raises ValueError where `out` has another shape.
         """
@@ -88,11 +90,11 @@ class Binding:
         if out is None and last is not None and _same(last, frame):
             return False
         self._shape(frame, self._points if out is None else out)
-        self._last, self._is_elsewhere = frame, out is not None
+        self._last, self._points_outdated = frame, out is not None
         return True
 
     def _shape(self, frame: Frame, out: np.ndarray) -> None:
-        if self._spread_anew(frame):
+        if self._weights_changed(frame):
             self._bound.clear()
             self._packed.clear()
         weights = self.mix_weights
@@ -100,16 +102,16 @@ class Binding:
             frame = replace(frame, mix="")
         is_linear = {frame.method == LINEAR, frame.mix == LINEAR}
         if weights is not None and frame.mix and frame.scale_rule != BLENDER_4.name and len(is_linear) == 2:
-            # Under these rules linear blending takes other bones than the rest.
-            self._shape_alike(replace(frame, mix=""), out, "motion")
+            # Under these rules linear blending takes other bone matrices than the other methods.
+            self._shape_with_one_kind(replace(frame, mix=""), out, "motion")
             second = np.empty_like(out)
-            self._shape_alike(replace(frame, method=frame.mix, mix=""), second, "second motion")
+            self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
             out += weights[:, None] * (second - out)
         else:
-            self._shape_alike(frame, out, "motion")
+            self._shape_with_one_kind(frame, out, "motion")
 
-    def _shape_alike(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
-        """By methods that take the same bones."""
+    def _shape_with_one_kind(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
+        """Writes the shape by methods that take the same kind of bone matrices."""
         rest_points, bones = frame.rest_points, frame.pose
         rest_inverses: np.ndarray | None = self._rest_from_armature
         if frame.scale_rule != BLENDER_4.name:
@@ -134,7 +136,7 @@ class Binding:
         rest_inverses: np.ndarray | None,
         out: np.ndarray,
     ) -> None:
-        """Deforms `rest_points` with the deformer bound for `purpose`, bound anew where it must be."""
+        """Deforms `rest_points` with the deformer of `purpose`, which is made again where it does not fit."""
         deformer, points = self._bound.get(purpose, (None, None))
         if deformer is None or (deformer.method, deformer.mixed_method or "") != (frame.method, frame.mix):
             if purpose not in self._packed:
@@ -153,8 +155,8 @@ class Binding:
             rest_inverses=rest_inverses,
         )
 
-    def _spread_anew(self, frame: Frame) -> bool:
-        """Whether weights differ from the last frame's, as they can depend on where the vertices are."""
+    def _weights_changed(self, frame: Frame) -> bool:
+        """Whether the influences differ from the last frame's: they can depend on the rest points."""
         last = self._last
         if last is None or not self.weighting.depends_on_points:
             return False
@@ -201,7 +203,7 @@ class SkinStage:
 
 @dataclass
 class SkinStageFrame:
-    """What decides a link's part in one frame: see Frame."""
+    """All that the deformation by a link depends on in one frame: see Frame."""
 
     method: str
     pose: np.ndarray
@@ -215,7 +217,7 @@ class SkinStack:
 
     def __init__(self, skin_stages: Sequence[SkinStage]) -> None:
         self.skin_stages = skin_stages
-        # The last link that took part, where all of its deformation counts: its points are the result.
+        # The last active link, if it has no mask: its points are the result.
         self._end: Binding | None = None
         self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
@@ -232,7 +234,7 @@ class SkinStack:
         frames: Sequence[SkinStageFrame | None],
         out: np.ndarray | None = None,
     ) -> bool:
-        """Brings `points` up to date; false where nothing differs from the last call.
+        """Computes `points`; false where nothing differs from the last call.
 
         rest_points  float32 [vertices, 3], object space
         frames       one for each link, None for one that is switched off or has no pose
@@ -260,7 +262,7 @@ class SkinStack:
         for number, (skin_stage, frame) in enumerate(zip(self.skin_stages, frames, strict=True)):
             if frame is None:
                 continue
-            # What comes in here is kept for the Multi Modifiers right behind that have nothing yet.
+            # The Multi Modifiers right behind this link start from the same shape as it does.
             for behind in range(number + 1, len(self.skin_stages)):
                 if not self.skin_stages[behind].multi or behind in starts:
                     break
@@ -274,7 +276,8 @@ class SkinStack:
             if skin_stage.mask is not None:
                 result = result + skin_stage.mask[:, None] * (skin_stage.binding.points - result)
             elif not is_end:
-                # The next link compares with what it was given: a buffer that is written again will not do.
+                # The next link compares its input with the last one: it must not be an array that is
+                # overwritten.
                 result = skin_stage.binding.points.copy()
         self._points = result
         return changed

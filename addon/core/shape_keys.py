@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mix of relative shape keys, as Blender applies it ahead of all modifiers."""
+"""The mix of relative shape keys, which Blender applies before all modifiers."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ class ShapeKeys:
 
     names  of all keys, in order
     basis  float32 [vertices, 3]
-    moves  one for each key: None for the basis, else float32 [vertices, 3], what value 1 adds
+    deltas  one for each key: None for the basis, else float32 [vertices, 3], its offsets at value 1
     """
 
     names: tuple[str, ...]
     basis: np.ndarray
-    moves: Sequence[np.ndarray | None]
+    deltas: Sequence[np.ndarray | None]
 
     def equals(self, other: ShapeKeys) -> bool:
         if self.names != other.names or not np.array_equal(self.basis, other.basis):
             return False
         return all(
             a is b if a is None or b is None else np.array_equal(a, b)
-            for a, b in zip(self.moves, other.moves, strict=True)
+            for a, b in zip(self.deltas, other.deltas, strict=True)
         )
 
     def mix(self, values: np.ndarray) -> np.ndarray:
         """float32 [vertices, 3] with each key at its value; a muted key's value is 0."""
         points = self.basis.copy()
-        for move, value in zip(self.moves, values, strict=True):
-            if move is not None and value != 0.0:
-                points += np.float32(value) * move
+        for delta, value in zip(self.deltas, values, strict=True):
+            if delta is not None and value != 0.0:
+                points += np.float32(value) * delta
         return points

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A comparison sheet: the pictures of several methods in one."""
+"""A comparison sheet: pictures of several methods side by side in one image."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
     cell = max(picture.width for column in pictures for picture in column)
     heights = [picture.height for picture in pictures[0]]
     head, label, row_label = 24 + 2 * MARGIN, 24 + 17 + 2 * MARGIN, 17 + MARGIN
-    # Even, as video needs it.
+    # Even numbers: video encoders need them.
     width = _even(len(columns) * (cell + MARGIN) + MARGIN)
     height = _even(head + label + len(row_titles) * row_label + sum(heights) + MARGIN)
     sheet = Image.new("RGB", (width, height), BACKGROUND)

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where copies of a character stand beside it."""
+"""The positions of copies of a character beside it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Room between two characters, as a part of a character's width.
+# The space between two characters, as a share of a character's width.
 GAP = 0.12
 
 
 def row_axis(right: np.ndarray) -> np.ndarray:
-    """float64 [3]: of the world's horizontal axes, in both directions, the one nearest to `right` [3], which
-    points to the right of the screen; +X where that is vertical."""
+    """float64 [3]: the one of -X, +X, -Y and +Y nearest to `right` [3], which points to the right of the
+    screen;
+    +X where that is vertical."""
     axis = np.zeros(3)
     nearest = int(np.abs(right[:2]).argmax())
     axis[nearest] = -1.0 if right[nearest] < 0.0 else 1.0
@@ -19,9 +20,9 @@ def row_axis(right: np.ndarray) -> np.ndarray:
 
 
 def spacing(points: np.ndarray, axis: np.ndarray) -> float:
-    """From one character to the next along `axis` [3]; 1 where they have no width there.
+    """The distance from one character to the next along `axis` [3]; 1 where they have no width along it.
 
-    points  [n, 3], n > 0, that bound the character
+    points  [n, 3], n > 0, the character's, or the corners of its bounding box
     """
     width = float(np.ptp(points @ axis))
     return (1.0 + GAP) * width if width > 0.0 else 1.0

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points in other spaces."""
+"""Transforms of points to other spaces."""
 
 from __future__ import annotations
 
 import numpy as np
 import sinew
 
-# From a space to itself; where this very matrix is given, no comparison is needed.
+# The identity; is_same_space() recognises this object without comparing numbers.
 SAME_SPACE = np.identity(4)
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """`points` [n, 3] after `matrix` [4, 4], an affine transform; float64 [n, 3]."""
-    # numpy leaves a product with so small a matrix to a BLAS whose threads wait for each other: up to a
-    # hundred times as long on a busy machine.
+    # Not by numpy's product: its BLAS uses threads even for so small a matrix, and these wait for each other,
+    # up to a hundred times as long on a busy machine.
     return sinew.affine.transform_point(matrix.astype(np.float64), points.astype(np.float64))
 
 
 def transformed_axes(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """The same, axis by axis as measuring wants it: float64 [3, n]."""
+    """The same as float64 [3, n], the layout of metrics.py."""
     x, y, z = points.T.astype(np.float64)
     columns = matrix[:3, :, np.newaxis]
     return columns[:, 0] * x + columns[:, 1] * y + columns[:, 2] * z + columns[:, 3]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The faces and edges of a mesh: what measuring needs of them, worked out once."""
+"""The topology of a mesh as measures need it, computed once."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Surface:
     vertex_count  of all meshes
     triangles     int32 [triangles, 3], counter-clockwise seen from outside
     edges         int32 [edges, 2], the mesh's own: no diagonals of its quads
-    same_place    int [vertices], one vertex of all that lie in one place at rest; None for all alone.
-                  Files for games are cut open at seams of texture coordinates: those are no holes
+    coincident    int [vertices], the first vertex at the same position at rest; None where no two coincide.
+                  Files for games split vertices at seams of texture coordinates: those are no holes
     """
 
     vertex_count: int
     triangles: np.ndarray
     edges: np.ndarray
-    same_place: np.ndarray | None = None
+    coincident: np.ndarray | None = None
 
     @cached_property
     def corners(self) -> np.ndarray:
@@ -46,30 +46,30 @@ class Surface:
         return EdgesAround(vertices, starts, order % max(len(self.edges), 1))
 
     @cached_property
-    def _sides(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sides of triangles from vertex to vertex, int64 [n]: those that lack a neighbour running the other
-        way, as often as they lack it, and those that occur more than once."""
-        corners = self.corners if self.same_place is None else self.same_place[self.corners]
+    def _directed_edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Directed edges of triangles as int64 [n], start * vertex_count + end: those without an opposite
+        one, as often as it is missing, and those that occur more than once."""
+        corners = self.corners if self.coincident is None else self.coincident[self.corners]
         starts, stops = corners.ravel(), np.roll(corners, -1, axis=0).ravel()
         keys, counts = np.unique(starts * self.vertex_count + stops, return_counts=True)
         opposite = keys % self.vertex_count * self.vertex_count + keys // self.vertex_count
         at = np.searchsorted(keys, opposite).clip(max=max(len(keys) - 1, 0))
         found = keys[at] == opposite if len(keys) else np.zeros(0, dtype=bool)
-        lacking = counts - np.where(found, counts[at], 0)
+        missing = counts - np.where(found, counts[at], 0)
         # Faces that shrank to an edge or a point at rest.
-        lacking[keys == opposite] = 0
-        return np.repeat(keys, lacking.clip(min=0)), keys[counts > 1]
+        missing[keys == opposite] = 0
+        return np.repeat(keys, missing.clip(min=0)), keys[counts > 1]
 
     @property
     def clash_count(self) -> int:
-        """Sides that two triangles run through in one direction: normals that disagree, or edges of more than
-        two faces. Where there are any, volume means little."""
-        return len(self._sides[1])
+        """The number of directed edges that two triangles share: their normals disagree, or the edge has more
+        than two faces. The volume then means little."""
+        return len(self._directed_edges[1])
 
     @cached_property
     def caps(self) -> Caps:
-        """What closes the holes."""
-        borders = self._sides[0]
+        """The fans that close the holes."""
+        borders = self._directed_edges[0]
         return Caps.over(borders // self.vertex_count, borders % self.vertex_count)
 
 
@@ -78,7 +78,7 @@ class EdgesAround:
     """The edges at each vertex, vertex by vertex.
 
     vertices  int64 [n], those that have edges
-    starts    int64 [n], where in `edges` those of each begin
+    starts    int64 [n], the index in `edges` of the first of each
     edges     int64 [2 edges]
     """
 
@@ -111,7 +111,8 @@ class Caps:
         first, second = index.reshape(2, -1)
         holes = np.arange(len(vertices))
         while True:
-            # Each hole takes the smallest number met along its border; doubling the steps keeps this short.
+            # Each vertex takes the smallest number of its border; pointer doubling keeps the number of rounds
+            # small.
             least = np.minimum(holes[first], holes[second])
             spread = holes.copy()
             np.minimum.at(spread, first, least)
@@ -124,7 +125,7 @@ class Caps:
         return cls(starts, stops, vertices, holes, holes[first], len(numbers))
 
     def volume(self, points: np.ndarray) -> float:
-        """What the fans add to six times the volume, for float64 points [3, vertices]."""
+        """Six times the volume that the fans add, for float64 points [3, vertices]."""
         if self.count == 0:
             return 0.0
         sizes = np.bincount(self.holes, minlength=self.count)
@@ -136,19 +137,19 @@ class Caps:
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:
-    """Several meshes as one, their vertices one after the other."""
-    triangles, edges, same_place, first = [], [], [], 0
+    """Several meshes as one; vertices are concatenated."""
+    triangles, edges, coincident, first = [], [], [], 0
     for surface in surfaces:
         triangles.append(surface.triangles + first)
         edges.append(surface.edges + first)
-        own = surface.same_place
-        same_place.append((np.arange(surface.vertex_count) if own is None else own) + first)
+        own = surface.coincident
+        coincident.append((np.arange(surface.vertex_count) if own is None else own) + first)
         first += surface.vertex_count
-    return Surface(first, *map(np.concatenate, (triangles, edges, same_place)))
+    return Surface(first, *map(np.concatenate, (triangles, edges, coincident)))
 
 
-def same_places(points: np.ndarray) -> np.ndarray:
-    """int [vertices]: the first vertex that lies exactly where each of `points` [vertices, 3] does."""
+def coincident_vertices(points: np.ndarray) -> np.ndarray:
+    """int [vertices]: for each of `points` [vertices, 3] the first one with exactly the same coordinates."""
     # Adding zero turns -0.0 into 0.0.
     rows = np.ascontiguousarray(points + 0.0).view([("", points.dtype)] * 3).ravel()
     _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)

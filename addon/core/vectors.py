@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arithmetic of many vectors stored component by component, [k, n]."""
+"""Arithmetic on arrays of vectors stored component by component, [k, n]."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of [3, n]: several times faster than numpy's own, which goes by rows."""
+    """Cross products of [3, n]: several times faster than numpy's own on rows."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

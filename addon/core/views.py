@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where cameras stand: around a whole mesh, or close to one place of it."""
+"""Orthographic cameras: of a whole mesh, or close to one of its vertices."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class View:
 
     direction  unit, from the target towards the camera
     target     what the camera looks at
-    width      how much is seen from left to right
-    height     and from top to bottom
-    depth      how far before and behind the target is seen
+    width      of what is seen, from left to right
+    height     of what is seen, from bottom to top
+    depth      how far in front of and behind the target is seen
     """
 
     direction: np.ndarray
@@ -38,34 +38,35 @@ class View:
 
 
 def whole_view(extents: Sequence[np.ndarray]) -> View:
-    """Frames from the front all that has one of `extents`, each as seen_extent gives it."""
+    """A view from the front of everything within `extents`, each as seen_extent returns it."""
     direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
     low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
     centre = (low + high) / 2
     right, up = camera_axes(direction)
     target = centre[0] * right + centre[1] * up + centre[2] * direction
-    width, height, depth = (float(side) for side in high - low)
+    width, height, depth = (float(size) for size in high - low)
     longer = max(width, height, 1e-6)
     width, height = max(width, longer / 2), max(height, longer / 2)
     return View(direction, target, width + 0.06 * longer, height + 0.06 * longer, depth + longer)
 
 
 def seen_extent(points: np.ndarray) -> np.ndarray:
-    """float64 [2, 3]: the lowest and highest coordinates of `points` [n, 3] to the whole view's right, up and
-    towards it."""
+    """float64 [2, 3]: the lowest and highest coordinates of `points` [n, 3] along the whole view's right, up
+    and direction."""
     direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
     seen = points @ np.stack([*camera_axes(direction), direction], axis=1)
     return np.stack([seen.min(axis=0), seen.max(axis=0)])
 
 
 def of_one_size(views: Sequence[View]) -> list[View]:
-    """The views, each as wide, high and deep as the largest: what they show can be compared by eye."""
+    """The views, each as wide, high and deep as the largest, so that what they show can be compared by
+    eye."""
     largest = {name: max(getattr(view, name) for view in views) for name in ("width", "height", "depth")}
     return [replace(view, **largest) for view in views]
 
 
-def place_of_difference(meshes: Sequence[np.ndarray]) -> int | None:
-    """The vertex at which the methods differ most, None where they do not.
+def most_different_vertex(meshes: Sequence[np.ndarray]) -> int | None:
+    """The vertex at which the methods differ most; None where they do not differ.
 
     meshes  one [vertices, 3] for each method, of one topology
     """
@@ -76,9 +77,10 @@ def place_of_difference(meshes: Sequence[np.ndarray]) -> int | None:
 
 
 def close_view(points: np.ndarray, targets: np.ndarray) -> View:
-    """Close to all of `targets` [n, 3], seen from where least of `points` [m, 3] stands in front.
+    """A view close to all of `targets` [n, 3], from the direction in which fewest of `points` [m, 3] are in
+    front.
 
-    targets  a place of the mesh under each method: none is out of the picture
+    targets  the positions of one vertex under each method: all are in the picture
     """
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     low, high = targets.min(axis=0), targets.max(axis=0)
@@ -88,13 +90,17 @@ def close_view(points: np.ndarray, targets: np.ndarray) -> View:
 
 
 def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
-    """Unit: from where the origin is least hidden by `points`; of equals, nearest to the whole view's.
+    """The unit direction from which the origin is least hidden; of equals, the one nearest to the whole
+    view's.
 
-    Hidden means behind points that stand in front of the sphere of `radius` around the origin.
+    `points` hide the origin where they are in front of the sphere of `radius` around it.
     """
     front = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
-    turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.radians([10, 35, -15]))
-    directions = np.stack([np.sin(turn) * np.cos(rise), -np.cos(turn) * np.cos(rise), np.sin(rise)], axis=-1)
+    azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.radians([10, 35, -15]))
+    directions = np.stack(
+        [np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)],
+        axis=-1,
+    )
     candidates = [front, *directions.reshape(-1, 3)]
 
     def hidden(direction: np.ndarray) -> float:
@@ -106,7 +112,7 @@ def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
 
 
 def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Right and up of a camera that stands in `direction` from its target, up as near to +Z as can be."""
+    """Right and up of a camera in `direction` from its target, up as near to +Z as possible."""
     world_up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
     right = np.cross(world_up, direction)
     right /= np.linalg.norm(right)

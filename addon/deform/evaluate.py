@@ -161,7 +161,7 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
 
 def _check_groups(values: Mapping[str, Value]) -> None:
     """Raises SinewError for a vertex group that no mesh of the file has; single ones may lack it."""
-    known = parameters.named()
+    known = parameters.by_full_name()
     for name, value in values.items():
         if known[name].kind == "vertex_group" and value:
             meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]

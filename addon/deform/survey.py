@@ -32,7 +32,7 @@ def describe(
         space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     if space is not None and weighting.depends_on_points:
         points = transformed(points, space)
-    boneless = weighting.bones.without_one([group.name for group in obj.vertex_groups])
+    boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
     return facts.with_warnings([*differences(obj), *_missing_mix_group(obj)])

@@ -14,7 +14,7 @@ import numpy as np
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
-from ..core.surface import Surface, same_places
+from ..core.surface import Surface, coincident_vertices
 
 # The attribute that holds a mesh's vertices: read and written as a whole, where "co" of the vertices takes a
 # hundred times as long.
@@ -48,7 +48,7 @@ def read_surface(mesh: bpy.types.Mesh) -> Surface:
     edges = np.empty((len(mesh.edges), 2), dtype=np.int32)
     mesh.edges.foreach_get("vertices", edges.ravel())
     points = read_points(mesh)
-    return Surface(len(mesh.vertices), triangles, edges, same_places(points))
+    return Surface(len(mesh.vertices), triangles, edges, coincident_vertices(points))
 
 
 def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:

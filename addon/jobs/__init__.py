@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many files at once: what to do, who does it, what became of it. Imports nothing of bpy: Blender works in
+"""Batches of many files: inputs, job files, workers, journal, report. Imports no bpy: Blenders run in
 processes of its own."""

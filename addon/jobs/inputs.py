@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which files a batch reads and which it writes."""
+"""The files that a batch reads, and the copies that it writes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Job:
 
 
 def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> list[Job]:
-    """A job for each file meant by `inputs`: files, folders (all .blend files below them), patterns such as
+    """A job for each file of `inputs`: files, folders (all .blend files below them), patterns such as
     "characters/**/*.blend", and STANDARD_INPUT, which stands for the paths `listed`, one a line.
 
     A single file's copy is written right into `out`. The tree below a folder, below the fixed part of a
@@ -49,8 +49,8 @@ def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> l
 
 
 def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[Path]]:
-    """The files that one input means, absolute, and the folder whose tree is kept."""
-    # Absolute without following links: a linked folder keeps the name it has here.
+    """The absolute paths of one input, and the folder below which the tree is kept."""
+    # Absolute without following links: a linked folder keeps its name.
     path = Path(os.path.abspath(given))
     if given == STANDARD_INPUT:
         lines = [line for line in (line.strip("\r\n") for line in listed) if line]
@@ -67,7 +67,7 @@ def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[
         found = _matching(root, path.relative_to(root))
     else:
         return path.parent, [path]
-    # The output of an earlier run is not input, nor is what a killed run did not finish.
+    # Copies of an earlier run are no inputs, nor are unfinished files of a killed run.
     resolved, resolve = out.resolve(), _resolver()
     may_be_below = resolved != root.resolve()
     files = [
@@ -88,7 +88,7 @@ def blend_files_below(folder: Path) -> Iterator[Path]:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """Also in linked folders, but in none that is already one of the folders above."""
+    """All files below, also in linked folders, but not in links to a folder above, which have no end."""
     for path, folders, names in os.walk(folder, followlinks=True):
         above = {os.path.realpath(part) for part in (Path(path), *Path(path).parents)}
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
@@ -96,8 +96,8 @@ def _files_below(folder: Path) -> Iterator[Path]:
 
 
 def _matching(root: Path, pattern: Path) -> Iterator[Path]:
-    """The files below `root` that fit a pattern, as of glob: ** is any folders, and * is nothing hidden. Not
-    by glob itself, which does not end where links lead up again."""
+    """The files below `root` that match a pattern of glob: ** stands for any folders, and * for nothing
+    hidden. glob itself does not end where links lead to a folder above."""
     parts = pattern.parts
     if "**" not in parts:
         found = glob.iglob(os.path.join(glob.escape(str(root)), pattern))
@@ -106,7 +106,7 @@ def _matching(root: Path, pattern: Path) -> Iterator[Path]:
 
 
 def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
-    # The positions in the pattern that the names so far can have reached.
+    # The positions in the pattern that the names so far can match up to.
     positions = {0}
     for name in names:
         shown = not name.startswith(".")
@@ -119,12 +119,12 @@ def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
             elif fnmatchcase(name, parts[position]) and (shown or parts[position].startswith(".")):
                 after.add(position + 1)
         positions = after
-    # At a pattern's end ** is any file, too.
+    # At the end of a pattern, ** also stands for any file.
     return len(parts) in positions or (parts[-1] == "**" and len(parts) - 1 in positions)
 
 
 def _past_folders(positions: set[int], parts: tuple[str, ...]) -> set[int]:
-    """With those behind each **, which can be no folder at all."""
+    """The positions, with those behind each **, which can also stand for no folder."""
     found = set(positions)
     for position in sorted(positions):
         while position < len(parts) and parts[position] == "**":
@@ -134,7 +134,7 @@ def _past_folders(positions: set[int], parts: tuple[str, ...]) -> set[int]:
 
 
 def _fixed_part(pattern: Path) -> Path:
-    """The folder that all files of a pattern are below. What is there under that very name is no pattern."""
+    """The folder above all files of a pattern. A part that exists under that exact name is no pattern."""
     fixed = Path(pattern.anchor)
     for part in pattern.parts[1:-1]:
         if glob.has_magic(part) and not (fixed / part).exists():
@@ -144,7 +144,7 @@ def _fixed_part(pattern: Path) -> Path:
 
 
 def _is_bake(path: Path) -> bool:
-    """Whether a batch, whose journal is above, baked it beside a copy."""
+    """Whether the file is a batch's bake beside a copy; the batch's journal is in a folder above."""
     start = path.name.removesuffix(BAKED)
     beside_copy = start != path.name and path.with_name(f"{start}.blend").exists()
     return beside_copy and any((folder / JOURNAL).exists() for folder in path.parents)
@@ -164,6 +164,6 @@ def _check(jobs: list[Job]) -> None:
 
 
 def _resolver() -> Callable[[Path], Path]:
-    """Path.resolve() for many files in few folders: each folder is looked at once."""
+    """Path.resolve() for many files in few folders: each folder is resolved once."""
     folder = cache(Path.resolve)
     return lambda path: path.resolve() if path.is_symlink() else folder(path.parent) / path.name

@@ -33,7 +33,7 @@ class ObjectRule:
 
 @dataclass(frozen=True)
 class Settings:
-    """What is done to the meshes of a file; None or empty where nothing is set.
+    """Settings of a file's meshes; None or empty where nothing is set.
 
     include, exclude  patterns of names of objects and of collections
     scale             name of a scale rule
@@ -66,7 +66,7 @@ class Settings:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """All kinds of bakes that an object of the file may ask for, each once."""
+        """All kinds of bakes that any object of the file has, each once."""
         every = [*(self.bake or ()), *(kind for rule in self.objects for kind in rule.bake or ())]
         return tuple(dict.fromkeys(every))
 
@@ -75,7 +75,7 @@ class Settings:
         check_bakes(self.kinds, self.bake_frames)
 
     def as_task(self) -> dict:
-        """What a task takes along, and the journal keeps."""
+        """As JSON, for tasks and for the journal."""
         return {
             "method": self.method,
             "include": list(self.include or ()),
@@ -97,7 +97,7 @@ class FileRule:
     line: int
 
     def matches(self, path: PurePath) -> bool:
-        """Also where a pattern is the end of the very path, which can have brackets."""
+        """Whether a pattern matches, or equals the end of the path: a path can have brackets."""
         return any(path.match(pattern) or _ends_with(path, PurePath(pattern)) for pattern in self.match)
 
 
@@ -125,7 +125,7 @@ class JobFile:
 
 
 def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
-    """Raises WrongUse, with file and line, for anything that is not as it should be."""
+    """Raises WrongUse, with file and line, for anything that the schema does not allow."""
     try:
         # Some editors begin a file with a byte order mark.
         text = path.read_text(encoding="utf-8-sig")
@@ -155,7 +155,7 @@ def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
 
 
 def _settings(values: Mapping[str, Any]) -> Settings:
-    """Of a table that can have other keys as well. Keys and fields have the same names."""
+    """The settings in a table, which can have other keys as well. Keys and fields have the same names."""
     own = {field.name: values[field.name] for field in fields(Settings) if field.name in values}
     own["objects"] = tuple(ObjectRule(**entry.values) for entry in values.get("objects", ()))
     return Settings(**own)
@@ -167,8 +167,8 @@ def _line_of(text: str, position: Position) -> int:
 
 
 def _line_where(text: str, is_true: Callable[[dict], bool]) -> int:
-    """The line on which the statement begins that first makes `is_true` so: of the beginnings of the file
-    that are TOML themselves, the first such ends with it."""
+    """The line of the first statement that makes `is_true` hold. tomllib reports no positions: ever longer
+    beginnings of the file are parsed, and the first one for which it holds ends with that statement."""
     lines = text.splitlines()
     begin = 0
     for end in range(1, len(lines) + 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All keys of a job file, from which its reader, `sinew reskin --job-help` and docs/batch.md are made."""
+"""The keys of a job file. Its reader, `sinew reskin --job-help` and docs/batch.md are made from this list."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .schema import TEXT, TEXTS, Key, SchemaError, Table, checked, one_of, rows,
 
 
 def job_schema(methods: Collection[str]) -> Table:
-    """The top of a job file. `methods` are the names that `method` can have."""
+    """The top table of a job file. `methods` are the names that `method` can have."""
     method = Key("method", one_of(methods, "a method of `sinew methods`"), "how the meshes are deformed")
     scale = Key(
         "scale",
         one_of([rule.name for rule in SCALE_RULES]),
-        "what becomes of the bones' scale; without it, each object keeps its own rule",
+        "the rule for the bones' scale; without it, each object keeps its own rule",
     )
     set_ = Key(
         "set",
@@ -31,7 +31,7 @@ def job_schema(methods: Collection[str]) -> Table:
     bake = Key(
         "bake",
         checked(some_of(KINDS), _check_one_in_file),
-        "what is baked beside the copies; [] is no bake",
+        "bakes to write beside the copies; [] for none",
     )
     of_objects = Table(
         (
@@ -48,7 +48,7 @@ def job_schema(methods: Collection[str]) -> Table:
         scale,
         set_,
         Key("include", TEXTS, "only objects, or collections, of these names or patterns"),
-        Key("exclude", TEXTS, "but not these"),
+        Key("exclude", TEXTS, "objects, or collections, to leave out"),
         bake,
         Key(
             "bake_frames",
@@ -62,7 +62,7 @@ def job_schema(methods: Collection[str]) -> Table:
             Key(
                 "match",
                 checked(TEXTS, _check_paths, "paths or patterns such as hero*.blend"),
-                "files whose path ends so",
+                "files whose path ends with one of these",
                 required=True,
             ),
             *settings,
@@ -82,7 +82,7 @@ def job_schema(methods: Collection[str]) -> Table:
 
 def markdown() -> str:
     """The keys as a table of docs/batch.md."""
-    lines = ["| key | where | value | what it says |", "|---|---|---|---|"]
+    lines = ["| key | where | value | meaning |", "|---|---|---|---|"]
     for name, headers, wanted, meaning in rows(job_schema(())):
         lines.append(f"| `{name}` | {headers} | {wanted} | {meaning} |")
     return "\n".join(lines)

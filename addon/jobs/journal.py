@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record of a batch beside its output, which outlives a run that is killed at any moment.
+"""The record of a batch in its output folder, valid also after a run that is killed at any moment.
 
-One JSON object a line. A line is on disk before the copy that it speaks of gets its name: whatever happens
-in between, the next run only has to rename. A half-written last line is as if it had never been.
+One JSON object a line. A line is on disk before the copy that it describes gets its name: if the run is
+killed in between, the next run only has to rename the copy. A half-written last line is ignored.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ class Journal:
 
     latest  the last record of each copy, by its path below `out`
 
-    Raises WrongUse where another batch is at work in the folder.
+    Raises WrongUse where another batch is running in the folder.
     """
 
     def __init__(self, out: Path) -> None:
         self.out = out
         self.path = out / NAME
         self._start = len(os.path.join(out, ""))
-        # Half a line at its end is cut off: not of what a link in a folder from elsewhere leads to.
+        # _read() truncates a half-written last line: it must not do so through a link that somebody else
+        # made.
         if self.path.is_symlink() or (self.path.exists() and not self.path.is_file()):
             raise SinewError(f"{self.path}: is no journal but a link or a folder; remove it")
         with writing(self.path):
@@ -59,7 +60,7 @@ class Journal:
         return str(target)[self._start :].replace(os.sep, "/")
 
     def record(self, target: Path, record: dict) -> None:
-        """Adds what became of a copy; on disk when this returns."""
+        """Adds the record of a copy; it is on disk when this returns."""
         record = {"file": self.name_of(target), **record}
         line = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode() + b"\n"
         end = self._file.seek(0, os.SEEK_END)
@@ -68,7 +69,7 @@ class Journal:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(self._file.fileno())
         except OSError as error:
-            # What a full disk took of the line goes again, for more than the last line could be half one.
+            # Removes the part of the line that fitted on a full disk: only a last line may be half-written.
             os.truncate(self.path, end)
             raise SinewError(
                 f"{self.path}: can not be written: {error.strerror}; what was done is in it, --resume goes on"
@@ -76,28 +77,28 @@ class Journal:
         self.latest[record["file"]] = record
 
     def finish(self, target: Path, record: dict) -> None:
-        """Gives a copy and its bakes their names, after their record: the copy last, so that where it is, all
-        is. What has its name already keeps it."""
+        """Renames a copy and its bakes after their record was written. The copy is renamed last: where it
+        exists, its bakes do, too. Files that have their names already are not touched."""
         for unfinished, path, written in self._files(target, record):
             if _stamp(unfinished) == written:
                 os.replace(unfinished, path)
 
-    def holds(self, target: Path, record: dict | None) -> bool:
-        """Whether `target` is the very file that its record speaks of."""
+    def matches(self, target: Path, record: dict | None) -> bool:
+        """Whether `target` is still the file that its record describes."""
         return record is not None and record.get("written") == _stamp(target)
 
-    def holds_all(self, target: Path, record: dict) -> bool:
-        """Whether its bakes are as well."""
+    def matches_with_bakes(self, target: Path, record: dict) -> bool:
+        """Whether its bakes are, too."""
         files = self._files(target, record)
         return all(_stamp(path) == written for _unfinished, path, written in files)
 
     def baked(self, target: Path, record: dict | None) -> list[Path]:
-        """The bakes of a record that are the very files still."""
+        """The bakes of a record that are still the files that it describes."""
         files = self._files(target, record)[:-1] if record is not None else []
         return [path for _unfinished, path, written in files if _stamp(path) == written]
 
     def recover(self) -> None:
-        """Finishes what a killed run had recorded."""
+        """Renames the files that a killed run had recorded and not yet renamed."""
         for name, record in self.latest.items():
             if "unfinished" in record:
                 files = self._files(self.out / name, record)
@@ -105,7 +106,7 @@ class Journal:
                     self.finish(self.out / name, record)
 
     def _files(self, target: Path, record: dict) -> list[tuple[Path, Path, list[int] | None]]:
-        """Of each file of a record: where it was made, where it is to be, its stamp. The copy is the last."""
+        """For each file of a record: its temporary path, its final path, its stamp. The copy is the last."""
         beside = [
             (self.out / unfinished, self.out / path, written)
             for unfinished, path, written in record.get("beside", ())
@@ -113,10 +114,10 @@ class Journal:
         unfinished = target.with_name(record.get("unfinished", target.name))
         return [*beside, (unfinished, target, record.get("written"))]
 
-    def clear_away(self, targets: Iterable[Path]) -> None:
-        """Removes the half-written copies of runs that were killed, which no record speaks of."""
+    def remove_unfinished(self, targets: Iterable[Path]) -> None:
+        """Removes unfinished copies of killed runs that no record describes."""
         for folder in {target.parent for target in targets}:
-            # Blender writes beside, too, with an @; bakes have other endings, and caches a folder.
+            # Blender's own temporary files end with @; bakes have other suffixes, and caches a folder.
             for pattern in (f".*{MARK}*", f"*{CACHES}/.*{MARK}"):
                 for leftover in folder.glob(pattern):
                     leftover.unlink(missing_ok=True)
@@ -129,8 +130,8 @@ class Journal:
             os.truncate(self.path, whole)
         latest = {}
         for line in content[:whole].splitlines():
-            # A machine that lost its power can leave anything, and a folder from elsewhere can hold it: such
-            # a file is done again.
+            # After a loss of power, or in a folder made by somebody else, a line can be anything: it is
+            # ignored, and its file is done again.
             with suppress(ValueError):
                 record = json.loads(line)
                 if _is_sound(record):
@@ -139,7 +140,7 @@ class Journal:
 
 
 def _is_sound(record: object) -> bool:
-    """Whether a line says of files what a journal's line does, and leads to none outside of its folder."""
+    """Whether a line has the form of a record and names no file outside of the journal's folder."""
     if not isinstance(record, dict):
         return False
     beside, unfinished = record.get("beside", []), record.get("unfinished", MARK)
@@ -148,23 +149,23 @@ def _is_sound(record: object) -> bool:
     if not isinstance(unfinished, str) or PurePath(unfinished).name != unfinished:
         return False
     return all(
-        _leads_inside(path) for path in (record.get("file"), *(path for one in beside for path in one[:2]))
+        _is_inside(path) for path in (record.get("file"), *(path for one in beside for path in one[:2]))
     )
 
 
-def tells_all(record: dict) -> bool:
-    """Whether a record of a file that is done has what a report says of it."""
+def is_complete(record: dict) -> bool:
+    """Whether a record of a finished file has all that the report shows."""
     kinds = {"hash": str, "versions": dict, "meshes": list, "left_out": list, "notes": list, "seconds": dict}
     if not all(isinstance(record.get(key), kind) for key, kind in kinds.items()):
         return False
-    meshes_tell = all(
+    meshes_complete = all(
         isinstance(mesh, dict) and {"object", "method", "warnings"} <= mesh.keys()
         for mesh in record["meshes"]
     )
-    return meshes_tell and {"sinew", "blender"} <= record["versions"].keys()
+    return meshes_complete and {"sinew", "blender"} <= record["versions"].keys()
 
 
-def _leads_inside(path: object) -> bool:
+def _is_inside(path: object) -> bool:
     if not isinstance(path, str) or not path or "\0" in path:
         return False
     pure = PurePath(path)
@@ -172,7 +173,7 @@ def _leads_inside(path: object) -> bool:
 
 
 def content_hash(path: Path) -> str | None:
-    """Of what is in a file; None where it can not be read, which is for who opens it to say."""
+    """The hash of a file's content; None where it can not be read, which opening the file will report."""
     try:
         if not path.is_file():
             return None
@@ -183,7 +184,7 @@ def content_hash(path: Path) -> str | None:
 
 
 def stamp(path: Path) -> list[int]:
-    """What stays the same of a file when it is renamed: its size, and when it was written."""
+    """The size of a file and the time of its last change, which renaming keeps."""
     status = path.stat()
     return [status.st_size, status.st_mtime_ns]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""report.json and report.html: what became of each file of a batch, with the worst frame before and after."""
+"""report.json and report.html: the result of each file of a batch, with pictures of its worst frame."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ img { max-width: 360px; max-height: 360px; background: #2a2c30; border-radius: 4
 
 
 def write_report(out: Path, summary: dict, rows: list[dict]) -> Path:
-    """Writes both into the folder `out`, beside first and then renamed; the path of report.html."""
+    """Writes both into the folder `out`; returns the path of report.html."""
     write_text(
         out / "report.json",
         json.dumps({"summary": summary, "files": rows}, indent=1, ensure_ascii=False),
@@ -122,8 +122,8 @@ def _meshes(meshes: list[dict]) -> str:
                 "; ".join(mesh["warnings"]),
             )
         )
-    said = [column for column in zip(*rows, strict=True) if any(column[1:])]
-    head, *body = zip(*said, strict=True)
+    shown = [column for column in zip(*rows, strict=True) if any(column[1:])]
+    head, *body = zip(*shown, strict=True)
     lines = [f"<th>{'</th><th>'.join(head)}</th>"]
     lines += ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in body]
     return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"

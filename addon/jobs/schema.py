@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tables of a TOML file can hold: one description for reading, error messages and documents."""
+"""A schema for the tables of a TOML file, from which reading, error messages and documents are made."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 from ..core.errors import WrongUse
 
 Position = tuple[str | int, ...]
-"""Where a value is in a file: keys from the top, and a number for each entry of an array of tables."""
+"""The path to a value in a file: keys from the top, and an index for each entry of an array of tables."""
 
 
 class SchemaError(Exception):
-    """A value that the description does not allow.
+    """A value that the schema does not allow.
 
     position  of the value; from the top of the file once read() raises it
-    sentence  what was wanted and what came
+    sentence  what was expected and what was found
     """
 
     def __init__(self, position: Position, sentence: str) -> None:
@@ -27,10 +27,10 @@ class SchemaError(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """What a value can be.
+    """The type of a value.
 
     wanted  in a few words, for documents
-    read    what is kept of a value; raises WrongUse with a sentence that follows the name of the key
+    read    converts and checks a value; raises WrongUse with a sentence that follows the name of the key
     """
 
     wanted: str
@@ -41,7 +41,7 @@ class Kind:
 class Key:
     """One key of a table.
 
-    kind  of its value, or the table of which it has a list, as in [[files]]
+    kind  of its value; a Table for a list of tables, as in [[files]]
     help  one sentence for documents
     """
 
@@ -55,7 +55,7 @@ class Key:
 class Table:
     """The keys of one table, in the order in which they are documented.
 
-    check  raises SchemaError, with a position from this table on, where keys do not fit each other
+    check  raises SchemaError, with a position relative to this table, where keys contradict each other
     """
 
     keys: tuple[Key, ...]
@@ -66,7 +66,7 @@ class Table:
 class Entry:
     """A table as read.
 
-    values  by key; a key that the file does not have is missing. A list of tables is a list of entries.
+    values  by key, only the keys of the file. A list of tables is a list of entries.
     """
 
     position: Position
@@ -74,7 +74,7 @@ class Entry:
 
 
 def read(table: Mapping[str, Any], schema: Table, position: Position = ()) -> Entry:
-    """Raises SchemaError for the first key, in the order of the file, that is not as the schema has it."""
+    """Raises SchemaError for the first key, in the order of the file, that the schema does not allow."""
     known = {key.name: key for key in schema.keys}
     for name in table:
         if name not in known:
@@ -148,7 +148,7 @@ def some_of(names: Collection[str]) -> Kind:
 
 
 def checked(kind: Kind, check: Callable[[Any], None], wanted: str = "") -> Kind:
-    """As `kind`, where `check` does not raise WrongUse."""
+    """The same as `kind`, for values for which `check` does not raise WrongUse."""
 
     def read_checked(value: object) -> object:
         kept = kind.read(value)
@@ -162,7 +162,7 @@ def checked(kind: Kind, check: Callable[[Any], None], wanted: str = "") -> Kind:
 
 
 def rows(schema: Table) -> list[tuple[str, str, str, str]]:
-    """Each key once: its name, the headers below which it can be, what it takes, its help."""
+    """Each key once: its name, the tables that can have it, the values that it takes, its help."""
     headers: dict[Key, list[str]] = {}
     for key, header in _keys_below(schema, ""):
         headers.setdefault(key, []).append(header)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who does the work of a batch: Blenders on this machine, or those of a dask cluster.
+"""The workers of a batch: Blenders on this machine, or those of a dask cluster.
 
-On this machine threads of this process hand out the tasks: the Blenders are processes already, and dask would
-take as much time for a small file as Blender takes to save it (bench/README.md).
+On this machine threads of this process distribute the tasks: the Blenders are processes already, and dask
+would take as much time for a small file as Blender takes to save it (bench/README.md).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import sinew
 
 from ..blender_process import BlenderLost, BlenderProcess, Limits, Stopped
 from ..core.errors import SinewError
-from ..core.opengl import usual_engine
+from ..core.opengl import default_engine
 from .journal import UNFINISHED, content_hash, stamp
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ CONNECT_LIMIT = 30.0
 
 @cache
 def versions() -> dict[str, str]:
-    """What decides over results in this Python: releases of Sinew and of Blender."""
+    """The releases of Sinew and of Blender in this Python, on which results depend."""
     try:
         return {"sinew": sinew.__version__, "blender": importlib.metadata.version("bpy")}
     except importlib.metadata.PackageNotFoundError:
@@ -45,7 +45,7 @@ def versions() -> dict[str, str]:
 
 
 class _Blenders:
-    """The Blenders of this process, one for each thread, each kept for its next file."""
+    """The Blenders of this process, one for each thread, each reused for the next file."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -55,8 +55,8 @@ class _Blenders:
         self._engine: Future[str] | None = None
 
     def run(self, task: dict, limits: Limits) -> dict:
-        # Found out once for all, while the first ones start.
-        engine = self._look_for_engine() if task["pictures"] is not None else None
+        # Determined once for all of them, while the first ones start.
+        engine = self._find_engine() if task["pictures"] is not None else None
         blender = self._take(limits)
         try:
             if engine is not None:
@@ -72,11 +72,11 @@ class _Blenders:
                 self._idle.append(blender)
         return outcome
 
-    def _look_for_engine(self) -> Future[str]:
+    def _find_engine(self) -> Future[str]:
         with self._lock:
             if self._engine is None:
                 aside = ThreadPoolExecutor(1)
-                self._engine = aside.submit(usual_engine)
+                self._engine = aside.submit(default_engine)
                 aside.shutdown(wait=False)
             return self._engine
 
@@ -101,12 +101,12 @@ class _Blenders:
             blender.end()
 
     def stop(self) -> None:
-        """Ends all, at once and for good."""
+        """Ends all of them at once; no new ones are started."""
         with self._lock:
             self._stopped = True
-            everyone = [*self._idle, *self._busy]
+            blenders = [*self._idle, *self._busy]
             self._idle = []
-        for blender in everyone:
+        for blender in blenders:
             blender.end()
 
 
@@ -124,14 +124,14 @@ def do_task(
     run: Callable[[dict, Limits], dict] = _blenders.run,
     versions: Callable[[], dict[str, str]] = versions,
 ) -> dict:
-    """What became of a task's file, tried once more in a fresh process where Blender was lost.
+    """The outcome of a task, tried once more in a new process where Blender crashed or was ended.
 
     task  "command", "source", "target", what the command needs, and "known": hash and versions of a source
           that need not be done again, or None
-    run   how to do it: in a process of its own, or here
+    run   does the task, in another process or in this one
 
-    The copy lies beside its target, under the name "unfinished": giving it its own is for who keeps the
-    journal.
+    The copy is written in the folder of its target under the name "unfinished"; who writes the journal
+    renames it.
     """
     source, target = Path(task["source"]), Path(task["target"])
     facts: dict[str, object] = {"versions": versions()}
@@ -139,7 +139,7 @@ def do_task(
         return {"unchanged": True}
     for attempt in range(1, ATTEMPTS + 1):
         facts["attempts"] = attempt
-        # Short, for names may be as long as the system lets them be.
+        # Short: the target's name may have the system's maximal length.
         unfinished = target.with_name(f".{uuid.uuid4().hex[:12]}{UNFINISHED}")
         try:
             outcome = run({**task, "unfinished": str(unfinished)}, limits)
@@ -169,7 +169,7 @@ def run_here(
     run: Callable[[dict, Limits], dict],
     versions: Callable[[], dict[str, str]],
 ) -> Generator[tuple[dict, dict], None, None]:
-    """Each task and what became of it, done one after the other in this process."""
+    """Each task and its outcome, one after the other in this process."""
     for task in tasks:
         yield task, do_task(task, Limits(), run, versions)
 
@@ -177,23 +177,23 @@ def run_here(
 def run_on_this_machine(
     tasks: Sequence[dict], limits: Limits, jobs: int
 ) -> Generator[tuple[dict, dict], None, None]:
-    """Each task and what became of it, as they are done, by `jobs` Blenders.
+    """Each task and its outcome, in the order in which `jobs` Blenders finish them.
 
-    Raises SinewError where no Blender can be had. What is not done when the generator is closed, or
-    interrupted, is given up.
+    Raises SinewError where no Blender can be started. Tasks that are not done when the generator is closed or
+    interrupted are dropped.
     """
     versions()
     waiting = deque(tasks)
     done: SimpleQueue[tuple[dict, dict]] = SimpleQueue()
 
     def work() -> None:
-        # Nothing else is done here, for as long as it takes a Blender waits.
+        # Outcomes are handled in the main thread: here a Blender would wait for it.
         with contextlib.suppress(IndexError):
             while True:
                 task = waiting.popleft()
                 done.put((task, _outcome(task, partial(do_task, task, limits))))
 
-    # Its threads last until all is done, and must: a Blender ends with the thread that started it.
+    # The threads must run until all is done: a Blender ends with the thread that started it.
     pool = ThreadPoolExecutor(jobs)
     for _ in range(jobs):
         pool.submit(work)
@@ -211,20 +211,20 @@ def run_on_this_machine(
 def run_in_dask(
     tasks: Sequence[dict], limits: Limits, scheduler: str, warn: Callable[[str], None]
 ) -> Generator[tuple[dict, dict], None, None]:
-    """The same by the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
+    """The same on the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
 
-    warn  told in one sentence where the cluster is open to others
+    warn  called with one sentence where others can reach the cluster
 
     Raises SinewError where the cluster can not be used.
     """
     import distributed
 
-    # Its warnings are of load and lost connections; what matters comes back as an error of a task.
+    # dask warns of load and lost connections; what matters is also an error of a task.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_LIMIT)
     except TypeError as error:
-        # Of tls://, with no or half a configuration.
+        # For tls:// without a complete configuration.
         raise SinewError(f"{scheduler}: {_sentence(error)}; docs/batch.md has how to set up TLS") from None
     except (OSError, ValueError, RuntimeError) as error:
         raise SinewError(f"{scheduler}: no dask scheduler answers at this address: {error}") from None
@@ -234,7 +234,8 @@ def run_in_dask(
         futures = client.map(do_task, tasks, limits=limits, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
         try:
-            # A worker that was lost has its file done by another; one that takes several along does not.
+            # dask gives the task of a lost worker to another one, but not a task that has lost several
+            # workers.
             for future in distributed.as_completed(futures):
                 task = task_of[future.key]
                 yield task, _outcome(task, future.result)
@@ -252,7 +253,7 @@ def _outcome(task: dict, result: Callable[[], dict]) -> dict:
 
 
 def _warn_where_open(address: str, warn: Callable[[str], None]) -> None:
-    """address  as the scheduler reports it; its machine's own where it listens on all"""
+    """address  as the scheduler reports it; one of its machine's own where it listens on all"""
     scheme, _separator, host_and_port = address.rpartition("://")
     host = host_and_port.rpartition(":")[0].strip("[]")
     if scheme != "tls" and not _is_this_machine(host):
@@ -270,7 +271,7 @@ def _is_this_machine(host: str) -> bool:
 
 
 def _check_workers(client: Client, scheduler: str) -> None:
-    """Raises SinewError where a worker can not do what this process would."""
+    """Raises SinewError where a worker can not run Blender or has another Sinew than this process."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_LIMIT)
     except TimeoutError:
@@ -281,14 +282,14 @@ def _check_workers(client: Client, scheduler: str) -> None:
         raise SinewError(
             f"{scheduler}: a worker can not run Sinew: {_sentence(error)}; install sinew-blender for it"
         ) from None
-    blenders = {there["blender"] for there in found.values()}
+    blenders = {versions["blender"] for versions in found.values()}
     if len(blenders) > 1:
         raise SinewError(f"{scheduler}: its workers have different Blenders: {', '.join(sorted(blenders))}")
-    for address, there in found.items():
-        if there["sinew"] != sinew.__version__:
+    for address, worker_versions in found.items():
+        if worker_versions["sinew"] != sinew.__version__:
             raise SinewError(
-                f"{scheduler}: worker {address} has Sinew {there['sinew']}, here is {sinew.__version__}; "
-                "install the same"
+                f"{scheduler}: worker {address} has Sinew {worker_versions['sinew']}, here is "
+                f"{sinew.__version__}; install the same"
             )
 
 

@@ -286,8 +286,8 @@ def test_another_blender_with_sinew(skinned, other_blender):
     [
         ("#!/bin/sh\nsleep 314.159 & sleep 314.159\n", "no answer after 1 s"),
         ("#!/bin/sh\nkill -SEGV $$\n", "ended (SIGSEGV) without an answer"),
-        ("#!/bin/sh\necho 'SINEW-ANSWER {'\n", "ended (status 0) without an answer"),
-        ("#!/bin/sh\necho 'SINEW-ANSWER [1]'\n", "ended (status 0) without an answer"),
+        ("#!/bin/sh\necho 'SINEW-STATUS {'\n", "ended (status 0) without an answer"),
+        ("#!/bin/sh\necho 'SINEW-STATUS [1]'\n", "ended (status 0) without an answer"),
         ("no program\n", "can not be started"),
         (None, "can not be started"),
     ],

@@ -30,35 +30,35 @@ def multiply(p, q):
     return np.array([a * b - np.dot(u, v), *(a * np.array(v) + b * np.array(u) + np.cross(u, v))])
 
 
-def joints(case, bone, point):  # of a bendy bone: the two beside the point, with their shares
+def joints(case, bone, point):  # of a bendy bone: the two next to the point, with their shares
     n = int(case["segments"][bone])
     if n == 1:
         return [(bone, 1.0)]
     along = moved_by(np.linalg.inv(case["rest"][bone]), point)[1] / case["lengths"][bone]
-    place = np.clip(along, 0, 1) * n
-    k = min(int(place), n - 1)
+    position = np.clip(along, 0, 1) * n
+    k = min(int(position), n - 1)
     first = int(case["first_joint"][bone]) + k
-    return [(first, 1 - (place - k)), (first + 1, place - k)]
+    return [(first, 1 - (position - k)), (first + 1, position - k)]
 
 
 def skin(case, preserve_volume):
     case = {k: v.astype(np.float64) if v.dtype.kind == "f" else v for k, v in case.items()}
     motion = case["posed"] @ np.linalg.inv(case["rest"])
-    turn = np.array([axes(p) @ axes(r).T for p, r in zip(case["posed"], case["rest"], strict=True)])
-    turns, result = np.array([quaternion(t) for t in turn]), case["points"].copy()
+    rotation = np.array([axes(p) @ axes(r).T for p, r in zip(case["posed"], case["rest"], strict=True)])
+    quaternions, result = np.array([quaternion(r) for r in rotation]), case["points"].copy()
     for v, x in enumerate(moved_by(case["armature_from_mesh"], case["points"])):
-        total, real, dual, shift = 0.0, np.zeros(4), np.zeros(4), np.zeros(3)
+        total, real, dual, translation = 0.0, np.zeros(4), np.zeros(4), np.zeros(3)
         for i in range(case["offsets"][v], case["offsets"][v + 1]):
             for b, share in joints(case, case["bones"][i], x):
-                w, q, y = share * case["weights"][i], turns[b], moved_by(motion[b], x)
+                w, q, y = share * case["weights"][i], quaternions[b], moved_by(motion[b], x)
                 s = -w if q @ real < 0 else w  # against the running sum, in stored order
-                total, shift, real = total + w, shift + w * (y - x), real + s * q
-                dual = dual + s / 2 * multiply([0.0, *(y - turn[b] @ x)], q)
+                total, translation, real = total + w, translation + w * (y - x), real + s * q
+                dual = dual + s / 2 * multiply([0.0, *(y - rotation[b] @ x)], q)
         if total > 1e-4:
-            place, back = x + shift / total, real * [1, -1, -1, -1]
+            point, conjugate = x + translation / total, real * [1, -1, -1, -1]
             if preserve_volume:
-                place = multiply(multiply(real, [0.0, *x]) + 2 * dual, back)[1:] / (real @ real)
-            result[v] = moved_by(np.linalg.inv(case["armature_from_mesh"]), place)
+                point = multiply(multiply(real, [0.0, *x]) + 2 * dual, conjugate)[1:] / (real @ real)
+            result[v] = moved_by(np.linalg.inv(case["armature_from_mesh"]), point)
     return result
 
 

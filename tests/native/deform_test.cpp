@@ -82,7 +82,7 @@ TEST_P(Deform, vertices_without_weight_stay_to_the_bit) {
 TEST_P(Deform, weights_are_normalised) {
     const Scene scene = random_scene(9, 200, 1.0);
     const auto expected = deformed(Deformer(scene.data(), method()), scene);
-    // Powers of two scale without rounding, so that nothing is left to differ.
+    // Powers of two scale without rounding, so that the results are equal.
     for (const float factor : {0x1p-80f, 0.25f, 0x1p80f}) {
         Scene scaled = scene;
         for (float& weight : scaled.weights) weight *= factor;
@@ -126,12 +126,12 @@ TEST_P(Deform, new_rest_points_equal_a_new_deformer) {
 
 TEST_P(Deform, bones_from_model_goes_there_and_back) {
     const Scene scene = random_scene(13, 300, 1.0);
-    const Affine<double> turn = to_affine(QuatVec<double>{about<double>({1, 2, 3}, 40.0), {1, -2, 3}});
-    const Affine<float> bones_from_model = cast<float>(turn * scaling<double>({2.0, 0.5, -1.5}));
+    const Affine<double> rotation = to_affine(QuatVec<double>{about<double>({1, 2, 3}, 40.0), {1, -2, 3}});
+    const Affine<float> bones_from_model = cast<float>(rotation * scaling<double>({2.0, 0.5, -1.5}));
     const auto points = deformed(Deformer(scene.data(), method()), scene, {bones_from_model, 0});
-    Scene there = scene;
-    for (Vec3<float>& point : there.rest_points) point = transform_point(bones_from_model, point);
-    const auto moved = deformed(Deformer(there.data(), method()), there);
+    Scene other = scene;
+    for (Vec3<float>& point : other.rest_points) point = transform_point(bones_from_model, point);
+    const auto moved = deformed(Deformer(other.data(), method()), other);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         const Vec3<float> expected = transform_point(inverse(bones_from_model), moved[vertex]);
         ASSERT_LT(distance(points[vertex], expected), 1e-5);
@@ -226,7 +226,7 @@ TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
     std::atomic<bool> done{false};
     std::atomic<int> torn{0};
     std::vector<std::thread> readers;
-    // More than there are palettes for.
+    // More threads than palettes.
     for (int reader = 0; reader < 20; ++reader) {
         readers.emplace_back([&, reader] {
             std::vector<Vec3<float>> points(scene.rest_points.size());
@@ -344,7 +344,7 @@ TEST(Deformer, refuses_bones_beyond_the_limit) {
               "influence_bones: expected indices of bones below 1048576, got 2147483647 at influence 2");
 }
 
-// Sizes alone: nothing that large is there to be read.
+// Sizes alone: no array of that size exists.
 TEST(Deformer, refuses_more_than_it_can_number) {
     const Vec3<float> point(0.0f);
     const std::size_t many = std::size_t{1} << 31;

@@ -136,9 +136,10 @@ TYPED_TEST(Interpolation, translations_near_the_largest_number_are_finite) {
     for (int i = 0; i < 40; ++i) {
         const auto random_end = [&] {
             const Vec3<double> v = random.vector(1.0);
-            const Quat<T> turn(i % 4 == 0 ? Quat<double>(1, 0, 0, 0) : random.rotation());
-            const Vec3<T> sides(v.x < 0 ? -large : large, v.y < 0 ? -large : large, v.z < 0 ? T(0) : large);
-            return this->in_layout({turn, sides});
+            const Quat<T> rotation(i % 4 == 0 ? Quat<double>(1, 0, 0, 0) : random.rotation());
+            const Vec3<T> translation(v.x < 0 ? -large : large, v.y < 0 ? -large : large,
+                                      v.z < 0 ? T(0) : large);
+            return this->in_layout({rotation, translation});
         };
         const auto a = random_end();
         const auto b = random_end();
@@ -182,15 +183,15 @@ TYPED_TEST(Interpolation, turns_near_half_a_turn_are_finite) {
     }
 }
 
-// Four turns a quarter of the sphere apart: their matrices sum to 0.
+// Four rotations a quarter of the sphere apart: their matrices sum to 0.
 TYPED_TEST(Interpolation, sum_that_cancels_gives_the_heaviest_turn) {
     using T = typename TypeParam::Scalar;
     using M = typename TypeParam::M;
-    const Vec3<T> shift(1, 2, 3);
-    const auto none = this->in_layout({Quat<T>(1, 0, 0, 0), shift});
-    const auto x = this->in_layout({Quat<T>(0, 1, 0, 0), shift});
-    const auto y = this->in_layout({Quat<T>(0, 0, 1, 0), shift});
-    const auto z = this->in_layout({Quat<T>(0, 0, 0, 1), shift});
+    const Vec3<T> translation(1, 2, 3);
+    const auto none = this->in_layout({Quat<T>(1, 0, 0, 0), translation});
+    const auto x = this->in_layout({Quat<T>(0, 1, 0, 0), translation});
+    const auto y = this->in_layout({Quat<T>(0, 0, 1, 0), translation});
+    const auto z = this->in_layout({Quat<T>(0, 0, 0, 1), translation});
     const auto mean = this->blend({none, x, y, z}, {T(0.25), T(0.25), T(0.25), T(0.25)});
     EXPECT_TRUE(this->is_finite(mean.transform));
     EXPECT_EQ(mean.is_defined, (std::is_same_v<M, MatrixLinear>));
@@ -214,8 +215,8 @@ TYPED_TEST(Interpolation, signs_of_quaternions_change_nothing) {
             EXPECT_LT(this->apart(plain.transform, M::between(a, minus_b, T(0.3)).transform),
                       this->kTolerance);
             const auto mean = this->blend({a, b, a}, {T(0.3), T(0.5), T(0.2)});
-            const auto turned = this->blend({a, minus_b, a}, {T(0.3), T(0.5), T(0.2)});
-            EXPECT_LT(this->apart(mean.transform, turned.transform), this->kTolerance);
+            const auto other_sign = this->blend({a, minus_b, a}, {T(0.3), T(0.5), T(0.2)});
+            EXPECT_LT(this->apart(mean.transform, other_sign.transform), this->kTolerance);
         }
     }
 }
@@ -230,21 +231,21 @@ TEST(MatrixLinear, halfway_to_half_a_turn_is_flat) {
 }
 
 TEST(MatrixPolar, is_the_nearest_rotation_even_to_a_mirror) {
-    // The mean of the three half turns about the axes is -1/3: a mirror, and every rotation is as near.
+    // The mean of the three rotations by 180 degrees about the axes is -1/3: a mirror, and every rotation is as near.
     const Vec3<double> none(0.0);
-    std::vector<Affine<double>> turns;
+    std::vector<Affine<double>> rotations;
     for (const Vec3<double>& axis : {Vec3<double>(1, 0, 0), {0, 1, 0}, {0, 0, 1}}) {
-        turns.push_back(to_affine(QuatVec<double>{about<double>(axis, 180.0), none}));
+        rotations.push_back(to_affine(QuatVec<double>{about<double>(axis, 180.0), none}));
     }
     const std::vector<double> even{1, 1, 1};
-    const auto tie = MatrixPolar::blend<Signs::kToHeaviest, double>(turns, even);
+    const auto tie = MatrixPolar::blend<Signs::kToHeaviest, double>(rotations, even);
     EXPECT_FALSE(tie.is_defined);
     EXPECT_LT(test::rotation_error(tie.transform.linear), 1e-14);
     // A little more of one breaks the tie.
     const std::vector<double> uneven{1, 1, 1.5};
-    const auto mean = MatrixPolar::blend<Signs::kToHeaviest, double>(turns, uneven);
+    const auto mean = MatrixPolar::blend<Signs::kToHeaviest, double>(rotations, uneven);
     EXPECT_TRUE(mean.is_defined);
-    EXPECT_LT(distance(mean.transform, turns[2]), 1e-12);
+    EXPECT_LT(distance(mean.transform, rotations[2]), 1e-12);
 }
 
 TEST(QvSlerp, has_constant_pace_where_nlerp_has_not) {
@@ -272,13 +273,13 @@ TEST(Sclerp, is_the_screw_at_constant_pace) {
 
 TEST(MatrixLog, is_not_the_shortest_path) {
     // 170 degrees and -170 degrees are 20 apart; by their logarithms the middle is none at all.
-    const auto turn = [](double degrees) {
+    const auto rotation = [](double degrees) {
         return to_affine(QuatVec<double>{about<double>({0, 0, 1}, degrees), {0, 0, 0}});
     };
-    const Affine<double> middle = MatrixLog::between(turn(170), turn(-170), 0.5).transform;
+    const Affine<double> middle = MatrixLog::between(rotation(170), rotation(-170), 0.5).transform;
     EXPECT_LT(distance(middle, Affine<double>{}), 1e-14);
-    const Affine<double> nearest = MatrixPolar::between(turn(170), turn(-170), 0.5).transform;
-    EXPECT_LT(distance(nearest, turn(180)), 1e-14);
+    const Affine<double> nearest = MatrixPolar::between(rotation(170), rotation(-170), 0.5).transform;
+    EXPECT_LT(distance(nearest, rotation(180)), 1e-14);
 }
 
 TEST(Slerp, of_opposite_quaternions_is_finite) {

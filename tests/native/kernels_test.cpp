@@ -31,8 +31,8 @@ Scene scene_of_sets(std::uint32_t seed, std::size_t sets, std::size_t vertices, 
     Scene scene = random_scene(seed, 0, 1.0);
     if (!scaled) {
         for (Affine<float>& motion : scene.posed_from_rest) {
-            const Quat<double> turn = glm::slerp(Quat<double>(1, 0, 0, 0), random.rotation(), spread);
-            motion = cast<float>(to_affine(QuatVec<double>{turn, random.vector(1.0)}));
+            const Quat<double> rotation = glm::slerp(Quat<double>(1, 0, 0, 0), random.rotation(), spread);
+            motion = cast<float>(to_affine(QuatVec<double>{rotation, random.vector(1.0)}));
         }
     }
     std::vector<std::vector<std::int32_t>> bones(sets);
@@ -98,8 +98,8 @@ Scene scene_of_unlike_bones(std::uint32_t seed, std::size_t sets, std::size_t ve
         const int count = 2 + random.index(5);
         for (int k = 0; k < count; ++k) {
             const double size = std::pow(farthest, random.uniform(0.0, 1.0));
-            const Quat<double> turn = glm::slerp(Quat<double>(1, 0, 0, 0), random.rotation(), spread);
-            Affine<double> motion = to_affine(QuatVec<double>{turn, size * random.vector(1.0)});
+            const Quat<double> rotation = glm::slerp(Quat<double>(1, 0, 0, 0), random.rotation(), spread);
+            Affine<double> motion = to_affine(QuatVec<double>{rotation, size * random.vector(1.0)});
             if (scaled) motion = motion * scaling<double>({1.0, random.uniform(0.5, 2.0), 1.0});
             influences.push_back({static_cast<std::int32_t>(scene.posed_from_rest.size()),
                                   static_cast<float>(random.uniform(0.5, 1.5) / size)});
@@ -153,7 +153,7 @@ TEST_P(Kernels, agree_for_bones_turned_alike) {
     EXPECT_LT(errors(method(), scene_of_sets(1, 12, 100, 6, false, 0.2)).back(), kTolerance);
 }
 
-// Each component of the quaternion is the largest of one of them, and half a turn has w = 0.
+// Each component of the quaternion is the largest of one of them, and 180 degrees have w = 0.
 TEST_P(Kernels, agree_for_bones_turned_far) {
     Scene scene;
     for (const double degrees : {0.0, 100.0, 179.0, 180.0, 181.0, 300.0}) {
@@ -205,9 +205,9 @@ TEST_P(Kernels, round_as_a_plain_sum_does_for_bones_of_unlike_size) {
 TEST_P(Kernels, a_far_bone_of_little_weight_costs_no_digits) {
     for (const double far : {1e3, 1e5}) {
         Scene scene;
-        const auto turn = about<double>({1, 2, 3}, 20.0);
-        scene.posed_from_rest = {cast<float>(to_affine(QuatVec<double>{turn, {far, -far, far}})),
-                                 cast<float>(to_affine(QuatVec<double>{turn, {0.1, 0.2, 0.3}}))};
+        const auto rotation = about<double>({1, 2, 3}, 20.0);
+        scene.posed_from_rest = {cast<float>(to_affine(QuatVec<double>{rotation, {far, -far, far}})),
+                                 cast<float>(to_affine(QuatVec<double>{rotation, {0.1, 0.2, 0.3}}))};
         scene.rest_bones.resize(2);
         const auto little = static_cast<float>(1.0 / far);
         for (int i = 0; i < 40; ++i) {
@@ -270,9 +270,9 @@ TEST_P(Kernels, bones_from_model_goes_there_and_back) {
     const Scene scene = scene_of_sets(8, 20, 25, 6, true);
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
     const auto points = deformed(Deformer(scene.data(), method()), scene, {bones_from_model, 0});
-    Scene there = scene;
-    for (Vec3<float>& point : there.rest_points) point = transform_point(bones_from_model, point);
-    const auto moved = in_double(method(), there);
+    Scene other = scene;
+    for (Vec3<float>& point : other.rest_points) point = transform_point(bones_from_model, point);
+    const auto moved = in_double(method(), other);
     const Affine<double> back = inverse(cast<double>(bones_from_model));
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         ASSERT_LT(distance(Vec3<double>(points[vertex]), transform_point(back, moved[vertex])), 1e-5);

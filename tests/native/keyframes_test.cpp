@@ -193,7 +193,7 @@ TYPED_TEST(Keyframes, half_turns_between_keys_are_finite) {
 
 TYPED_TEST(Keyframes, no_jump_within_the_spline) {
     using Transform = typename TypeParam::template Transform<double>;
-    // Steps of 100 degrees: keys two apart lie beyond half a turn, where a choice of side by the heaviest
+    // Steps of 100 degrees: keys two apart differ by more than 180 degrees, where a choice of sign by the heaviest
     // key would change in the middle of an interval.
     std::vector<Transform> keys;
     for (int i = 0; i < 5; ++i) {
@@ -209,7 +209,7 @@ TYPED_TEST(Keyframes, no_jump_within_the_spline) {
     }
 }
 
-// Smith 2013, figure 3.3: an arm of two bones of length 1, both turned by 90 degrees between the keyframes.
+// Smith 2013, figure 3.3: an arm of two bones of length 1, both rotated by 90 degrees between the keyframes.
 template <class Method>
 double elbow_gap(bool combine_first) {
     using Transform = typename Method::template Transform<double>;
@@ -251,7 +251,7 @@ TEST(FigureThreeThree, interpolating_after_combining_tears_the_elbow) {
     // The lower arm's head goes straight from (1, 0) to (0, 1), the upper arm's end on the circle.
     EXPECT_NEAR(elbow_gap<QvNlerp>(true), 1.0 - std::sqrt(0.5), 1e-12);
     EXPECT_NEAR(elbow_gap<QvSlerp>(true), 1.0 - std::sqrt(0.5), 1e-12);
-    // The lower arm's own screw turns by 180 degrees about the middle of its way.
+    // The lower arm's own screw rotates by 180 degrees about the middle of its way.
     EXPECT_GT(elbow_gap<Dlb>(true), 0.1);
     EXPECT_GT(elbow_gap<Sclerp>(true), 0.1);
 }

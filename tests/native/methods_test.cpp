@@ -25,7 +25,7 @@ TEST(Methods, names_numbers_and_labels_are_unique) {
     EXPECT_EQ(numbers.size(), kMethods.size());
 }
 
-// .blend files hold these numbers: a change here changes people's files.
+// These numbers are stored in .blend files: never change them.
 TEST(Methods, stored_numbers_stay) {
     EXPECT_EQ(find_method("lbs")->number, 1);
     EXPECT_EQ(find_method("qv")->number, 2);

@@ -54,7 +54,7 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 
-// The thread sanitizer has one of its own there.
+// The thread sanitizer defines its own.
 #if defined(__GLIBC__) && !defined(__SANITIZE_THREAD__)
 #define SINEW_COUNTS_LOCKS
 extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) {
@@ -141,7 +141,7 @@ TEST(Bindings, are_packed_once) {
     deformers.reserve(kMethodCount);
     const std::size_t alone = bytes;
     for (const MethodInfo& method : kMethods) deformers.emplace_back(binding, method);
-    // What is left is room for bones.
+    // The rest is memory for bones.
     EXPECT_LT(bytes - alone, of_binding / 10);
 }
 

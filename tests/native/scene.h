@@ -104,7 +104,7 @@ inline std::vector<Vec3<double>> in_double(const MethodInfo& method, const Scene
     return by_skinning<double>(method, scene);
 }
 
-// kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The shift of a
+// kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The translation of a
 // dual quaternion is a product of two numbers of that size, so it grows with the size and no faster.
 inline constexpr double kTolerance = 2e-6;
 

@@ -58,22 +58,22 @@ TYPED_TEST(Rigid, points_of_the_screw_line_only_slide_along_it) {
         const Vec3<T> moved = transform_point(to_dual_quat(screw), point);
         EXPECT_LT(distance(moved, point + T(0.7) * screw.axis), this->kTolerance);
         const Screw<T> found = to_screw(to_dual_quat(screw));
-        const T side = glm::dot(found.axis, screw.axis) < T(0) ? T(-1) : T(1);
-        EXPECT_LT(distance(side * found.axis, screw.axis), this->kTolerance) << degrees;
-        EXPECT_LT(distance(side * found.moment, screw.moment), this->kTolerance) << degrees;
-        EXPECT_NEAR(side * found.translation, screw.translation, this->kTolerance) << degrees;
+        const T sign = glm::dot(found.axis, screw.axis) < T(0) ? T(-1) : T(1);
+        EXPECT_LT(distance(sign * found.axis, screw.axis), this->kTolerance) << degrees;
+        EXPECT_LT(distance(sign * found.moment, screw.moment), this->kTolerance) << degrees;
+        EXPECT_NEAR(sign * found.translation, screw.translation, this->kTolerance) << degrees;
         EXPECT_NEAR(found.angle, screw.angle, this->kTolerance) << degrees;
     }
 }
 
 TYPED_TEST(Rigid, screw_of_translation_and_of_identity) {
     using T = TypeParam;
-    const Screw<T> shift = to_screw(from_translation<DualQuat>(Vec3<T>(0, -2, 0)));
-    EXPECT_TRUE(test::same_bits(shift.axis, Vec3<T>(0, -1, 0)));
-    EXPECT_TRUE(test::same_bits(shift.moment, Vec3<T>(0)));
-    EXPECT_EQ(shift.angle, T(0));
-    EXPECT_EQ(shift.translation, T(2));
-    EXPECT_EQ(shift.pitch(), std::numeric_limits<T>::infinity());
+    const Screw<T> translation = to_screw(from_translation<DualQuat>(Vec3<T>(0, -2, 0)));
+    EXPECT_TRUE(test::same_bits(translation.axis, Vec3<T>(0, -1, 0)));
+    EXPECT_TRUE(test::same_bits(translation.moment, Vec3<T>(0)));
+    EXPECT_EQ(translation.angle, T(0));
+    EXPECT_EQ(translation.translation, T(2));
+    EXPECT_EQ(translation.pitch(), std::numeric_limits<T>::infinity());
     const Screw<T> none = to_screw(DualQuat<T>{});
     EXPECT_TRUE(test::same_bits(none.axis, Vec3<T>(0, 0, 1)));
     EXPECT_EQ(none.angle, T(0));

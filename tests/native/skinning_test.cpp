@@ -173,9 +173,9 @@ double change_by_space(const Rig& rig, const Affine<double>& other_from_space,
     Rig moved = rig;
     for (Affine<double>& bone : moved.posed_from_rest) bone = other_from_space * bone * space_from_other;
     for (Affine<double>& bone : moved.rest_bones) bone = other_from_space * bone;
-    const Vec3<double> there =
+    const Vec3<double> in_other_space =
         skinned<Method>(prepared<Method>(moved), influences, transform_point(other_from_space, rest));
-    return distance(transform_point(space_from_other, there),
+    return distance(transform_point(space_from_other, in_other_space),
                     skinned<Method>(prepared<Method>(rig), influences, rest));
 }
 
@@ -183,9 +183,9 @@ TYPED_TEST(Skinning, turned_axes_change_nothing) {
     Random random(11);
     for (std::uint32_t i = 0; i < 40; ++i) {
         const Rig rig = i % 2 == 0 ? rigid_rig(i) : scaled_rig(i);
-        const Affine<double> turn{to_mat3(random.rotation()), Vec3<double>(0.0)};
+        const Affine<double> rotation{to_mat3(random.rotation()), Vec3<double>(0.0)};
         const Vec3<double> rest = random.vector(2.0);
-        EXPECT_LT(change_by_space<TypeParam>(rig, turn, random.influences<double>(5, 6), rest), 1e-12);
+        EXPECT_LT(change_by_space<TypeParam>(rig, rotation, random.influences<double>(5, 6), rest), 1e-12);
     }
 }
 
@@ -193,9 +193,10 @@ TYPED_TEST(Skinning, another_origin_changes_only_qv) {
     Random random(12);
     for (std::uint32_t i = 0; i < 40; ++i) {
         const Rig rig = i % 2 == 0 ? rigid_rig(i) : scaled_rig(i);
-        const Affine<double> shift{Mat3<double>(1.0), {30.0, -20.0, 10.0}};
+        const Affine<double> translation{Mat3<double>(1.0), {30.0, -20.0, 10.0}};
         const Vec3<double> rest = random.vector(2.0);
-        const double change = change_by_space<TypeParam>(rig, shift, random.influences<double>(5, 6), rest);
+        const double change =
+            change_by_space<TypeParam>(rig, translation, random.influences<double>(5, 6), rest);
         if (std::is_same_v<TypeParam, Qv>) {
             EXPECT_GT(change, 0.1);
         } else {
@@ -238,7 +239,7 @@ TYPED_TEST(Skinning, opposite_turns_are_finite) {
 }
 
 TYPED_TEST(Skinning, three_half_turns_about_square_axes_are_finite) {
-    // Quaternions i, j, k and 1 are all square to each other: every choice of a side is a tie.
+    // Quaternions i, j, k and 1 are all orthogonal to each other: every choice of a sign is a tie.
     Rig rig{{{}}, std::vector<Affine<double>>(4)};
     for (int axis = 0; axis < 3; ++axis) {
         Vec3<double> direction(0.0);

@@ -72,7 +72,7 @@ TEST(SplitScale, parts_multiply_to_the_whole) {
         {"mirror y", scaling<double>({1, -1, 1})},
         {"mirror z", scaling<double>({1, 1, -1})},
         {"mirror all", scaling<double>({-2, -1, -3})},
-        {"half turn by signs", scaling<double>({-1, 1, -1})},
+        {"180 degrees by signs", scaling<double>({-1, 1, -1})},
         {"sheared", shear},
         {"mirrored shear", shear * scaling<double>({1, 1, -2})},
     };

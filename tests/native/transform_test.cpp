@@ -10,18 +10,18 @@ using test::about;
 using test::distance;
 using test::Random;
 
-// Motions that conversions get wrong first: no turn, half turns about each axis and between them, turns a
+// Motions that conversions get wrong first: no rotation, 180 degrees about each axis and between them, rotations a
 // hair from these, and translation alone.
 template <class T>
 std::vector<QuatVec<T>> named_motions() {
     const Vec3<T> x(1, 0, 0);
     const Vec3<T> y(0, 1, 0);
     const Vec3<T> z(0, 0, 1);
-    const Vec3<T> shift(T(0.5), T(-2), T(3));
-    std::vector<QuatVec<T>> motions{{}, {Quat<T>(1, 0, 0, 0), shift}};
+    const Vec3<T> translation(T(0.5), T(-2), T(3));
+    std::vector<QuatVec<T>> motions{{}, {Quat<T>(1, 0, 0, 0), translation}};
     for (const Vec3<T>& axis : {x, y, z, x + y, y + z, x - z, x + y + z}) {
         for (const T degrees : {T(1e-3), T(90), T(179.99), T(180), T(180.01), T(270)}) {
-            motions.push_back({about<T>(axis, degrees), shift});
+            motions.push_back({about<T>(axis, degrees), translation});
         }
     }
     return motions;
@@ -78,13 +78,15 @@ TYPED_TEST(Transform, composition_agrees) {
 
 TYPED_TEST(Transform, product_applies_the_right_factor_first) {
     using T = TypeParam;
-    const QuatVec<T> turn{about<T>(Vec3<T>(0, 0, 1), T(90)), Vec3<T>(T(0))};
-    const QuatVec<T> shift{Quat<T>(1, 0, 0, 0), Vec3<T>(1, 0, 0)};
+    const QuatVec<T> rotation{about<T>(Vec3<T>(0, 0, 1), T(90)), Vec3<T>(T(0))};
+    const QuatVec<T> translation{Quat<T>(1, 0, 0, 0), Vec3<T>(1, 0, 0)};
     const Vec3<T> origin(T(0));
-    EXPECT_LT(distance(transform_point(turn * shift, origin), Vec3<T>(0, 1, 0)), this->kTolerance);
-    EXPECT_LT(distance(transform_point(to_affine(turn) * to_affine(shift), origin), Vec3<T>(0, 1, 0)),
-              this->kTolerance);
-    EXPECT_LT(distance(transform_point(to_dual_quat(turn) * to_dual_quat(shift), origin), Vec3<T>(0, 1, 0)),
+    EXPECT_LT(distance(transform_point(rotation * translation, origin), Vec3<T>(0, 1, 0)), this->kTolerance);
+    EXPECT_LT(
+        distance(transform_point(to_affine(rotation) * to_affine(translation), origin), Vec3<T>(0, 1, 0)),
+        this->kTolerance);
+    EXPECT_LT(distance(transform_point(to_dual_quat(rotation) * to_dual_quat(translation), origin),
+                       Vec3<T>(0, 1, 0)),
               this->kTolerance);
 }
 
@@ -146,10 +148,10 @@ TYPED_TEST(Transform, dual_quat_of_a_motion_is_unit) {
 
 TYPED_TEST(Transform, pure_translation_comes_back_to_the_bit) {
     using T = TypeParam;
-    const Vec3<T> shift(T(0.1), T(-2e6), T(3e-6));
-    const QuatVec<T> motion{Quat<T>(1, 0, 0, 0), shift};
-    EXPECT_TRUE(test::same_bits(translation(to_dual_quat(motion)), shift));
-    EXPECT_TRUE(test::same_bits(to_quat_vec(to_affine(motion)).translation, shift));
+    const Vec3<T> far_away(T(0.1), T(-2e6), T(3e-6));
+    const QuatVec<T> motion{Quat<T>(1, 0, 0, 0), far_away};
+    EXPECT_TRUE(test::same_bits(translation(to_dual_quat(motion)), far_away));
+    EXPECT_TRUE(test::same_bits(to_quat_vec(to_affine(motion)).translation, far_away));
 }
 
 TEST(DualQuat, normalized_keeps_a_unit_one) {

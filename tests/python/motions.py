@@ -31,14 +31,14 @@ LAYOUT_OF = {
     "dib": "dual_quat",
 }
 
-# Turns and shifts where quotients of small numbers, or signs, go wrong first.
+# Rotations and translations where quotients of small numbers, or signs, go wrong first.
 ANGLES = [0.0, 1e-30, 1e-12, 1e-7, 1e-4, 0.0199, 0.0201, 1.0, 3.0, np.pi - 1e-5, np.pi]
 
 
 def rigid(rng, count=None, extent=2.0):
     """scipy's RigidTransform, one or `count`."""
-    shift = rng.uniform(-extent, extent, 3 if count is None else (count, 3))
-    return RigidTransform.from_components(shift, Rotation.random(count, rng=rng))
+    translation = rng.uniform(-extent, extent, 3 if count is None else (count, 3))
+    return RigidTransform.from_components(translation, Rotation.random(count, rng=rng))
 
 
 def layout(transform, name, dtype=np.float64):
@@ -78,14 +78,14 @@ def hat(twist):
 
 
 def edge_motions():
-    """RigidTransform of every angle of ANGLES about five axes, each with two shifts and without."""
-    rotations, shifts = [], []
+    """RigidTransform of every angle of ANGLES about five axes, each with two translations and without."""
+    rotations, translations = [], []
     for angle in ANGLES:
         for axis in ([1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, -0.8, 0], [0.48, 0.6, -0.64]):
-            for shift in ([0, 0, 0], [1, 2, 3], [0.96, 1.2, -1.28]):
+            for translation in ([0, 0, 0], [1, 2, 3], [0.96, 1.2, -1.28]):
                 rotations.append(angle * np.array(axis, np.float64))
-                shifts.append(shift)
-    return RigidTransform.from_components(np.array(shifts, np.float64), Rotation.from_rotvec(rotations))
+                translations.append(translation)
+    return RigidTransform.from_components(np.array(translations, np.float64), Rotation.from_rotvec(rotations))
 
 
 def numbers(extent):
@@ -98,6 +98,6 @@ def rigid_motions(draw, angle=np.pi):
     axis = np.array([draw(numbers(1.0)) for _ in range(3)])
     length = np.linalg.norm(axis)
     axis = axis / length if length > 1e-3 else np.array([0.0, 0.0, 1.0])
-    shift = np.array([draw(numbers(3.0)) for _ in range(3)])
-    turn = draw(st.floats(0.0, angle, allow_subnormal=False))
-    return RigidTransform.from_components(shift, Rotation.from_rotvec(turn * axis))
+    translation = np.array([draw(numbers(3.0)) for _ in range(3)])
+    radians = draw(st.floats(0.0, angle, allow_subnormal=False))
+    return RigidTransform.from_components(translation, Rotation.from_rotvec(radians * axis))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skinning in float64 numpy and matrix form, from the papers: what the library is measured against.
+"""Skinning in float64 numpy and matrix form, from the papers: the oracle of the library.
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
-Collins, Zara, O'Sullivan 2008, algorithm 1 (dq) and Alexa 2002 (log); slow, one vertex at a time, and shares
-no formula with the library where there are two. Quaternions are (w, x, y, z).
+Collins, Zara, O'Sullivan 2008, algorithm 1 (dq) and Alexa 2002 (log); slow, one vertex at a time, and does
+not use the formulas of the library where others exist. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -12,9 +12,9 @@ import numpy as np
 import scipy.linalg
 
 
-def turn(rotation):
-    """The proper rotation nearest to the 3x3 `rotation` (polar decomposition)."""
-    u, _, vt = np.linalg.svd(rotation)
+def nearest_rotation(matrix):
+    """The proper rotation nearest to the 3x3 `matrix` (polar decomposition)."""
+    u, _, vt = np.linalg.svd(matrix)
     return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
 
 
@@ -23,10 +23,10 @@ def is_rigid(linear):
 
 
 def rotation_of_bone(posed_from_rest, rest_bone):
-    """The turn of a bone's motion, 3x3: where it is scaled, that of its posed axes made orthonormal and
-    right-handed with Y kept, then X as near as can be."""
+    """The rotation of a bone's motion, 3x3: of a scaled bone, that of its posed axes made orthonormal and
+    right-handed, with Y kept and X as near as possible."""
     if is_rigid(posed_from_rest[:3, :3]):
-        return turn(posed_from_rest[:3, :3])
+        return nearest_rotation(posed_from_rest[:3, :3])
     axes = posed_from_rest[:3, :3] @ rest_bone[:3, :3]
     y = axes[:, 1] / np.linalg.norm(axes[:, 1])
     assert y @ axes[:, 0] < 1.0, "beyond this shear Blender's rule picks another axis than the reference"
@@ -81,14 +81,14 @@ def translation(real, dual):
 
 
 def in_one_hemisphere(quaternions, weights):
-    """Signs that turn each quaternion to the side of the weighted sum of those before it, and how far the
-    closest of them is from a tie (1: none is near)."""
+    """Signs that bring each quaternion into the hemisphere of the weighted sum of those before it, and how
+    far the closest of them is from a tie (1: none is near)."""
     signs, total, margin = [], np.zeros(4), 1.0
     for q, weight in zip(quaternions, weights, strict=True):
-        side = q @ total
+        along = q @ total
         if total.any():
-            margin = min(margin, abs(side) / np.linalg.norm(total))
-        signs.append(-1.0 if side < 0.0 else 1.0)
+            margin = min(margin, abs(along) / np.linalg.norm(total))
+        signs.append(-1.0 if along < 0.0 else 1.0)
         total = total + signs[-1] * weight * q
     return np.array(signs), margin
 
@@ -99,22 +99,22 @@ def lbs(point, motions, rotations, weights):
 
 
 def rigid_terms(point, motions, rotations):
-    """For each bone the rigid motion with its turn that takes `point` where the whole bone takes it."""
-    shifts = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point
-    return np.array([quaternion(r) for r in rotations]), shifts
+    """For each bone the rigid motion with its rotation that moves `point` as the whole bone does."""
+    translations = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point
+    return np.array([quaternion(r) for r in rotations]), translations
 
 
 def qv(point, motions, rotations, weights):
-    quaternions, shifts = rigid_terms(point, motions, rotations)
+    quaternions, translations = rigid_terms(point, motions, rotations)
     signs, margin = in_one_hemisphere(quaternions, weights)
     blended = (signs * weights) @ quaternions
-    return rotation(blended / np.linalg.norm(blended)) @ point + weights @ shifts, margin
+    return rotation(blended / np.linalg.norm(blended)) @ point + weights @ translations, margin
 
 
 def dq(point, motions, rotations, weights):
-    quaternions, shifts = rigid_terms(point, motions, rotations)
+    quaternions, translations = rigid_terms(point, motions, rotations)
     duals = np.array(
-        [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, shifts, strict=True)]
+        [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, translations, strict=True)]
     )
     signs, margin = in_one_hemisphere(quaternions, weights)
     real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals

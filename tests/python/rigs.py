@@ -14,7 +14,7 @@ def random_rotation(rng):
 
 
 def about(axis, degrees):
-    """float64 [4, 4]: the turn by `degrees` about `axis` through the origin."""
+    """float64 [4, 4]: the rotation by `degrees` about `axis` through the origin."""
     half = np.radians(degrees) / 2
     axis = np.asarray(axis, np.float64) / np.linalg.norm(axis)
     matrix = np.eye(4)
@@ -22,14 +22,14 @@ def about(axis, degrees):
     return matrix
 
 
-def shift(vector):
+def translation(vector):
     matrix = np.eye(4)
     matrix[:3, 3] = vector
     return matrix
 
 
 def random_motion(rng, extent=1.0):
-    matrix = shift(rng.uniform(-extent, extent, 3))
+    matrix = translation(rng.uniform(-extent, extent, 3))
     matrix[:3, :3] = random_rotation(rng)
     return matrix
 
@@ -65,8 +65,8 @@ class Rig:
 
 
 def random_rig(seed, vertices=200, bones=15, extent=1.0, most_influences=12, scaled=False):
-    """Bones turned any way; 1 to `most_influences` bones a vertex. `scaled`: every second bone is stretched
-    along its axes, and of those every second one mirrored."""
+    """Bones with random rotations; 1 to `most_influences` bones a vertex. `scaled`: every second bone is
+    stretched along its axes, and of those every second one mirrored."""
     rng = np.random.default_rng(seed)
     rest_bones = np.array([random_motion(rng, extent) for _ in range(bones)])
     transforms = np.array([random_motion(rng, extent) for _ in range(bones)])

@@ -346,10 +346,10 @@ def test_a_run_killed_before_the_name_is_finished_by_the_next(tmp_path):
     with Journal(tmp_path) as journal:
         journal.recover()
         assert target.read_bytes() == b"a copy"
-        assert journal.holds(target, journal.latest["a.blend"])
+        assert journal.matches(target, journal.latest["a.blend"])
         target.write_bytes(b"edited")
         journal.recover()
-        assert not journal.holds(target, journal.latest["a.blend"])
+        assert not journal.matches(target, journal.latest["a.blend"])
 
 
 def test_what_has_no_record_is_cleared_away(tmp_path):
@@ -357,7 +357,7 @@ def test_what_has_no_record_is_cleared_away(tmp_path):
     (tmp_path / ".2.unfinished.blend@").write_bytes(b"Blender's own")
     with Journal(tmp_path) as journal:
         journal.recover()
-        journal.clear_away([tmp_path / "a.blend"])
+        journal.remove_unfinished([tmp_path / "a.blend"])
     assert sorted(path.name for path in tmp_path.iterdir()) == [NAME]
 
 

@@ -11,14 +11,14 @@ import pytest
 import reference
 import scipy.linalg
 import sinew
-from rigs import Rig, about, random_motion, random_rig, shift, transform
+from rigs import Rig, about, random_motion, random_rig, transform, translation
 
 METHODS = [method.name for method in sinew.methods()]
 RIGID = [name for name in METHODS if name != "lbs"]
 
 # Times the size of the scene: float32's 6e-8 after some tens of operations.
 TOLERANCE = 4e-6
-# Nearer than this to a tie between q and -q the two sides are both right, and far apart.
+# Nearer than this to a tie between q and -q, both signs are right, and their results far apart.
 NO_TIE = 1e-4
 
 every_method = pytest.mark.parametrize("method", METHODS)
@@ -123,7 +123,7 @@ def test_agrees_with_the_reference_with_identity_rest_bones(method):
 @every_method
 def test_agrees_with_the_reference_far_from_the_origin(method):
     rig = random_rig(23, scaled=True)
-    far = shift([1000.0, -500.0, 2000.0])
+    far = translation([1000.0, -500.0, 2000.0])
     rig = rig.with_motions(
         far @ rig.transforms @ np.linalg.inv(far),
         rest_points=transform(far, rig.rest_points).astype(np.float32),
@@ -197,7 +197,8 @@ def test_log_spreads_a_twist_evenly():
 
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e6, 1e12])
 def test_log_is_finite_for_whatever_is_finite(size):
-    """Half turns of all axes, bones without width, far bones, in every kernel that a mesh can come to."""
+    """Rotations by 180 degrees about all axes, bones without width, far bones, in every kernel that a mesh
+    can come to."""
     rng = np.random.default_rng(61)
     axes = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (-1, -2, 3)]
     motions = [np.eye(4), np.diag([0.0, 0.0, 0.0, 1.0]), np.diag([-1.0, -1.0, -1.0, 1.0])]
@@ -218,26 +219,26 @@ def change_by_space(method, rig, other_from_space):
     another space and the result is taken back."""
     _, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
     back = np.linalg.inv(other_from_space)
-    there = rig.with_motions(
+    other = rig.with_motions(
         other_from_space @ rig.transforms.astype(np.float64) @ back,
         rest_points=transform(other_from_space, rig.rest_points.astype(np.float64)).astype(np.float32),
         rest_bones=(other_from_space @ rig.rest_bones.astype(np.float64)).astype(np.float32),
     )
-    points = transform(back, there.deform(method).astype(np.float64))
+    points = transform(back, other.deform(method).astype(np.float64))
     return np.linalg.norm(points - rig.deform(method), axis=1)[margins > NO_TIE].max()
 
 
 @every_method
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 def test_turned_axes_change_nothing(method, scaled):
-    turned = random_motion(np.random.default_rng(28), 0.0)
-    assert change_by_space(method, random_rig(29, scaled=scaled), turned) < 4 * TOLERANCE
+    rotated = random_motion(np.random.default_rng(28), 0.0)
+    assert change_by_space(method, random_rig(29, scaled=scaled), rotated) < 4 * TOLERANCE
 
 
 @every_method
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 def test_another_origin_changes_only_qv(method, scaled):
-    change = change_by_space(method, random_rig(30, scaled=scaled), shift([3.0, -2.0, 1.0]))
+    change = change_by_space(method, random_rig(30, scaled=scaled), translation([3.0, -2.0, 1.0]))
     if method == "qv":
         assert change > 0.1
     else:
@@ -371,11 +372,11 @@ def test_bones_from_model_equals_doing_it_by_hand(method):
     rig = random_rig(38, scaled=True)
     bones_from_model = random_motion(np.random.default_rng(39), 2.0) @ np.diag([2.0, 0.5, -1.5, 1.0])
     points = rig.deform(method, bones_from_model=bones_from_model.astype(np.float32))
-    there = rig.with_(
+    other = rig.with_(
         rest_points=transform(bones_from_model, rig.rest_points.astype(np.float64)).astype(np.float32)
     )
-    _, margins = reference.deform(method, *there.mesh, there.transforms, there.rest_bones)
-    expected = transform(np.linalg.inv(bones_from_model), there.deform(method).astype(np.float64))
+    _, margins = reference.deform(method, *other.mesh, other.transforms, other.rest_bones)
+    expected = transform(np.linalg.inv(bones_from_model), other.deform(method).astype(np.float64))
     np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=10 * TOLERANCE)
 
 
@@ -656,8 +657,8 @@ def test_unaligned_input_is_copied(method):
     inverses = np.tile(np.eye(4), (len(rig.transforms), 1, 1))
     points = deformer.deform(unaligned(rig.transforms), rest_inverses=unaligned(inverses))
     np.testing.assert_array_equal(points, rig.deform(method))
-    turned = unaligned(rig.transforms.astype(np.float64))
-    np.testing.assert_array_equal(sinew.affine.to_quat_vec(turned), sinew.affine.to_quat_vec(turned.copy()))
+    rotated = unaligned(rig.transforms.astype(np.float64))
+    np.testing.assert_array_equal(sinew.affine.to_quat_vec(rotated), sinew.affine.to_quat_vec(rotated.copy()))
 
 
 def test_unaligned_out_is_refused():
@@ -736,8 +737,8 @@ def test_set_rest_points_beside_deform_tears_nothing(method):
     threads = [threading.Thread(target=deform) for _ in range(3)]
     for thread in threads:
         thread.start()
-    for turn in range(200):
-        deformer.set_rest_points((new, old)[turn % 2])
+    for call in range(200):
+        deformer.set_rest_points((new, old)[call % 2])
     done.set()
     for thread in threads:
         thread.join()

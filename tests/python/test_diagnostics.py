@@ -79,7 +79,7 @@ def test_planted_faults_are_found_and_nothing_else():
 def pose_check(motions_of_frames, influences):
     check = PoseCheck(influences)
     for frame, motions in enumerate(motions_of_frames, start=1):
-        check.look(rotations_of(np.asarray(motions)[:, :3, :3]), frame)
+        check.add_pose(rotations_of(np.asarray(motions)[:, :3, :3]), frame)
     return {finding.name: finding for finding in check.findings()}
 
 
@@ -119,15 +119,15 @@ def two_bones(weights):
     return Influences(offsets, bones, np.stack([1 - weights, weights], axis=1).ravel())
 
 
-def turned(degrees):
+def rotated(degrees):
     return [np.eye(4), about([1, 2, 3], degrees)]
 
 
 def test_half_turns_are_found_when_they_are_near():
-    # A vertex that hangs on one bone but for a trace does not move far when the trace changes sides.
+    # A vertex with almost all weight on one bone does not move far when the other bone changes hemisphere.
     influences = two_bones([0.5, 0.9, 0.01, 0.3])
     for degrees, near in ((174, False), (176, True), (180, True), (184, True), (186, False)):
-        found = pose_check([turned(degrees)], influences)
+        found = pose_check([rotated(degrees)], influences)
         assert ("near_half_turn" in found) == near, degrees
         if near:
             assert found["near_half_turn"].vertices.tolist() == [0, 1, 3]
@@ -137,21 +137,21 @@ def test_half_turns_are_found_when_they_are_near():
 
 def test_jumps_are_found_between_frames():
     influences = two_bones([0.5, 0.02, 0.4])
-    found = pose_check([turned(d) for d in (0, 90, 150, 210, 250)], influences)
+    found = pose_check([rotated(d) for d in (0, 90, 150, 210, 250)], influences)
     assert set(found) == {"jumps"}
     assert found["jumps"].vertices.tolist() == [0, 2]
     assert found["jumps"].frames == (4,)
-    assert pose_check([turned(d) for d in (0, 60, 120, 170, 120)], influences) == {}
+    assert pose_check([rotated(d) for d in (0, 60, 120, 170, 120)], influences) == {}
 
 
 def test_a_jump_is_one_in_the_deformed_mesh():
-    """Half a degree further at the half turn, and the vertex is on the other side."""
+    """Half a degree beyond 180 degrees, the vertex jumps to the other side of the bone."""
     influences = two_bones([0.5])
     frames = [179.0, 179.6, 180.4, 181.0]
-    found = pose_check([turned(d) for d in frames], influences)["jumps"]
+    found = pose_check([rotated(d) for d in frames], influences)["jumps"]
     points = []
     for degrees in frames:
-        motions = np.array(turned(degrees))
+        motions = np.array(rotated(degrees))
         point, half = np.array([1.0, 0.0, 0.0]), np.array([0.5, 0.5])
         points.append(reference.dq(point, motions, motions[:, :3, :3], half)[0])
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -162,4 +162,4 @@ def test_a_jump_is_one_in_the_deformed_mesh():
 
 def test_vertices_without_influences_are_left_alone():
     influences = Influences(np.zeros(4, np.int32), np.zeros(0, np.int32), np.zeros(0, np.float32))
-    assert pose_check([turned(0), turned(180)], influences) == {}
+    assert pose_check([rotated(0), rotated(180)], influences) == {}

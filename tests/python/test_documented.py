@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every command that the documents name is there and is run by a test, most of them here, as written."""
+"""Every command that the documents name exists and is run by a test, most of them here, as written."""
 
 from __future__ import annotations
 

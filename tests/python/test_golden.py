@@ -32,8 +32,8 @@ def test_reader(path):
 def test_library(path, method, name):
     case, tolerance = read(path)
     sums = np.add.reduceat(np.append(case["weights"], 0.0), case["offsets"][:-1])
-    held = (np.diff(case["offsets"]) > 0) & (sums > 1e-4)
-    weights = case["weights"] * np.repeat(held, np.diff(case["offsets"]))
+    deforms = (np.diff(case["offsets"]) > 0) & (sums > 1e-4)
+    weights = case["weights"] * np.repeat(deforms, np.diff(case["offsets"]))
     deformer = sinew.Deformer(
         case["points"], case["offsets"], case["bones"], weights, method, rest_bones=case["rest"]
     )

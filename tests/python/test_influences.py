@@ -27,9 +27,9 @@ def in_a_loop(groups: GroupWeights, bone_of_group: np.ndarray) -> list[list[tupl
             (int(bone_of_group[group]), weight)
             for group, weight in zip(groups.groups[begin:end], groups.weights[begin:end], strict=True)
         ]
-        held = [(bone, weight) for bone, weight in entries if bone >= 0]
-        deforms = sum(float(weight) for _bone, weight in held) > 1e-4
-        found.append([entry for entry in held if entry[1] > 0] if deforms else [])
+        kept = [(bone, weight) for bone, weight in entries if bone >= 0]
+        deforms = sum(float(weight) for _bone, weight in kept) > 1e-4
+        found.append([entry for entry in kept if entry[1] > 0] if deforms else [])
     return found
 
 

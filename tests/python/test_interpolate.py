@@ -87,7 +87,7 @@ def test_between_agrees_with_the_papers(method, dtype):
         assert result.transforms.dtype == dtype
         assert result.is_defined.all()
         for t, transform in zip(TIMES, result.transforms, strict=True):
-            # Almost half a turn apart, float32 itself is what moves the answer.
+            # Almost 180 degrees apart, the rounding of float32 moves the result.
             far = (
                 ends[0].inv() * ends[1]
             ).rotation.magnitude() > 3.1 or ends.rotation.magnitude().max() > 3.1
@@ -150,7 +150,7 @@ def test_broadcasts_one_against_many(method):
     np.testing.assert_array_equal(blends.transforms[1, 2], blend(table[1], weights[2], method).transforms)
 
 
-# Input that has no one answer: what comes is finite, and says so.
+# Input without a unique result: the result is finite and marked as not defined.
 @ALL
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_not_defined_is_said_and_finite(method, dtype):
@@ -180,12 +180,12 @@ def in_space(method, ends, t, left, right):
     return left.inv().as_matrix() @ matrix(result.transforms, name) @ right.inv().as_matrix()
 
 
-FEWER_THAN_HALF_TURNS = rigid_motions(angle=1.5)
+BELOW_180_DEGREES = rigid_motions(angle=1.5)
 PARTS = st.floats(0.0, 1.0)
 
 
 @pytest.mark.parametrize("method", ["dlb", "sclerp", "dib", "matrix_linear"])
-@given(a=FEWER_THAN_HALF_TURNS, b=FEWER_THAN_HALF_TURNS, left=rigid_motions(), right=rigid_motions(), t=PARTS)
+@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, left=rigid_motions(), right=rigid_motions(), t=PARTS)
 def test_independent_of_coordinates_on_both_sides(method, a, b, left, right, t):
     ends = RigidTransform.concatenate([a, b])
     plain = matrix(between(*layout(ends, LAYOUT_OF[method]), t, method).transforms, LAYOUT_OF[method])
@@ -193,7 +193,7 @@ def test_independent_of_coordinates_on_both_sides(method, a, b, left, right, t):
 
 
 @pytest.mark.parametrize("method", ["qv_nlerp", "qv_slerp", "matrix_polar"])
-@given(a=FEWER_THAN_HALF_TURNS, b=FEWER_THAN_HALF_TURNS, left=rigid_motions(), t=PARTS)
+@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, left=rigid_motions(), t=PARTS)
 def test_independent_of_coordinates_on_the_left(method, a, b, left, t):
     ends = RigidTransform.concatenate([a, b])
     plain = matrix(between(*layout(ends, LAYOUT_OF[method]), t, method).transforms, LAYOUT_OF[method])
@@ -203,15 +203,15 @@ def test_independent_of_coordinates_on_the_left(method, a, b, left, t):
 # Smith 2013, section 3.5.2: the translation of a pair interpolated after a change of the origin differs by
 # (1-t) q1 v q1* + t q2 v q2* - q(t) v q(t)*.
 @pytest.mark.parametrize("method", ["qv_nlerp", "qv_slerp"])
-@given(a=FEWER_THAN_HALF_TURNS, b=FEWER_THAN_HALF_TURNS, right=rigid_motions(), t=PARTS)
+@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, right=rigid_motions(), t=PARTS)
 def test_pairs_depend_on_the_origin_as_the_report_says(method, a, b, right, t):
     ends = RigidTransform.concatenate([a, b])
     plain = matrix(between(*layout(ends, "quat_vec"), t, method).transforms, "quat_vec")
     moved = in_space(method, ends, t, RigidTransform.identity(), right) @ right.as_matrix()
     difference = moved[:3, 3] - (plain @ right.as_matrix())[:3, 3]
     v = right.translation
-    turned = (1 - t) * a.rotation.apply(v) + t * b.rotation.apply(v)
-    close(difference, turned - plain[:3, :3] @ v, 1e-12)
+    rotated = (1 - t) * a.rotation.apply(v) + t * b.rotation.apply(v)
+    close(difference, rotated - plain[:3, :3] @ v, 1e-12)
 
 
 def test_pairs_fail_where_dual_quaternions_hold():

@@ -8,7 +8,7 @@ import trimesh
 from rigs import about, random_motion, transform
 from sinew_addon.core.influences import Influences
 from sinew_addon.core.metrics import METRICS, FrameOfRig, Gauge, Shape, volume
-from sinew_addon.core.surface import Surface, joined, same_places
+from sinew_addon.core.surface import Surface, coincident_vertices, joined
 
 SIDES, RINGS, RADIUS, LENGTH = 24, 81, 0.25, 2.0
 IDENTITY = np.eye(4)
@@ -20,9 +20,9 @@ def surface_of(mesh):
 
 def influences_of(weights):
     """weights [vertices, bones]; zero for none."""
-    held = weights > 0.0
-    offsets = np.concatenate([[0], np.cumsum(held.sum(axis=1))]).astype(np.int32)
-    vertices, bones = np.nonzero(held)
+    weighted = weights > 0.0
+    offsets = np.concatenate([[0], np.cumsum(weighted.sum(axis=1))]).astype(np.int32)
+    vertices, bones = np.nonzero(weighted)
     return Influences(offsets, bones.astype(np.int32), weights[vertices, bones].astype(np.float32))
 
 
@@ -92,7 +92,7 @@ def test_linear_blend_of_a_twist_shrinks_cross_sections(tube, degrees):
     w = tube.second[: SIDES * RINGS]
     shrunk = RADIUS * np.sqrt(1 - 4 * w * (1 - w) * np.sin(np.radians(degrees) / 2) ** 2)
     np.testing.assert_allclose(measured.field("bulge")[: SIDES * RINGS], shrunk - RADIUS, atol=1e-6)
-    # The mean of the squared radius over the length; rings are flat polygons that turn against each other,
+    # The mean of the squared radius over the length; rings are flat polygons that rotate against each other,
     # so the triangles between them lie a little inside.
     expected = 1 - 2 / 3 * np.sin(np.radians(degrees) / 2) ** 2
     assert measured.summary().volume_change == pytest.approx(expected - 1, abs=1e-3)
@@ -102,9 +102,9 @@ def test_dual_quaternions_keep_a_twisted_tube_round(tube):
     measured = tube.measure("dq", about([1, 0, 0], 180))
     assert abs(measured.summary().volume_change) < 0.01
     np.testing.assert_allclose(measured.field("bulge"), 0.0, atol=1e-6)
-    # A blend of no turn and a half turn turns by 2 atan(w / (1 - w)) (Kavan et al. 2008, DLB).
-    turns = 2 * np.arctan2(tube.second, 1 - tube.second)[: SIDES * RINGS].reshape(RINGS, SIDES)[:, 0]
-    step, chords = LENGTH / (RINGS - 1), 2 * RADIUS * np.sin(np.diff(turns) / 2)
+    # A blend of no rotation and one by 180 degrees rotates by 2 atan(w / (1 - w)) (Kavan et al. 2008, DLB).
+    angles = 2 * np.arctan2(tube.second, 1 - tube.second)[: SIDES * RINGS].reshape(RINGS, SIDES)[:, 0]
+    step, chords = LENGTH / (RINGS - 1), 2 * RADIUS * np.sin(np.diff(angles) / 2)
     longest = np.hypot(step, chords.max()) / step
     assert measured.summary().stretch_max == pytest.approx(longest, rel=1e-4)
     assert measured.summary().flipped_faces == 0
@@ -112,15 +112,15 @@ def test_dual_quaternions_keep_a_twisted_tube_round(tube):
 
 @pytest.mark.parametrize("degrees", [60, 120])
 def test_dual_quaternions_bulge_where_a_tube_bends(tube, degrees):
-    """Each vertex turns about the joint: outside the bend it keeps sqrt(x^2 + r^2) from it."""
+    """Each vertex rotates about the joint: outside the bend it keeps sqrt(x^2 + r^2) from it."""
     measured = tube.measure("dq", about([0, 0, 1], -degrees))
     bend, w = np.radians(degrees), tube.second
-    turn = 2 * np.arctan2(w * np.sin(bend / 2), 1 - w + w * np.cos(bend / 2))
-    # In the frame of the bone that holds the vertex, whose joint is at 0 and which lies along -X.
+    rotation = 2 * np.arctan2(w * np.sin(bend / 2), 1 - w + w * np.cos(bend / 2))
+    # In the space of the heaviest bone, whose joint is at 0 and which points along -X.
     x, y, z = tube.rest.T
     second = w > 0.5
-    x, turn = np.where(second, -x, x), np.where(second, bend - turn, turn)
-    along, across = x * np.cos(turn) + y * np.sin(turn), -x * np.sin(turn) + y * np.cos(turn)
+    x, rotation = np.where(second, -x, x), np.where(second, bend - rotation, rotation)
+    along, across = x * np.cos(rotation) + y * np.sin(rotation), -x * np.sin(rotation) + y * np.cos(rotation)
     from_axis = np.hypot(across, z)
     expected = np.where(along > 0.0, np.hypot(from_axis, along), from_axis)
     expected = np.where(along < -LENGTH / 2, np.hypot(from_axis, along + LENGTH / 2), expected)
@@ -202,7 +202,7 @@ def test_seams_are_no_holes():
     triangles = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
     no_edges = np.empty((0, 2), np.int32)
     assert Surface(len(points), triangles, no_edges).caps.count == len(triangles)
-    surface = Surface(len(points), triangles, no_edges, same_places(points))
+    surface = Surface(len(points), triangles, no_edges, coincident_vertices(points))
     assert (surface.caps.count, len(surface.caps.starts)) == (0, 0)
     assert Shape(surface, points).volume == pytest.approx(mesh.volume, rel=1e-9)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 import sinew
 from sinew_addon.core.errors import WrongUse
-from sinew_addon.core.parameters import as_texts, named, parse
+from sinew_addon.core.parameters import as_texts, by_full_name, parse
 
 
 def test_a_stages_name_is_its_first_parameter():
@@ -16,7 +16,7 @@ def test_a_stages_name_is_its_first_parameter():
 
 
 def test_every_parameter_has_a_name_that_parses_back():
-    parameters = named()
+    parameters = by_full_name()
     assert set(parameters) >= {"mix.method", "mix.group"}
     examples = {"method": "dq", "vertex_group": "Arms", "bool": True}
     values = {name: examples.get(each.kind, each.default) for name, each in parameters.items()}

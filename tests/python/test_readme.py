@@ -15,7 +15,7 @@ def test_the_python_program_deforms(capsys):
     names = {}
     exec(program, names)
     points = names["deformer"].deform(names["bones"])
-    # The middle vertex turns by half of the second bone's half turn.
+    # The middle vertex rotates by 90 degrees, half of the second bone's 180.
     np.testing.assert_allclose(points, [[0, 1, 0], [1, 0, 1], [2, -1, 0]], atol=1e-6)
     assert capsys.readouterr().out.startswith("[[")
 

@@ -100,21 +100,21 @@ def brute_force(method, t, point):
     """Figures 3.4 and 3.5 by scipy alone."""
     from scipy.spatial.transform import Rotation, Slerp
 
-    (angle_a, axis_a, shift_a), (angle_b, axis_b, shift_b) = printed.ENDS
-    turns = Rotation.from_rotvec(
+    (angle_a, axis_a, translation_a), (angle_b, axis_b, translation_b) = printed.ENDS
+    rotations = Rotation.from_rotvec(
         [
             np.radians(angle) * np.array(axis) / np.linalg.norm(axis)
             for angle, axis in ((angle_a, axis_a), (angle_b, axis_b))
         ]
     )
-    shift = (1 - t) * np.array(shift_a) + t * np.array(shift_b)
+    translation = (1 - t) * np.array(translation_a) + t * np.array(translation_b)
     if method == "matrix_linear":
-        a, b = turns.as_matrix()
-        return ((1 - t) * a + t * b) @ point + shift
+        a, b = rotations.as_matrix()
+        return ((1 - t) * a + t * b) @ point + translation
     if method == "qv_slerp":
-        return Slerp([0, 1], turns)(t).apply(point) + shift
-    a, b = turns.as_quat()
-    return Rotation.from_quat((1 - t) * a + t * (b if a @ b > 0 else -b)).apply(point) + shift
+        return Slerp([0, 1], rotations)(t).apply(point) + translation
+    a, b = rotations.as_quat()
+    return Rotation.from_quat((1 - t) * a + t * (b if a @ b > 0 else -b)).apply(point) + translation
 
 
 @pytest.mark.parametrize("method", ["matrix_linear", "qv_nlerp", "qv_slerp"])
@@ -140,7 +140,7 @@ def test_figures_3_4_and_3_5_show_what_the_report_says():
         assert len(figure.pictures) == 2
         assert all(fact.agrees for fact in figure.facts)
     shrinking = paths.figure_3_5().facts[0].values
-    # Half way the turn between the two is gone from the matrix but for its axis: by hand, from the sum.
+    # Half way, the mean matrix keeps only the axis of the rotation between the two: by hand, from the sum.
     assert shrinking["matrix_linear"] == pytest.approx(0.1347, abs=1e-4)
 
 

@@ -22,7 +22,8 @@ def close(got, wanted, tolerance=1e-13):
 
 
 def reference(keys, times, at):
-    """Smith 2013, section 2.3.2, with scipy's Hermite spline; the ends' tangents one-sided, held outside."""
+    """Smith 2013, section 2.3.2, with scipy's Hermite spline; the ends' tangents one-sided, constant
+    outside."""
     flat = keys.reshape(len(keys), -1)
     after = np.minimum(np.arange(len(keys)) + 1, len(keys) - 1)
     before = np.maximum(np.arange(len(keys)) - 1, 0)
@@ -32,7 +33,7 @@ def reference(keys, times, at):
 
 
 def on_one_side(keys, size):
-    """Signs that bring each quaternion to the side of the one before."""
+    """Signs that bring each quaternion into the hemisphere of the one before."""
     keys = keys.copy()
     for i in range(1, len(keys)):
         if keys[i, :4] @ keys[i - 1, :4] < 0:
@@ -61,7 +62,7 @@ def test_vector_form_is_the_hermite_spline_of_the_components(name, dtype):
 
 @ALL
 def test_blend_form_is_the_blend_with_the_weights_of_the_spline(method):
-    # Within 57 degrees of one another: all on one side, whichever key is the heaviest.
+    # Within 57 degrees of one another: all in one hemisphere, whichever key is the heaviest.
     name, rng = LAYOUT_OF[method], np.random.default_rng(1)
     twists = np.column_stack([rng.uniform(-0.29, 0.29, (5, 3)), rng.uniform(-2, 2, (5, 3))])
     keys = layout(rigid(rng) * RigidTransform.from_exp_coords(twists), name)
@@ -167,14 +168,14 @@ def test_root_relative_in_every_representation(name, dtype):
     close(matrix(result, name), wanted, 64 * np.finfo(dtype).eps)
 
 
-# Smith 2013, Figure 3.3: an arm of two bones of length 1, both turned by 90 degrees between the keyframes.
+# Smith 2013, Figure 3.3: an arm of two bones of length 1, both rotated by 90 degrees between the keyframes.
 @pytest.mark.parametrize("method", ["matrix_polar", "qv_nlerp", "qv_slerp", "dlb", "sclerp"])
 def test_interpolating_after_combining_tears_the_elbow(method):
     name, arm = LAYOUT_OF[method], sinew.Skeleton(np.int32([-1, 0]))
 
     def pose(degrees):
-        turn = Rotation.from_rotvec([[0, 0, degrees], [0, 0, degrees]], degrees=True)
-        return layout(RigidTransform.from_components([[0, 0, 0], [1, 0, 0]], turn), name)
+        rotation = Rotation.from_rotvec([[0, 0, degrees], [0, 0, degrees]], degrees=True)
+        return layout(RigidTransform.from_components([[0, 0, 0], [1, 0, 0]], rotation), name)
 
     def gap(bones):
         upper, lower = matrix(bones, name)

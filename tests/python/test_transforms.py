@@ -76,9 +76,9 @@ def test_from_axis_angle_translation_and_rotation_matrix(name, dtype):
     close(result[:, :3, 3], 0.0)
     matrices = rotation.as_matrix().astype(dtype)
     close(matrix(module.from_rotation_matrix(matrices), name)[:, :3, :3], matrices, dtype)
-    shifted = matrix(module.from_translation(axes), name)
-    np.testing.assert_array_equal(shifted[:, :3, :3], np.tile(np.eye(3), (len(axes), 1, 1)))
-    close(shifted[:, :3, 3], axes, dtype)
+    translated = matrix(module.from_translation(axes), name)
+    np.testing.assert_array_equal(translated[:, :3, :3], np.tile(np.eye(3), (len(axes), 1, 1)))
+    close(translated[:, :3, 3], axes, dtype)
 
 
 @ALL
@@ -94,7 +94,7 @@ def test_identity(name):
 def test_twists_agree_with_scipy(name, dtype):
     module, motions = LAYOUTS[name], samples()
     twists = module.to_twist(layout(motions, name, dtype))
-    # At half a turn either direction is right: what the logarithm gives must lead back.
+    # At 180 degrees either direction is right: the exponential must invert the logarithm.
     back = np.array([expm(hat(twist)) for twist in twists.astype(np.float64)])
     close(back, motions.as_matrix(), dtype, 2)
     close(matrix(module.from_twist(twists), name), motions.as_matrix(), dtype, 2)
@@ -127,10 +127,10 @@ def test_screw_about_a_point_keeps_its_line():
     unit = axis / np.linalg.norm(axis)
     motion = sinew.dual_quat.from_screw_about(axis, point, np.array(ANGLES), 0.7)
     close(sinew.dual_quat.transform_point(motion, point), np.tile(point + 0.7 * unit, (len(ANGLES), 1)))
-    turned = sinew.dual_quat.to_screw(motion[-4])
-    close(turned.axis, unit)
-    close(turned.moment, np.cross(point, unit))
-    close([turned.angle, turned.translation, turned.pitch], [1.0, 0.7, 0.7])
+    rotated = sinew.dual_quat.to_screw(motion[-4])
+    close(rotated.axis, unit)
+    close(rotated.moment, np.cross(point, unit))
+    close([rotated.angle, rotated.translation, rotated.pitch], [1.0, 0.7, 0.7])
 
 
 @ALL
@@ -201,9 +201,9 @@ def test_log_exp_and_power_of_dual_quaternions():
 def test_products_are_associative_in_every_layout(a, b, c):
     for name, module in LAYOUTS.items():
         x, y, z = (layout(motion, name) for motion in (a, b, c))
-        left = module.compose(module.compose(x, y), z)
-        close(left, module.compose(x, module.compose(y, z)))
-        close(matrix(left, name), (a * b * c).as_matrix())
+        grouped = module.compose(module.compose(x, y), z)
+        close(grouped, module.compose(x, module.compose(y, z)))
+        close(matrix(grouped, name), (a * b * c).as_matrix())
 
 
 @given(rigid_motions())

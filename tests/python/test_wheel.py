@@ -12,7 +12,7 @@ ADDON = Path(__file__).resolve().parents[2] / "addon"
 
 
 def test_the_wheel_has_every_module(tmp_path):
-    # A copy: setuptools leaves its work beside the sources, and takes what lies there into the next wheel.
+    # A copy: setuptools builds within the sources, and includes leftovers in the next wheel.
     sources = shutil.copytree(
         ADDON, tmp_path / "addon", ignore=shutil.ignore_patterns("__pycache__", "build", "*.egg-info")
     )

@@ -3,20 +3,16 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 import numpy as np
 import sinew
 
 from ..errors import SinewError
+from ..plots import new_figure, to_svg
 from . import printed
 from .model import Fact, Figure, Picture
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Canvas
 
 # The report's three first.
 METHODS: tuple[sinew.interpolate.Method, ...] = (
@@ -31,7 +27,6 @@ METHODS: tuple[sinew.interpolate.Method, ...] = (
 )
 ORIGIN, CORNER = np.zeros(3), np.ones(3)
 STEPS = 400
-NO_PLOTS = "Not drawn in this installation: plots need matplotlib; pip install matplotlib and try again."
 
 
 @dataclass(frozen=True)
@@ -103,7 +98,7 @@ def figure_3_4() -> Figure:
             ),
         )
     except SinewError as error:
-        return Figure("3.4", title, (), facts, notes, str(error))
+        return Figure("3.4", title, (), facts, notes, f"Not drawn in this installation: {error}.")
     return Figure("3.4", title, pictures, facts, notes)
 
 
@@ -120,7 +115,7 @@ def figure_3_5() -> Figure:
             ),
         )
     except SinewError as error:
-        return Figure("3.5", title, (), facts, (), str(error))
+        return Figure("3.5", title, (), facts, (), f"Not drawn in this installation: {error}.")
     return Figure("3.5", title, pictures, facts)
 
 
@@ -226,20 +221,8 @@ _STYLES = {
 }
 
 
-def _pyplot() -> tuple[ModuleType, type[Canvas]]:
-    """matplotlib without a screen. Raises SinewError where it is not installed."""
-    try:
-        import matplotlib
-        from matplotlib.figure import Figure as Canvas
-    except ImportError:
-        raise SinewError(NO_PLOTS) from None
-    return matplotlib, Canvas
-
-
 def _plot_paths(all_paths: dict[str, Path], name: str) -> str:
-    matplotlib, new_figure = _pyplot()
-    with matplotlib.rc_context(_settings(name + " path")):
-        figure = new_figure(figsize=(6.4, 4.4), layout="constrained")
+    with new_figure(f"{name} path", (6.4, 4.4)) as figure:
         axes = figure.add_subplot()
         for order, (method, (colour, width, dash)) in enumerate(_STYLES.items()):
             x, y = all_paths[method].moved[:, 0], all_paths[method].moved[:, 1]
@@ -253,14 +236,12 @@ def _plot_paths(all_paths: dict[str, Path], name: str) -> str:
         axes.set(xlabel="x", ylabel="y", aspect="equal", adjustable="datalim")
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5))
-        return _svg(figure)
+        return to_svg(figure)
 
 
 def _plot_over_t(values: dict[str, np.ndarray], label: str, name: str) -> str:
     """values  [steps + 1] by method; a method of NaN is left out"""
-    matplotlib, new_figure = _pyplot()
-    with matplotlib.rc_context(_settings(name + " t")):
-        figure = new_figure(figsize=(6.4, 4.4), layout="constrained")
+    with new_figure(f"{name} t", (6.4, 4.4)) as figure:
         axes = figure.add_subplot()
         for order, (method, (colour, width, dash)) in enumerate(_STYLES.items()):
             if np.isnan(values[method]).any():
@@ -270,17 +251,4 @@ def _plot_over_t(values: dict[str, np.ndarray], label: str, name: str) -> str:
         axes.set(xlabel="t", ylabel=label, xlim=(0, 1))
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5))
-        return _svg(figure)
-
-
-def _settings(salt: str) -> dict[str, object]:
-    # Text stays text, in the page's own font; ids differ from picture to picture and not from run to run.
-    return {"svg.fonttype": "none", "svg.hashsalt": salt, "font.family": "sans-serif", "font.size": 10}
-
-
-def _svg(figure: Canvas) -> str:
-    """The <svg> element alone, with nothing that points outside the page."""
-    file = io.StringIO()
-    figure.savefig(file, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    text = file.getvalue()
-    return text[text.index("<svg") :]
+        return to_svg(figure)

@@ -64,7 +64,7 @@ class _Reading:
         pose = armature_io.read_pose(armature, bones).astype(np.float64)
         # A bone of no size turns nothing.
         motions = pose[:, :3, :3] @ np.linalg.pinv(bones.rest[:, :3, :3].astype(np.float64))
-        self.poses.look(rotations_of(motions), frame)
+        self.poses.add_pose(rotations_of(motions), frame)
 
 
 def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int) -> None:
@@ -167,7 +167,7 @@ def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:
 def _keep(reading: _Reading, most_influences: int, frames: str) -> None:
     obj = reading.obj
     groups = tuple(group.name for group in obj.vertex_groups)
-    masks = group_uses.used(obj, reading.weighting.bones.without_one(groups))
+    masks = group_uses.used(obj, reading.weighting.bones.groups_without_bone(groups))
     found = check_weights(reading.weighting, reading.points, reading.weights, groups, most_influences, masks)
     _checks[obj.session_uid] = Check(
         [*found, *reading.poses.findings()],

@@ -52,7 +52,7 @@ class Part:
 
     def check_weights(self, most_influences: int) -> list[Finding]:
         names = [group.name for group in self.obj.vertex_groups]
-        masks = group_uses.used(self.obj, self.weighting.bones.without_one(names))
+        masks = group_uses.used(self.obj, self.weighting.bones.groups_without_bone(names))
         return check_weights(self.weighting, self.rest_points, self.weights, names, most_influences, masks)
 
 
@@ -263,7 +263,7 @@ def _look_at_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
     first = 0
     for part in subject.parts:
         count = len(part.weighting.bones.rest)
-        part.pose_check.look(rig.rotations[:, first : first + count], frame)
+        part.pose_check.add_pose(rig.rotations[:, first : first + count], frame)
         first += count
 
 

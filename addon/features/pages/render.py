@@ -18,7 +18,7 @@ from mathutils import Matrix
 
 from ...core.errors import SinewError, WrongUse
 from ...core.heat import linear
-from ...core.opengl import usual_engine
+from ...core.opengl import default_engine
 from ...core.output import write_whole
 from ...core.scratch import scratch_folder
 from ...core.views import View, camera_axes
@@ -41,7 +41,7 @@ def chosen_engine(wanted: str) -> str:
     """
     if wanted == "cycles":
         return wanted
-    engine = usual_engine(bpy.app.binary_path)
+    engine = default_engine(bpy.app.binary_path)
     if wanted not in ("auto", engine):
         raise SinewError("there is no OpenGL here, which Workbench needs; use --engine cycles")
     return engine

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Calls all that the installed library exports, and looks at what comes.
+// Calls all that the installed library exports, and checks the results.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -14,8 +14,8 @@
 
 namespace {
 
-void expect(bool holds, const char* what) {
-    if (holds) return;
+void expect(bool is_true, const char* what) {
+    if (is_true) return;
     std::fprintf(stderr, "not so: %s\n", what);
     std::exit(1);
 }
@@ -68,7 +68,7 @@ int main() {
     expect(sinew::simd_target() == sinew::simd_targets().front(), "the fastest kernels are in use");
     sinew::use_simd_target(sinew::simd_targets().back());
     deform();
-    expect(sinew::hardware_threads() >= 1, "there is a thread");
+    expect(sinew::hardware_threads() >= 1, "at least one thread");
     sinew::parallel_for(
         10, 2, [](std::size_t, std::size_t) {}, 1);
     sinew::end_threads();

@@ -35,7 +35,7 @@ file(GLOB_RECURSE libraries "${folder}/installed/libsinew.*")
 if(UNIX AND NOT APPLE AND NOT libraries MATCHES "libsinew\\.so\\.0\\.1;")
   message(FATAL_ERROR "no libsinew.so.0.1 among ${libraries}")
 endif()
-# What it does not export can not be called, and is not there.
+# Symbols that it does not export must be absent.
 file(GLOB of_deform RELATIVE "${folder}/installed/include/sinew/deform" "${folder}/installed/include/sinew/deform/*")
 if(NOT of_deform STREQUAL "deformer.h;simd.h;thread_pool.h")
   message(FATAL_ERROR "headers of sinew/deform: ${of_deform}")
