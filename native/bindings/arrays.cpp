@@ -2,6 +2,9 @@
 #include "arrays.h"
 
 #include <cmath>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
 
 #include "sinew/deform/deformer.h"
 
@@ -24,18 +27,97 @@ bool is_finite(const float* values, py::ssize_t count) {
     return true;
 }
 
+/// str(value), whatever is in it.
+std::string text_of(const py::handle& value) {
+    const py::str text(value);
+    return py::reinterpret_steal<py::bytes>(
+        PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"));
+}
+
+/// `wide` as T, whose name is `type`. ValueError for a finite number that T can not hold.
+template <class T, class Wide>
+py::array_t<T> narrowed(const py::array_t<Wide>& wide, const char* argument, const char* type) {
+    py::array_t<T> narrow(std::vector<py::ssize_t>(wide.shape(), wide.shape() + wide.ndim()));
+    const Wide* const from = wide.data();
+    T* const to = narrow.mutable_data();
+    for (py::ssize_t i = 0; i < wide.size(); ++i) {
+        bool fits = true;
+        if constexpr (std::is_floating_point_v<Wide>) {
+            to[i] = static_cast<T>(from[i]);
+            fits = std::isfinite(to[i]) || !std::isfinite(from[i]);
+        } else {
+            fits = std::in_range<T>(from[i]);
+            to[i] = static_cast<T>(from[i]);
+        }
+        if (!fits) {
+            fail(argument, std::string("numbers that ") + type + " holds", text_of(py::cast(from[i])));
+        }
+    }
+    return narrow;
+}
+
 }  // namespace
 
 void fail(const char* argument, const std::string& wanted, const std::string& got) {
     throw py::value_error(std::string(argument) + ": expected " + wanted + ", got " + got);
 }
 
-std::string describe(const py::handle& value) {
-    if (!py::isinstance<py::array>(value)) {
-        return py::str(py::type::of(value).attr("__name__")).cast<std::string>();
+py::array as_array(const py::handle& value, const char* argument) {
+    if (py::isinstance<py::array>(value)) {
+        if (Py_TYPE(value.ptr()) != py::detail::npy_api::get().PyArray_Type_ && py::hasattr(value, "mask") &&
+            value.attr("mask").attr("any")().cast<bool>()) {
+            fail(argument, "an array without masked values", "one with them");
+        }
+        return py::reinterpret_borrow<py::array>(value);
     }
-    const auto array = py::reinterpret_borrow<py::array>(value);
-    std::string text = py::str(array.dtype()).cast<std::string>() + " [";
+    try {
+        return py::array(py::module_::import("numpy").attr("asarray")(value));
+    } catch (py::error_already_set& error) {
+        // Whatever numpy or the value says, it is no array; but not what ends a program.
+        if (error.matches(PyExc_MemoryError) || !error.matches(PyExc_Exception)) throw;
+        return py::reinterpret_steal<py::array>(py::handle());
+    }
+}
+
+bool is_numeric(const py::array& array) {
+    const char kind = array.dtype().kind();
+    return kind == 'b' || kind == 'i' || kind == 'u' || (kind == 'f' && array.itemsize() <= 8);
+}
+
+template <>
+py::array_t<double> as_type(const py::array& array, const char* argument, const std::string& wanted) {
+    if (!is_numeric(array)) fail(argument, wanted, describe(array));
+    return in_order<double>(array);
+}
+
+template <>
+py::array_t<float> as_type(const py::array& array, const char* argument, const std::string& wanted) {
+    if (!is_numeric(array)) fail(argument, wanted, describe(array));
+    if (array.dtype().kind() != 'f' || array.itemsize() < 8) return in_order<float>(array);
+    return narrowed<float>(in_order<double>(array), argument, "float32");
+}
+
+template <>
+py::array_t<std::int32_t> as_type(const py::array& array, const char* argument, const std::string& wanted) {
+    const char kind = array.dtype().kind();
+    // What numpy makes of an empty list has fractions by name alone.
+    const bool is_empty = array.size() == 0 && is_numeric(array);
+    if (kind != 'b' && kind != 'i' && kind != 'u' && !is_empty) fail(argument, wanted, describe(array));
+    if (kind == 'u') return narrowed<std::int32_t>(in_order<std::uint64_t>(array), argument, "int32");
+    return narrowed<std::int32_t>(in_order<std::int64_t>(array), argument, "int32");
+}
+
+std::string describe(const py::handle& value) {
+    const auto name_of_type = [&] { return text_of(py::type::of(value).attr("__name__")); };
+    py::array array;
+    if (py::isinstance<py::array>(value)) {
+        array = py::reinterpret_borrow<py::array>(value);
+    } else {
+        array = as_array(value, "");
+        if (!array || array.ndim() == 0 || !is_numeric(array)) return name_of_type();
+    }
+    std::string text = py::isinstance<py::array>(value) ? "" : name_of_type() + " of ";
+    text += text_of(array.dtype()) + " [";
     for (py::ssize_t axis = 0; axis < array.ndim(); ++axis) {
         if (axis > 0) text += ", ";
         text += std::to_string(array.shape(axis));

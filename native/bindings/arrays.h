@@ -20,8 +20,13 @@ inline constexpr std::size_t kAnyLength = std::numeric_limits<std::size_t>::max(
 /// Raises ValueError "`argument`: expected `wanted`, got `got`".
 [[noreturn]] void fail(const char* argument, const std::string& wanted, const std::string& got);
 
-/// "float64 [120, 4]" for an array, the type's name for anything else.
+/// "float64 [120, 4]" for an array, "list of float64 [120, 4]" for what numpy makes an array of numbers of, the type's
+/// name for anything else.
 std::string describe(const py::handle& value);
+
+/// `value` itself where it is an array, else what numpy makes of it; null where it makes nothing of it. ValueError for
+/// a masked array with masked values: these would be taken for numbers.
+py::array as_array(const py::handle& value, const char* argument);
 
 /// The text of a `str`. TypeError for anything else, naming `wanted`.
 std::string checked_name(const py::handle& value, const char* argument, const std::string& wanted);
@@ -37,32 +42,42 @@ py::array_t<T> in_order(const py::handle& value) {
     return py::reinterpret_steal<py::array_t<T>>(array.release());
 }
 
-/// `value` as a C-contiguous array of T with `dimensions` dimensions; copied only where its layout is
-/// another. ValueError where it is no array of exactly that element type, naming `wanted`, or has more than
-/// `most` of its first dimension.
+template <class T>
+bool has_type(const py::array& array) {
+    return array.dtype().is(py::dtype::of<T>()) || array.dtype().equal(py::dtype::of<T>());
+}
+
+/// Whether the elements are real numbers of at most 64 bits.
+bool is_numeric(const py::array& array);
+
+/// The numbers of `array` as T (float, double or std::int32_t), C-contiguous and aligned: the array itself where it is
+/// so already. Fractions are rounded to T. ValueError for what T can not hold: fractions as integers, numbers beyond
+/// its range.
+template <class T>
+py::array_t<T> as_type(const py::array& array, const char* argument, const std::string& wanted);
+
+/// `value` as a C-contiguous array of T with `dimensions` dimensions: an array or anything that numpy makes one of,
+/// copied only where its layout or its element type is another. ValueError, naming `wanted`, for what is no array of
+/// numbers that T holds, or has more than `most` of its first dimension.
 template <class T>
 py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_t dimensions,
                        const std::string& wanted, std::size_t most = kAnyLength) {
-    if (!py::isinstance<py::array>(value)) fail(argument, wanted, describe(value));
-    const auto array = py::reinterpret_borrow<py::array>(value);
-    if (!array.dtype().is(py::dtype::of<T>()) && !array.dtype().equal(py::dtype::of<T>())) {
-        fail(argument, wanted, describe(value));
-    }
-    if (array.ndim() != dimensions) fail(argument, wanted, describe(value));
+    const py::array array = as_array(value, argument);
+    if (!array || !is_numeric(array) || array.ndim() != dimensions) fail(argument, wanted, describe(value));
     // Before a copy is made.
     if (static_cast<std::size_t>(array.shape(0)) > most) {
         fail(argument, wanted + ", at most " + std::to_string(most), describe(value));
     }
-    return in_order<T>(array);
+    return has_type<T>(array) ? in_order<T>(array) : as_type<T>(array, argument, wanted);
 }
 
-/// float32 [n, 3], n at most kMaxVertices.
+/// [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 
-/// float32 [n, 4, 4] or [n, 3, 4], row-major, finite; a fourth row is not read.
+/// [n, 4, 4] or [n, 3, 4], row-major, finite; a fourth row is not read.
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument);
 
-/// float32 [4, 4] or [3, 4].
+/// [4, 4] or [3, 4].
 Affine<float> checked_affine(const py::handle& value, const char* argument);
 
 }  // namespace sinew::bindings

@@ -6,9 +6,11 @@
 #include <optional>
 
 #include "arrays.h"
+#include "broadcast.h"
 #include "gil.h"
 #include "module.h"
 #include "sinew/deform/deformer.h"
+#include "sinew/deform/thread_pool.h"
 #include "sinew/skinning/methods.h"
 
 namespace sinew::bindings {
@@ -87,16 +89,105 @@ Deformer make_deformer(const py::object& rest_points, const py::object& influenc
         row);
 }
 
+/// The argument `mix`, and the array that MixData points at.
+struct MixArguments {
+    std::optional<MethodInfo> method;
+    py::array_t<float> weights;
+
+    [[nodiscard]] std::optional<MixData> data() const {
+        if (!method) return std::nullopt;
+        return MixData{*method, as_span(weights)};
+    }
+};
+
+MixArguments checked_mix(const py::object& mix) {
+    if (mix.is_none()) return {};
+    const char* const wanted = "None or (method, weights)";
+    if (!py::isinstance<py::tuple>(mix) && !py::isinstance<py::list>(mix)) fail("mix", wanted, describe(mix));
+    const py::tuple pair(mix);
+    if (pair.size() != 2) fail("mix", wanted, std::string(py::isinstance<py::tuple>(mix) ? "a tuple of " : "a list of ") + std::to_string(pair.size()));
+    const MethodInfo second = checked_method(pair[0], "mix");
+    return {second, checked<float>(pair[1], "mix", 1, "weights float32 [vertices]", kMaxVertices)};
+}
+
 Deformer make_deformer_of(const Binding& binding, const py::object& method, const py::object& mix) {
     const MethodInfo first = checked_method(method, "method");
-    if (mix.is_none()) return Deformer(binding, first);
-    const char* const wanted = "None or (method, weights)";
-    if (!py::isinstance<py::tuple>(mix)) fail("mix", wanted, describe(mix));
-    const auto pair = py::reinterpret_borrow<py::tuple>(mix);
-    if (pair.size() != 2) fail("mix", wanted, "a tuple of " + std::to_string(pair.size()));
-    const MethodInfo second = checked_method(pair[0], "mix");
-    const auto weights = checked<float>(pair[1], "mix", 1, "weights float32 [vertices]", kMaxVertices);
-    return Deformer(binding, first, MixData{second, as_span(weights)});
+    const MixArguments second = checked_mix(mix);
+    return Deformer(binding, first, second.data());
+}
+
+// --- Pickles: what a Binding keeps, as arrays; of a Deformer, then its method and mix.
+
+template <class T>
+py::array_t<T> array_of(const std::vector<T>& values) {
+    return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+py::tuple state_of(const BoundMesh& mesh) {
+    py::array_t<float> points({static_cast<py::ssize_t>(mesh.rest_points.size()), py::ssize_t{3}});
+    const auto* const first = reinterpret_cast<const float*>(mesh.rest_points.data());
+    std::copy(first, first + points.size(), points.mutable_data());
+    py::object rest_bones = py::none();
+    if (!mesh.rest_bones.empty()) {
+        Output<Affine<float>> output({static_cast<py::ssize_t>(mesh.rest_bones.size())});
+        for (std::size_t i = 0; i < mesh.rest_bones.size(); ++i) {
+            output.write(static_cast<py::ssize_t>(i), mesh.rest_bones[i]);
+        }
+        rest_bones = output.take();
+    }
+    return py::make_tuple(points, array_of(mesh.influence_offsets), array_of(mesh.influence_bones),
+                          array_of(mesh.influence_weights), rest_bones);
+}
+
+py::tuple state_of(const Deformer& deformer) {
+    py::object mix = py::none();
+    if (const MethodInfo* const mixed = deformer.mixed_method(); mixed != nullptr) {
+        mix = py::make_tuple(std::string(mixed->name), array_of(deformer.mix_weights()));
+    }
+    return py::make_tuple(state_of(deformer.unpack()), std::string(deformer.method().name), mix);
+}
+
+/// The item `index` of a state of `size` items.
+py::object part_of(const py::object& state, std::size_t size, std::size_t index) {
+    const std::string wanted = "a tuple of " + std::to_string(size) + ", as pickling makes it";
+    if (!py::isinstance<py::tuple>(state)) fail("state", wanted, describe(state));
+    const auto parts = py::reinterpret_borrow<py::tuple>(state);
+    if (parts.size() != size) fail("state", wanted, "a tuple of " + std::to_string(parts.size()));
+    return parts[index];
+}
+
+BindArrays arrays_of_state(const py::object& state) {
+    return checked_arrays(part_of(state, 5, 0), part_of(state, 5, 1), part_of(state, 5, 2), part_of(state, 5, 3),
+                          part_of(state, 5, 4));
+}
+
+Binding binding_of_state(const py::object& state) {
+    const BindArrays arrays = arrays_of_state(state);
+    BindData data = arrays.data();
+    data.is_normalised = true;
+    return Binding(data);
+}
+
+Deformer deformer_of_state(const py::object& state) {
+    const BindArrays arrays = arrays_of_state(part_of(state, 3, 0));
+    BindData data = arrays.data();
+    data.is_normalised = true;
+    const MethodInfo method = checked_method(part_of(state, 3, 1), "method");
+    const MixArguments mix = checked_mix(part_of(state, 3, 2));
+    return Deformer(data, method, mix.data());
+}
+
+std::string counts_of(const auto& bound) {
+    return std::to_string(bound.vertex_count()) + " vertices, " + std::to_string(bound.influence_count()) +
+           " influences, " + std::to_string(bound.bone_count()) + " bones>";
+}
+
+std::string text_of_deformer(const Deformer& deformer) {
+    std::string text = "<sinew.Deformer " + std::string(deformer.method().name);
+    if (const MethodInfo* const mixed = deformer.mixed_method(); mixed != nullptr) {
+        text += " mixed with " + std::string(mixed->name);
+    }
+    return text + ": " + counts_of(deformer);
 }
 
 // An array to write into: never a silent copy, or the caller's array would keep its old points.
@@ -118,12 +209,19 @@ py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) 
 
 std::size_t checked_threads(const py::object& threads) {
     if (threads.is_none()) return 0;
-    if (!py::isinstance<py::int_>(threads)) fail("threads", "None or 1 or more", describe(threads));
-    int overflow = 0;
-    const long long count = PyLong_AsLongLongAndOverflow(threads.ptr(), &overflow);
-    if (overflow < 0 || (overflow == 0 && count < 1)) {
-        fail("threads", "None or 1 or more", py::str(threads).cast<std::string>());
+    const char* const wanted = "None or an integer, 0 or more";
+    // Those of numpy, too.
+    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(threads.ptr()));
+    if (!number) {
+        PyErr_Clear();
+        fail("threads", wanted, describe(threads));
     }
+    int overflow = 0;
+    const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
+    // As text the longest are refused by Python.
+    if (overflow < 0) fail("threads", wanted, "a negative one");
+    if (overflow == 0 && count < 0) fail("threads", wanted, std::to_string(count));
+    if (overflow == 0 && count == 0) return hardware_threads();
     return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
@@ -135,10 +233,9 @@ std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
     const auto are_affines = [](const py::array& a) {
         return a.ndim() == 3 && a.shape(2) == 4 && (a.shape(1) == 4 || a.shape(1) == 3);
     };
-    if (!py::isinstance<py::array_t<float>>(bone_transforms)) {
-        fail("bone_transforms", wanted, describe(bone_transforms));
-    }
-    auto posed = py::reinterpret_borrow<py::array_t<float>>(bone_transforms);
+    const bool in_place = py::isinstance<py::array_t<float>>(bone_transforms);
+    auto posed = in_place ? py::reinterpret_borrow<py::array_t<float>>(bone_transforms)
+                          : checked<float>(bone_transforms, "bone_transforms", 3, wanted);
     if (!are_affines(posed)) fail("bone_transforms", wanted, describe(bone_transforms));
     if ((posed.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0) posed = in_order<float>(posed);
     const std::string as_many =
@@ -219,13 +316,19 @@ void bind_deformer(py::module_& m) {
              "space\n"
              "    of the bone transforms; read where a bone is scaled and the method is rigid. None: "
              "identity.\n\n"
-             "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
-        .def_property_readonly("vertex_count", &Binding::vertex_count)
+             "Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is lost: "
+             "lists, float64,\nint64 whose numbers fit. All input is copied. Raises ValueError that names the "
+             "argument, what was wanted and\nwhat came. Can be pickled: what was bound, with weights "
+             "normalised.")
+        .def_property_readonly("vertex_count", &Binding::vertex_count, "Vertices of the mesh.")
         .def_property_readonly("influence_count", &Binding::influence_count, "Influences of positive weight.")
         .def_property_readonly("bone_count", &Binding::bone_count,
-                               "One more than the highest bone that an influence names.");
+                               "One more than the highest bone that an influence names.")
+        .def("__repr__", [](const Binding& binding) { return "<sinew.Binding: " + counts_of(binding); })
+        .def(py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
 
-    py::class_<Deformer>(m, "Deformer", "A binding and a method, ready to deform at any pose.")
+    py::class_<Deformer>(m, "Deformer", "A binding and a method, ready to deform at any pose.\n\n"
+                         "Can be pickled, with the rest points that it has then and a binding of its own.")
         .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
              py::arg("mix") = py::none(),
              "binding: a Binding; not copied.\n"
@@ -249,11 +352,13 @@ void bind_deformer(py::module_& m) {
                 return std::string(method->name);
             },
             "The name of the method that `mix` adds, or None.")
-        .def_property_readonly("vertex_count", &Deformer::vertex_count)
+        .def_property_readonly("vertex_count", &Deformer::vertex_count, "Vertices of the mesh.")
         .def_property_readonly("influence_count", &Deformer::influence_count,
                                "Influences of positive weight.")
         .def_property_readonly("bone_count", &Deformer::bone_count,
                                "One more than the highest bone that an influence names.")
+        .def("__repr__", &text_of_deformer)
+        .def(py::pickle([](const Deformer& deformer) { return state_of(deformer); }, &deformer_of_state))
         .def("set_rest_points", &set_rest_points, py::arg("rest_points"),
              "New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. "
              "Other\n"
@@ -264,8 +369,10 @@ void bind_deformer(py::module_& m) {
              "The deformed points, float32 [vertices, 3], model space.\n\n"
              "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
              "read.\n"
-             "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned.\n"
-             "threads: how many at most; None: as many as help. The result is the same bit for bit.\n"
+             "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never "
+             "converted.\n"
+             "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help.\n"
+             "    The result is the same bit for bit.\n"
              "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
              "    transforms, where the blending happens; the result is taken back. None: the same space.\n"
              "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the "

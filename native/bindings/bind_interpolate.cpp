@@ -56,7 +56,8 @@ py::object blend_items(const py::object& transforms, const py::object& weights) 
     return output.take();
 }
 
-py::object blend(const py::object& transforms, const py::object& weights, const py::object& method) {
+py::object blend(const py::object& any_transforms, const py::object& any_weights, const py::object& method) {
+    const auto [transforms, weights] = promoted<2>({"transforms", "weights"}, {any_transforms, any_weights});
     return with_method(method, [&]<class Method>(Method) {
         return with_element(transforms, "transforms",
                             Item<typename Method::template Transform<double>>::kShape,
@@ -87,8 +88,9 @@ py::object spline_items(const py::object& keys, const py::object& times, const p
     return output.take();
 }
 
-py::object spline(const py::object& keys, const py::object& times, const py::object& at,
+py::object spline(const py::object& any_keys, const py::object& any_times, const py::object& any_at,
                   const py::object& method) {
+    const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
     return with_method(method, [&]<class Method>(Method) {
         return with_element(
             keys, "keys", Item<typename Method::template Transform<double>>::kShape, [&]<class T>(T) {
@@ -99,7 +101,8 @@ py::object spline(const py::object& keys, const py::object& times, const py::obj
     });
 }
 
-py::object spline_of_vectors(const py::object& keys, const py::object& times, const py::object& at) {
+py::object spline_of_vectors(const py::object& any_keys, const py::object& any_times, const py::object& any_at) {
+    const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
     return with_representation(keys, "keys", "keys", [&]<class Row>(Row) {
         return with_element(keys, "keys", "", [&]<class T>(T) {
             return spline_items<T, typename Row::template Transform<T>>(

@@ -7,6 +7,11 @@
 namespace sinew::bindings {
 namespace {
 
+Skeleton make_skeleton(const py::object& parents) {
+    const auto array = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
+    return Skeleton({array.data(), static_cast<std::size_t>(array.size())});
+}
+
 // [bones, ..] of one representation, one for each bone.
 template <class Transform, class T>
 std::vector<Transform> checked_bones(const Skeleton& skeleton, const py::object& value,
@@ -35,7 +40,8 @@ T checked_scalar(const py::object& value, const char* argument) {
     return *input.data;
 }
 
-py::object relative_to_root(const Skeleton& skeleton, const py::object& transforms) {
+py::object relative_to_root(const Skeleton& skeleton, const py::object& any_transforms) {
+    const auto [transforms] = promoted<1>({"transforms"}, {any_transforms});
     return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
         return with_element(transforms, "transforms", "", [&]<class T>(T) {
             using Transform = typename Row::template Transform<T>;
@@ -46,8 +52,9 @@ py::object relative_to_root(const Skeleton& skeleton, const py::object& transfor
     });
 }
 
-py::object interpolate(const Skeleton& skeleton, const py::object& a, const py::object& b,
-                       const py::object& t, const py::object& method) {
+py::object interpolate(const Skeleton& skeleton, const py::object& any_a, const py::object& any_b,
+                       const py::object& any_t, const py::object& method) {
+    const auto [a, b, t] = promoted<3>({"a", "b", "t"}, {any_a, any_b, any_t});
     return with_method(method, [&]<class Method>(Method) {
         const char* shape = Item<typename Method::template Transform<double>>::kShape;
         return with_element(a, "a", shape, [&]<class T>(T) -> py::object {
@@ -79,8 +86,10 @@ py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, c
     return py::make_tuple(as_array(bones), are_defined);
 }
 
-py::object spline(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
-                  const py::object& time, const py::object& method) {
+py::object spline(const Skeleton& skeleton, const py::object& any_keyframes, const py::object& any_times,
+                  const py::object& any_time, const py::object& method) {
+    const auto [keyframes, times, time] =
+        promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
     return with_method(method, [&]<class Method>(Method) {
         const char* shape = Item<typename Method::template Transform<double>>::kShape;
         return with_element(keyframes, "keyframes", shape, [&]<class T>(T) {
@@ -92,8 +101,10 @@ py::object spline(const Skeleton& skeleton, const py::object& keyframes, const p
     });
 }
 
-py::object spline_vector_form(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
-                              const py::object& time) {
+py::object spline_vector_form(const Skeleton& skeleton, const py::object& any_keyframes,
+                              const py::object& any_times, const py::object& any_time) {
+    const auto [keyframes, times, time] =
+        promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
     return with_representation(keyframes, "keyframes", "keys, bones", [&]<class Row>(Row) {
         return with_element(keyframes, "keyframes", "", [&]<class T>(T) {
             using Transform = typename Row::template Transform<T>;
@@ -110,19 +121,26 @@ py::object spline_vector_form(const Skeleton& skeleton, const py::object& keyfra
 void bind_skeleton(py::module_& m) {
     py::class_<Skeleton>(m, "Skeleton",
                          "A hierarchy of bones; parents come before their children.\n\n"
-                         "Its methods take each bone relative to its parent, float32 or float64 (the result "
-                         "has the same), in\n"
-                         "any representation, layouts as in sinew.affine, sinew.quat_vec and "
-                         "sinew.dual_quat. They raise\n"
-                         "ValueError that names the argument, what was wanted and what came.")
-        .def(py::init([](const py::object& parents) {
-                 const auto array = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
-                 return Skeleton({array.data(), static_cast<std::size_t>(array.size())});
-             }),
-             py::arg("parents"),
+                         "Its methods take each bone relative to its parent, in any representation, layouts as in "
+                         "sinew.affine,\nsinew.quat_vec and sinew.dual_quat, and promote arrays as these do. "
+                         "They raise ValueError that names\nthe argument, what was wanted and what came.")
+        .def(py::init(&make_skeleton), py::arg("parents"),
              "parents: int32 [bones], the index of each bone's parent, -1 for a root.\n\n"
              "Raises ValueError where a parent does not come before its child.")
-        .def_property_readonly("bone_count", &Skeleton::bone_count)
+        .def_property_readonly("bone_count", &Skeleton::bone_count, "Bones of the hierarchy.")
+        .def("__repr__",
+             [](const Skeleton& skeleton) {
+                 return "<sinew.Skeleton: " + std::to_string(skeleton.bone_count()) + " bones>";
+             })
+        .def(py::pickle(
+            [](const Skeleton& skeleton) {
+                const auto parents = skeleton.parents();
+                return py::make_tuple(py::array_t<std::int32_t>(static_cast<py::ssize_t>(parents.size()), parents.data()));
+            },
+            [](const py::tuple& state) {
+                if (state.size() != 1) fail("state", "a tuple of 1, as pickling makes it", "a tuple of " + std::to_string(state.size()));
+                return make_skeleton(state[0]);
+            }))
         .def("root_relative", &relative_to_root, py::arg("transforms"),
              "Each bone relative to the root, in the representation that came (Smith 2013, algorithm 1).\n\n"
              "transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].")

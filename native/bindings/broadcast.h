@@ -38,9 +38,19 @@ struct Input {
     }
 };
 
-/// Whether `value`, an array, holds float64 and not float32. ValueError that names `wanted` for anything
-/// else.
+/// Whether `value`, of promoted(), is an array of float64 and not of float32. ValueError that names `wanted` for
+/// anything else.
 bool is_double(const py::handle& value, const char* argument, const std::string& wanted);
+
+/// The arguments of one call with their arrays in one element type, float32 or float64: as numpy promotes them, so
+/// float64 where one is not of float32 or less. Numbers, and what is no array of numbers, stay as they are.
+void promote(std::span<py::object> values, std::span<const char* const> arguments);
+
+template <std::size_t N>
+std::array<py::object, N> promoted(const std::array<const char*, N>& arguments, std::array<py::object, N> values) {
+    promote(values, arguments);
+    return values;
+}
 
 /// A number of Python or numpy. ValueError for anything else.
 double checked_number(const py::handle& value, const char* argument, const std::string& wanted);
@@ -60,7 +70,7 @@ void check_finite(const T* numbers, std::size_t count, const char* argument, py:
     }
 }
 
-/// `value` as items of `Value`, finite, of element type T exactly; a number alone stands for a scalar.
+/// `value`, of promoted(), as items of `Value`, finite, of element type T; a number alone stands for a scalar.
 template <class T, class Value>
 Input<T> checked_input(const py::handle& value, const char* argument) {
     const std::string wanted = element_name<T>() + Item<Value>::kShape;
@@ -188,10 +198,11 @@ py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
     return output.take();
 }
 
-/// The same in the element type of the first argument, which is no scalar; all have it.
+/// The same in the element type that all arguments have after promoted(); the first is no scalar.
 template <template <class> class... In, class F>
 py::object map(const std::array<const char*, sizeof...(In)>& arguments,
-               const std::array<py::object, sizeof...(In)>& values, F f) {
+               const std::array<py::object, sizeof...(In)>& given, F f) {
+    const auto values = promoted(arguments, given);
     const std::array<const char*, sizeof...(In)> shapes{Item<In<double>>::kShape...};
     const std::string wanted = std::string("float32 or float64 ") + shapes[0];
     constexpr std::index_sequence_for<Item<In<double>>...> kIndices;

@@ -74,9 +74,9 @@ def test_bone_count():
         (np.int32([0]), "parents: expected -1 or the index of an earlier bone, got 0 for bone 0"),
         (np.int32([-1, 2, 0]), "parents: expected -1 or the index of an earlier bone, got 2 for bone 1"),
         (np.int32([-1, -2]), "parents: expected -1 or the index of an earlier bone, got -2 for bone 1"),
-        (np.int64([-1]), "parents: expected int32 [bones], got int64 [1]"),
+        (np.float32([-1]), "parents: expected int32 [bones], got float32 [1]"),
         (np.int32([[-1]]), "parents: expected int32 [bones], got int32 [1, 1]"),
-        ([-1, 0], "parents: expected int32 [bones], got list"),
+        ([-1, None], "parents: expected int32 [bones], got list"),
         (None, "parents: expected int32 [bones], got NoneType"),
     ],
 )
@@ -99,14 +99,14 @@ def with_nan():
     ("transforms", "message"),
     [
         (random_bones()[:6], "transforms: expected 7 bones, got 6"),
-        (random_bones().astype(np.int32), f"transforms: expected {LAYOUTS}, got int32 [7, 4, 4]"),
+        (random_bones().astype(complex), f"transforms: expected {LAYOUTS}, got complex128 [7, 4, 4]"),
         (random_bones()[0], "transforms: expected one axis of bones, got float32 [4, 4]"),
         (random_bones()[:, :, :3], f"transforms: expected {LAYOUTS}, got float32 [7, 4, 3]"),
         (
             random_bones()[:, :2],
             "transforms: expected float32 [.., 4, 4] or [.., 3, 4], got float32 [7, 2, 4]",
         ),
-        (random_bones().tolist(), f"transforms: expected {LAYOUTS}, got list"),
+        (random_bones().tolist() + [[1]], f"transforms: expected {LAYOUTS}, got list"),
         (with_nan(), "transforms: expected finite values, got NaN or infinity at index 2"),
     ],
 )

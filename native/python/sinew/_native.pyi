@@ -1,10 +1,8 @@
 from types import ModuleType
-from typing import Literal, final, overload
+from typing import Any, Literal, final, overload
 
 import numpy as np
-from numpy.typing import NDArray
-
-from ._types import Float
+from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
@@ -17,135 +15,248 @@ spline: ModuleType
 
 @final
 class Parameter:
+    """A setting of a method or of a stage."""
+
     @property
-    def id(self) -> str: ...
+    def id(self) -> str:
+        """What programs say."""
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """What people read."""
     @property
-    def description(self) -> str: ...
+    def description(self) -> str:
+        """One sentence."""
     @property
-    def unit(self) -> str: ...
+    def unit(self) -> str:
+        """"", "length", "angle" (radians) or "factor"."""
     @property
-    def kind(self) -> Literal["float", "int", "bool", "enum", "vertex_group", "method"]: ...
+    def kind(self) -> Literal["float", "int", "bool", "enum", "vertex_group", "method"]:
+        """"float", "int", "bool", "enum" (one of `choices`), "vertex_group" (a weight for each vertex)
+        or "method" (the name of a method)."""
     @property
-    def default(self) -> float | int | bool | str | None: ...
+    def default(self) -> float | int | bool | str | None:
+        """None for a vertex group and a method."""
     @property
-    def min(self) -> float | None: ...
+    def min(self) -> float | None:
+        """The least value of a number, -inf where there is none; None for other kinds."""
     @property
-    def max(self) -> float | None: ...
+    def max(self) -> float | None:
+        """The largest value of a number, inf where there is none; None for other kinds."""
     @property
-    def choices(self) -> tuple[str, ...]: ...
+    def choices(self) -> tuple[str, ...]:
+        """The values of an enum."""
 
 @final
 class Method:
+    """The facts of a skinning method."""
+
     @property
-    def number(self) -> int: ...
+    def number(self) -> int:
+        """Number that .blend files store; never changes."""
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """What programs say."""
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """What people read."""
     @property
-    def description(self) -> str: ...
+    def description(self) -> str:
+        """One sentence: when to use it."""
     @property
-    def source(self) -> str: ...
+    def source(self) -> str:
+        """The papers."""
     @property
-    def needs(self) -> tuple[str, ...]: ...
+    def needs(self) -> tuple[str, ...]:
+        """What it takes besides points, influences and bone transforms: "rest_bones" where bones are scaled."""
     @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its settings, one Parameter each."""
 
 @final
 class Stage:
-    @property
-    def name(self) -> str: ...
-    @property
-    def label(self) -> str: ...
-    @property
-    def description(self) -> str: ...
-    @property
-    def source(self) -> str: ...
-    @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
+    """The facts of a stage: what may follow a method."""
 
-def methods() -> tuple[Method, ...]: ...
-def stages() -> tuple[Stage, ...]: ...
-def keep_thread_state() -> None: ...
+    @property
+    def name(self) -> str:
+        """What programs say."""
+    @property
+    def label(self) -> str:
+        """What people read."""
+    @property
+    def description(self) -> str:
+        """One sentence: when to use it."""
+    @property
+    def source(self) -> str:
+        """The papers."""
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its settings, one Parameter each."""
+
+def methods() -> tuple[Method, ...]:
+    """Every skinning method, one Method each."""
+
+def stages() -> tuple[Stage, ...]:
+    """Every stage, one Stage each. `mix` is an argument of Deformer."""
+
+def keep_thread_state() -> None:
+    """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and that
+    calls it often, is 50 to 100 us a call faster. Safe to call again, and on any thread."""
 
 @final
 class Skeleton:
-    def __init__(self, parents: NDArray[np.int32]) -> None: ...
+    """A hierarchy of bones; parents come before their children.
+
+    Its methods take each bone relative to its parent, in any representation, layouts as in sinew.affine,
+    sinew.quat_vec and sinew.dual_quat, and promote arrays as these do. They raise ValueError that names
+    the argument, what was wanted and what came.
+    """
+    def __init__(self, parents: ArrayLike) -> None:
+        """parents: int32 [bones], the index of each bone's parent, -1 for a root.
+
+        Raises ValueError where a parent does not come before its child.
+        """
     @property
-    def bone_count(self) -> int: ...
-    def root_relative(self, transforms: NDArray[Float]) -> NDArray[Float]: ...
+    def bone_count(self) -> int:
+        """Bones of the hierarchy."""
+    def root_relative(self, transforms: ArrayLike) -> NDArray[Any]:
+        """Each bone relative to the root, in the representation that came (Smith 2013, algorithm 1).
+
+        transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].
+        """
     def interpolate(
-        self, a: NDArray[Float], b: NDArray[Float], t: float, method: str = "dlb"
-    ) -> tuple[NDArray[Float], bool]: ...
+        self, a: ArrayLike, b: ArrayLike, t: ArrayLike, method: str = "dlb"
+    ) -> tuple[NDArray[Any], bool]:
+        """(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
+
+        a, b: [bones, ..] in the representation of the method, at t = 0 and t = 1.
+        t: a number; outside 0 to 1 the motion goes on.
+        method: one of sinew.interpolate.METHODS.
+        is_defined: False where a bone has no one in-between; it then has what sinew.interpolate.between
+            gives there.
+        """
     def spline(
-        self, keyframes: NDArray[Float], times: NDArray[Float], time: float, method: str = "dlb"
-    ) -> tuple[NDArray[Float], bool]: ...
+        self, keyframes: ArrayLike, times: ArrayLike, time: ArrayLike, method: str = "dlb"
+    ) -> tuple[NDArray[Any], bool]:
+        """(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, blend form
+        (Smith 2013, algorithm 3 and section 3.2.2).
+
+        keyframes: [keys, bones, ..] in the representation of the method, one key or more.
+        times: [keys], not decreasing; keys of equal time are a cut.
+        time: a number; before the first key and after the last it is that key.
+        method: one of sinew.interpolate.METHODS.
+        """
     def spline_vector(
-        self, keyframes: NDArray[Float], times: NDArray[Float], time: float
-    ) -> tuple[NDArray[Float], bool]: ...
+        self, keyframes: ArrayLike, times: ArrayLike, time: ArrayLike
+    ) -> tuple[NDArray[Any], bool]:
+        """The same in vector form (Smith 2013, algorithm 3): not rigid between the keys.
+
+        keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].
+        """
 
 @final
 class Binding:
     """A mesh bound to bones: immutable, and shared by the deformers made of it."""
-
     def __init__(
         self,
-        rest_points: NDArray[np.float32],
-        influence_offsets: NDArray[np.int32],
-        influence_bones: NDArray[np.int32],
-        influence_weights: NDArray[np.float32],
-        rest_bones: NDArray[np.float32] | None = None,
-    ) -> None: ...
+        rest_points: ArrayLike,
+        influence_offsets: ArrayLike,
+        influence_bones: ArrayLike,
+        influence_weights: ArrayLike,
+        rest_bones: ArrayLike | None = None,
+    ) -> None:
+        """rest_points: float32 [vertices, 3], model space.
+        influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
+        influence_bones: int32 [influences].
+        influence_weights: float32 [influences], >= 0, any sum (normalised inside).
+            At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.
+        rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space
+            of the bone transforms; read where a bone is scaled and the method is rigid. None: identity.
+
+        Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is lost:
+        lists, float64,
+        int64 whose numbers fit. All input is copied. Raises ValueError that names the argument, what was
+        wanted and
+        what came. Can be pickled: what was bound, with weights normalised.
+        """
     @property
-    def vertex_count(self) -> int: ...
+    def vertex_count(self) -> int:
+        """Vertices of the mesh."""
     @property
-    def influence_count(self) -> int: ...
+    def influence_count(self) -> int:
+        """Influences of positive weight."""
     @property
-    def bone_count(self) -> int: ...
+    def bone_count(self) -> int:
+        """One more than the highest bone that an influence names."""
 
 @final
 class Deformer:
     """A binding and a method, ready to deform at any pose.
 
-    mix  None, or (method, weights): the share of another method, float32 [vertices] from 0 to 1, that each
-         vertex takes (the stage `mix`)
+    Can be pickled, with the rest points that it has then and a binding of its own.
     """
-
     @overload
     def __init__(
         self,
         binding: Binding,
         method: str = "lbs",
-        mix: tuple[str, NDArray[np.float32]] | None = None,
-    ) -> None: ...
+        mix: tuple[str, ArrayLike] | None = None,
+    ) -> None:
+        """binding: a Binding; not copied.
+        method: the name of one of sinew.methods().
+        mix: None, or (name of another method, weights): weights float32 [vertices] say how much of the
+            other method each vertex takes, from 0 (none) to 1 (all of it); clamped. As the stage `mix`.
+        """
     @overload
     def __init__(
         self,
-        rest_points: NDArray[np.float32],
-        influence_offsets: NDArray[np.int32],
-        influence_bones: NDArray[np.int32],
-        influence_weights: NDArray[np.float32],
+        rest_points: ArrayLike,
+        influence_offsets: ArrayLike,
+        influence_bones: ArrayLike,
+        influence_weights: ArrayLike,
         method: str = "lbs",
-        rest_bones: NDArray[np.float32] | None = None,
-    ) -> None: ...
+        rest_bones: ArrayLike | None = None,
+    ) -> None:
+        """With a binding of its own, of the arguments that Binding has."""
     @property
-    def method(self) -> str: ...
+    def method(self) -> str:
+        """The name of the method."""
     @property
-    def mixed_method(self) -> str | None: ...
+    def mixed_method(self) -> str | None:
+        """The name of the method that `mix` adds, or None."""
     @property
-    def vertex_count(self) -> int: ...
+    def vertex_count(self) -> int:
+        """Vertices of the mesh."""
     @property
-    def influence_count(self) -> int: ...
+    def influence_count(self) -> int:
+        """Influences of positive weight."""
     @property
-    def bone_count(self) -> int: ...
-    def set_rest_points(self, rest_points: NDArray[np.float32]) -> None: ...
+    def bone_count(self) -> int:
+        """One more than the highest bone that an influence names."""
+    def set_rest_points(self, rest_points: ArrayLike) -> None:
+        """New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. Other
+        threads may deform meanwhile: each of their results has the old points or the new ones.
+        """
     def deform(
         self,
-        bone_transforms: NDArray[np.float32],
+        bone_transforms: ArrayLike,
         out: NDArray[np.float32] | None = None,
-        threads: int | None = None,
-        bones_from_model: NDArray[np.float32] | None = None,
-        rest_inverses: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float32]: ...
+        threads: int | np.integer[Any] | None = None,
+        bones_from_model: ArrayLike | None = None,
+        rest_inverses: ArrayLike | None = None,
+    ) -> NDArray[np.float32]:
+        """The deformed points, float32 [vertices, 3], model space.
+
+        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not
+            read.
+        out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never
+            converted.
+        threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The
+            result is the same bit for bit.
+        bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone
+            transforms, where the blending happens; the result is taken back. None: the same space.
+        rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the posed
+            bones, and each is multiplied by the inverse of its rest, in double.
+
+        A vertex without influences stays. The GIL is released for large meshes. Raises ValueError that
+        names the argument, what was wanted and what came.
+        """

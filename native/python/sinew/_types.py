@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 
 Float = TypeVar("Float", np.float32, np.float64)
 
-# An array [..] of the call's element type, or one number.
-Number = float | NDArray[np.float32] | NDArray[np.float64]
-
 
 class Screw(NamedTuple, Generic[Float]):
     """axis and moment [.., 3]; angle (radians), translation along the axis and pitch [..]."""

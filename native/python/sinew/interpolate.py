@@ -24,12 +24,12 @@ Each result says whether it is defined. Not defined, and then:
 No result is NaN.
 """
 
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from ._native import interpolate as _native
-from ._types import Blended, Float, Number
+from ._types import Blended
 
 __all__ = ["METHODS", "Blended", "Method", "between", "blend"]
 
@@ -40,10 +40,11 @@ Method = Literal[
 METHODS: Final[tuple[Method, ...]] = _native.METHODS
 
 
-def between(a: NDArray[Float], b: NDArray[Float], t: Number, method: Method = "dlb") -> Blended[Float]:
+def between(a: ArrayLike, b: ArrayLike, t: ArrayLike, method: Method = "dlb") -> Blended[Any]:
     """From `a` at t = 0 to `b` at t = 1; other t go on beyond. Leading axes of a, b and t broadcast.
 
-    a, b: in the layout of the method, rotations of unit length, one element type; so is the result.
+    a, b: in the layout of the method, rotations of unit length. The result is float32 where all arrays are of
+        float32 or less, float64 otherwise.
     t: [..] or a number.
 
     Raises ValueError that names the argument, what was wanted and what came.
@@ -51,7 +52,7 @@ def between(a: NDArray[Float], b: NDArray[Float], t: Number, method: Method = "d
     return Blended(*_native.between(a, b, t, method))
 
 
-def blend(transforms: NDArray[Float], weights: NDArray[Float], method: Method = "dlb") -> Blended[Float]:
+def blend(transforms: ArrayLike, weights: ArrayLike, method: Method = "dlb") -> Blended[Any]:
     """The blend of the n transforms along the last leading axis; the axes before it broadcast.
 
     transforms: [.., n, 7] and so on, in the layout of the method, n >= 1, rotations of unit length.

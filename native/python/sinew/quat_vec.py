@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rigid transforms as quaternion-vector pairs (QV; Smith 2013, section 2.2.1).
 
-Layout: [.., 7] as (w, x, y, z, tx, ty, tz), the quaternion of unit length: turn, then shift.
+Layout: [.., 7] as (w, x, y, z, tx, ty, tz), the quaternion of unit length: rotation, then translation.
 
 Every function takes one or many: leading axes broadcast as numpy's do, and numbers may stand for arrays of
-numbers. All arrays of a call have one element type, float32 or float64, and so has the result. ValueError
-names the argument, what was wanted and what came; NaN and infinity are refused.
+numbers. Arrays are anything that numpy makes one of. The result is float32 where all arrays of a call are of
+float32 or less, float64 otherwise, as numpy promotes; numbers do not count. ValueError names the argument, what
+was wanted and what came; NaN and infinity are refused.
 """
 
-from typing import Any, overload
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ._native import quat_vec as _native
-from ._types import Distance, Float, Number, Screw
+from ._representation import Representation
 
 __all__ = [
     "compose",
@@ -37,121 +35,23 @@ __all__ = [
     "transform_vector",
 ]
 
+_layout = Representation(_native, np.eye(1, 7)[0])
 
-@overload
-def identity() -> NDArray[np.float64]: ...
-@overload
-def identity(dtype: type[Float]) -> NDArray[Float]: ...
-def identity(dtype: Any = np.float64) -> NDArray[Any]:
-    """The identity, [7]."""
-    return np.eye(1, 7, dtype=dtype)[0]
-
-
-def from_axis_angle(axis: NDArray[Float], angle: Number) -> NDArray[Float]:
-    """The turn by `angle` radians about `axis` through the origin, [.., 7].
-
-    axis: [.., 3], of any length; one of length 0 gives the identity. angle: [..].
-    """
-    return _native.from_axis_angle(axis, angle)
-
-
-def from_rotation_matrix(rotation: NDArray[Float]) -> NDArray[Float]:
-    """The turn of `rotation`, [.., 3, 3], orthonormal with determinant 1 to within rounding."""
-    return _native.from_rotation_matrix(rotation)
-
-
-def from_translation(translation: NDArray[Float]) -> NDArray[Float]:
-    """The shift by `translation`, [.., 3]."""
-    return _native.from_translation(translation)
-
-
-def from_screw(
-    axis: NDArray[Float], moment: NDArray[Float], angle: Number, translation: Number
-) -> NDArray[Float]:
-    """The turn by `angle` radians about a line and the shift by `translation` along it; undoes to_screw().
-
-    axis, moment: [.., 3], Pluecker coordinates of the line: both are divided by the length of the axis, and
-        a part of the moment along it is left out. An axis of length 0 gives the identity.
-    angle, translation: [..]; a pitch (translation per radian) gives translation = pitch * angle.
-
-    Source: Daniilidis 1999, eq. 13.
-    """
-    return _native.from_screw(axis, moment, angle, translation)
-
-
-def from_screw_about(
-    axis: NDArray[Float], point: NDArray[Float], angle: Number, translation: Number
-) -> NDArray[Float]:
-    """As from_screw(), with the line given by `point`, [.., 3], any point on it."""
-    return _native.from_screw_about(axis, point, angle, translation)
-
-
-def to_screw(a: NDArray[Float]) -> Screw[Float]:
-    """The screw that `a` is (Chasles 1830): axis and moment [.., 3], angle, translation and pitch [..].
-
-    angle: 0 to pi; at pi the axis is one of its two directions. moment: point x axis. pitch: translation /
-    angle; infinite for a shift alone, whose axis is its direction, angle and moment 0, translation >= 0. The
-    identity has the axis z.
-    """
-    return Screw(*_native.to_screw(a))
-
-
-def from_twist(twist: NDArray[Float]) -> NDArray[Float]:
-    """The exponential of `twist`, [.., 6]: angular velocity, linear velocity; of any angle."""
-    return _native.from_twist(twist)
-
-
-def to_twist(a: NDArray[Float]) -> NDArray[Float]:
-    """The logarithm of `a` in se(3), [.., 6]: angular, then linear, the angle 0 to pi.
-
-    At half a turn both directions of the axis are logarithms, and the result has one of them.
-    """
-    return _native.to_twist(a)
-
-
-def to_affine(a: NDArray[Float]) -> NDArray[Float]:
-    """`a` in the layout of sinew.affine, [.., 4, 4]."""
-    return _native.to_affine(a)
-
-
-def to_dual_quat(a: NDArray[Float]) -> NDArray[Float]:
-    """`a` in the layout of sinew.dual_quat, [.., 8]."""
-    return _native.to_dual_quat(a)
-
-
-def compose(a: NDArray[Float], b: NDArray[Float]) -> NDArray[Float]:
-    """First `b`, then `a`: compose(model_from_bone, bone_from_rest) = model_from_rest."""
-    return _native.compose(a, b)
-
-
-def inverse(a: NDArray[Float]) -> NDArray[Float]:
-    """The transform that undoes `a`."""
-    return _native.inverse(a)
-
-
-def normalized(a: NDArray[Float]) -> NDArray[Float]:
-    """`a` with its quaternion at unit length; one of length 0 becomes that of the identity."""
-    return _native.normalized(a)
-
-
-def transform_point(a: NDArray[Float], points: NDArray[Float]) -> NDArray[Float]:
-    """Where `a` takes `points`, [.., 3]. n transforms of m points each: a[:, None]."""
-    return _native.transform_point(a, points)
-
-
-def transform_vector(a: NDArray[Float], vectors: NDArray[Float]) -> NDArray[Float]:
-    """`vectors`, [.., 3], after `a`: turned, not shifted."""
-    return _native.transform_vector(a, vectors)
-
-
-def transform_normal(a: NDArray[Float], normals: NDArray[Float]) -> NDArray[Float]:
-    """Unit normals, [.., 3], of surfaces after `a`; (0, 0, 0) stays."""
-    return _native.transform_normal(a, normals)
-
-
-def rigid_distance(a: NDArray[Float], b: NDArray[Float]) -> Distance[Float]:
-    """Angle of the turn from `a` to `b`, 0 to pi, and distance between where they take the origin; both [..].
-
-    The same for compose(x, a) and compose(x, b), x rigid.
-    """
-    return Distance(*_native.rigid_distance(a, b))
+compose = _layout.compose
+from_axis_angle = _layout.from_axis_angle
+from_rotation_matrix = _layout.from_rotation_matrix
+from_screw = _layout.from_screw
+from_screw_about = _layout.from_screw_about
+from_translation = _layout.from_translation
+from_twist = _layout.from_twist
+identity = _layout.identity
+inverse = _layout.inverse
+normalized = _layout.normalized
+rigid_distance = _layout.rigid_distance
+to_affine = _layout.to_affine
+to_dual_quat = _layout.to_dual_quat
+to_screw = _layout.to_screw
+to_twist = _layout.to_twist
+transform_normal = _layout.transform_normal
+transform_point = _layout.transform_point
+transform_vector = _layout.transform_vector

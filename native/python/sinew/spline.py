@@ -13,18 +13,20 @@ Not defined where keys in use are half a turn apart (quaternions; the signs as g
 blend is not (sinew.interpolate). ValueError names the argument, what was wanted and what came.
 """
 
-from numpy.typing import NDArray
+from typing import Any
+
+from numpy.typing import ArrayLike
 
 from ._native import spline as _native
-from ._types import Blended, Float, Number
+from ._types import Blended
 from .interpolate import Method
 
 __all__ = ["Blended", "catmull_rom", "catmull_rom_vector"]
 
 
 def catmull_rom(
-    keys: NDArray[Float], times: NDArray[Float], at: Number, method: Method = "dlb"
-) -> Blended[Float]:
+    keys: ArrayLike, times: ArrayLike, at: ArrayLike, method: Method = "dlb"
+) -> Blended[Any]:
     """Blend form: the keys blended by `method` with the weights of the spline (Smith 2013, section 3.2.2).
 
     Rigid for every method but matrix_linear. keys: in the layout of the method.
@@ -35,7 +37,7 @@ def catmull_rom(
     return Blended(*_native.catmull_rom(keys, times, at, method))
 
 
-def catmull_rom_vector(keys: NDArray[Float], times: NDArray[Float], at: Number) -> Blended[Float]:
+def catmull_rom_vector(keys: ArrayLike, times: ArrayLike, at: ArrayLike) -> Blended[Any]:
     """Vector form: the components as a vector of 12, 7 or 8 numbers (Smith 2013, algorithm 3).
 
     Rigid at the keys only; the layout's normalized() makes it so everywhere.

@@ -26,6 +26,9 @@ constexpr std::size_t kVerticesWorthAThread = 32768;
 // nothing.
 constexpr std::size_t kBlocksOfAChunk = 256;
 
+// How far from 1 the sum of normalised weights may be, each of which was rounded.
+constexpr double kNormalised = 1e-5;
+
 [[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got) {
     throw std::invalid_argument(argument + ": expected " + wanted + ", got " + got);
 }
@@ -151,6 +154,9 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 struct Binding::Packed {
     explicit Packed(const BindData& data);
 
+    /// With the rest points of `rows`.
+    [[nodiscard]] BoundMesh unpack(std::span<const Lanes<float>> rows) const;
+
     PackedMesh mesh;
     std::vector<Affine<float>> rest_bones;      // of mesh.used_bones; or empty: all identity
     std::vector<std::int32_t> stretched_bones;  // of mesh.used_bones, those whose axes are not of unit length
@@ -176,11 +182,15 @@ Binding::Packed::Packed(const BindData& data) {
         const auto end = static_cast<std::size_t>(data.influence_offsets[vertex + 1]);
         double sum = 0.0;
         for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(data.influence_weights[i]);
+        if (data.is_normalised && sum != 0.0 && !(std::abs(sum - 1.0) < kNormalised)) {
+            fail("influence_weights", "normalised ones, of sum 1",
+                 "sum " + std::to_string(sum) + " at vertex " + std::to_string(vertex));
+        }
         for (std::size_t i = begin; i < end; ++i) {
             const float weight = data.influence_weights[i];
             if (weight > 0.0f) {
-                influences.push_back(
-                    {data.influence_bones[i], static_cast<float>(static_cast<double>(weight) / sum)});
+                const double share = static_cast<double>(weight) / (data.is_normalised ? 1.0 : sum);
+                influences.push_back({data.influence_bones[i], static_cast<float>(share)});
             }
         }
         offsets.push_back(static_cast<std::uint32_t>(influences.size()));
@@ -198,11 +208,35 @@ Binding::Packed::Packed(const BindData& data) {
     }
 }
 
+BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
+    const UnpackedMesh unpacked = sinew::unpack(mesh, rows, vertex_count);
+    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}};
+    bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
+    for (const auto& [bone, weight] : unpacked.influences) {
+        bound.influence_bones.push_back(bone);
+        bound.influence_weights.push_back(weight);
+    }
+    const std::size_t named = mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
+    if (named < bone_count) {
+        // Named without weight, and dropped: of the last vertex, which takes it without weight.
+        bound.influence_bones.push_back(static_cast<std::int32_t>(bone_count) - 1);
+        bound.influence_weights.push_back(0.0f);
+        ++bound.influence_offsets.back();
+    }
+    if (rest_bones.empty()) return bound;
+    bound.rest_bones.resize(bone_count);
+    for (std::size_t i = 0; i < mesh.used_bones.size(); ++i) {
+        bound.rest_bones[static_cast<std::size_t>(mesh.used_bones[i])] = rest_bones[i];
+    }
+    return bound;
+}
+
 Binding::Binding(const BindData& data) : packed_(std::make_shared<const Packed>(data)) {}
 
 std::size_t Binding::vertex_count() const noexcept { return packed_->vertex_count; }
 std::size_t Binding::influence_count() const noexcept { return packed_->influence_count; }
 std::size_t Binding::bone_count() const noexcept { return packed_->bone_count; }
+BoundMesh Binding::unpack() const { return packed_->unpack(packed_->mesh.rows); }
 
 struct Deformer::State {
     State(std::shared_ptr<const Binding::Packed> packed, std::vector<Lanes<float>> own_rows,
@@ -256,6 +290,17 @@ std::size_t Deformer::vertex_count() const noexcept { return state_->packed->ver
 std::size_t Deformer::influence_count() const noexcept { return state_->packed->influence_count; }
 std::size_t Deformer::bone_count() const noexcept { return state_->packed->bone_count; }
 
+BoundMesh Deformer::unpack() const {
+    const PaletteStore::Reading reading(state_->palettes);
+    const Binding::Packed& packed = *state_->packed;
+    return packed.unpack(state_->own_rows.empty() ? packed.mesh.rows : state_->own_rows);
+}
+
+std::vector<float> Deformer::mix_weights() const {
+    if (!state_->mix) return {};
+    return unpack_values(state_->packed->mesh, state_->mix->weights, vertex_count());
+}
+
 void Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) {
     const PackedMesh& mesh = state_->packed->mesh;
     if (rest_points.size() != vertex_count()) {
@@ -292,6 +337,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         const Kernel& kernel = *state_->kernels[k];
         Palette& palette = reading.palette(k);
         prepare(kernel, bones, palette);
+        find_plain(packed.mesh.pairs, packed.mesh.used_bones.size(), palette);
         const bool changes_space = kernel.is_rigid && !same_space;
         work.frames[k] = {&packed.mesh,
                           rows,

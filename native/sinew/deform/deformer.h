@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "sinew/export.h"
 #include "sinew/skinning/methods.h"
@@ -30,6 +31,21 @@ struct BindData {
     std::span<const Affine<float>>
         rest_bones{};  // [bones] orthonormal, Y along the bone; empty: all identity.
                        // Read where a bone is scaled and the method is rigid
+    bool is_normalised = false;  // of a BoundMesh: weights have sum 1 but for rounding, and are taken as they are
+};
+
+/// What a Binding keeps of its BindData, to store it and to make one anew that gives the same bits. Influences have
+/// weights of sum 1. One of weight 0 may name the highest bone that was named.
+struct BoundMesh {
+    std::vector<Vec3<float>> rest_points;
+    std::vector<std::int32_t> influence_offsets;
+    std::vector<std::int32_t> influence_bones;
+    std::vector<float> influence_weights;
+    std::vector<Affine<float>> rest_bones;  // of bones without influences: identity
+
+    [[nodiscard]] BindData data() const {
+        return {rest_points, influence_offsets, influence_bones, influence_weights, rest_bones, true};
+    }
 };
 
 /// How one frame is deformed.
@@ -55,6 +71,7 @@ public:
     [[nodiscard]] std::size_t influence_count() const noexcept;
     /// One more than the highest bone that an influence names.
     [[nodiscard]] std::size_t bone_count() const noexcept;
+    [[nodiscard]] BoundMesh unpack() const;
 
 private:
     friend class Deformer;
@@ -92,6 +109,11 @@ public:
     [[nodiscard]] std::size_t influence_count() const noexcept;
     /// One more than the highest bone that an influence names.
     [[nodiscard]] std::size_t bone_count() const noexcept;
+
+    /// Its binding, with the rest points that it has now.
+    [[nodiscard]] BoundMesh unpack() const;
+    /// The weights of the stage `mix` [vertices], clamped; empty without it.
+    [[nodiscard]] std::vector<float> mix_weights() const;
 
     /// New rest points [vertices] for this deformer alone, as when shape keys change. Throws std::invalid_argument
     /// for another number of points or a value that is not finite. Waits for threads that deform, and they for it:

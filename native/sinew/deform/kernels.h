@@ -62,6 +62,10 @@ struct Kernel {
 
 inline const TargetKernel& Kernel::target() const noexcept { return targets[target_in_use()]; }
 
+/// Fills Palette::may_be_plain from the sizes: once in a frame for each pair of bones, so that few vertices are tested
+/// one by one.
+void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept;
+
 /// Fills `palette` for `bones`. A bone that the pose lacks stays at rest.
 void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcept;
 

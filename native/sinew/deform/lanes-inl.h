@@ -201,14 +201,13 @@ HWY_INLINE std::size_t lanes_end(D d, const Block& block) {
     return hn::MaxLanes(D()) == kLanes ? hn::Lanes(d) : block.vertices;
 }
 
-/// Whether bones are added plainly of which the first and the smallest have these of Palette::sizes.
-HWY_INLINE bool is_plain(float first, float least) { return !(first < kAlike * kAlike * least); }
-
+/// Whether these bones of a vertex are added plainly.
 HWY_INLINE bool is_plain(const Palette& palette, const std::int32_t* bones, std::size_t count) {
+    if (HWY_LIKELY(palette.may_be_plain[bones[0]] == 0)) return false;
     const float first = palette.sizes[bones[0]];
     float least = first;
     for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette.sizes[bones[k]]);
-    return is_plain(first, least);
+    return sinew::is_plain(first, least);
 }
 
 /// Blocks [begin, end), which have no bones.

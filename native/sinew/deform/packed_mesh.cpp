@@ -114,6 +114,7 @@ public:
         }
         fill(rest_points);
         number_used_bones();
+        list_bone_pairs();
         mesh_.blocks.shrink_to_fit();
         mesh_.vertices.shrink_to_fit();
         mesh_.runs.shrink_to_fit();
@@ -236,6 +237,55 @@ private:
         for (std::int32_t& bone : mesh_.bones) bone = index_of_bone[static_cast<std::size_t>(bone)];
     }
 
+    /// Fills PackedMesh::pairs. In linear time, as a mesh may have as many sets of bones as
+    /// vertices.
+    void list_bone_pairs() {
+        struct Set {
+            std::uint32_t begin;
+            std::uint32_t end;
+        };
+        std::vector<Set> sets;
+        const std::uint32_t* before = nullptr;
+        for (const Block& block : mesh_.blocks) {
+            if (block.influences == 0) continue;
+            const bool as_before = before != nullptr && *before == block.first_bone;
+            before = &block.first_bone;
+            if (as_before && !block.mixed) continue;
+            const std::size_t vertices = block.mixed ? block.vertices : 1;
+            for (std::uint32_t i = 0; i < vertices; ++i) {
+                const std::uint32_t begin = block.first_bone + i * block.influences;
+                sets.push_back({begin, begin + block.influences});
+            }
+        }
+        std::vector<std::uint32_t> starts(mesh_.used_bones.size() + 1);
+        const auto first_of = [this](const Set& set) { return static_cast<std::size_t>(mesh_.bones[set.begin]); };
+        for (const Set& set : sets) ++starts[first_of(set) + 1];
+        std::partial_sum(starts.begin(), starts.end(), starts.begin());
+        std::vector<Set> by_first(sets.size());
+        std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
+        for (const Set& set : sets) by_first[next[first_of(set)]++] = set;
+
+        std::vector<std::int32_t> found_for(mesh_.used_bones.size(), -1);
+        for (std::size_t first = 0; first < mesh_.used_bones.size(); ++first) {
+            const auto bone = static_cast<std::int32_t>(first);
+            found_for[first] = bone;
+            for (std::uint32_t s = starts[first]; s < starts[first + 1]; ++s) {
+                for (std::uint32_t i = by_first[s].begin + 1; i < by_first[s].end; ++i) {
+                    const std::int32_t later = mesh_.bones[i];
+                    std::int32_t& found = found_for[static_cast<std::size_t>(later)];
+                    if (found == bone) continue;
+                    found = bone;
+                    mesh_.pairs.first.push_back(bone);
+                    mesh_.pairs.later.push_back(later);
+                }
+            }
+        }
+        while (mesh_.pairs.first.size() % kLanes != 0) {
+            mesh_.pairs.first.push_back(0);
+            mesh_.pairs.later.push_back(0);
+        }
+    }
+
     std::span<const std::uint32_t> offsets_;
     std::span<const Influence<float>> influences_;
     PackedMesh mesh_;
@@ -260,6 +310,53 @@ void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_poi
             xyz[2].lane[lane] = point.z;
         }
     }
+}
+
+UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows, std::size_t vertices) {
+    UnpackedMesh result;
+    result.rest_points.resize(vertices);
+    result.offsets.assign(vertices + 1, 0);
+    // call(vertex, influence) for each influence of each vertex.
+    const auto for_each_influence = [&](const auto& call) {
+        for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
+            const Block& block = mesh.blocks[b];
+            const Lanes<float>* const xyz = &rows[block.first_row];
+            for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+                const auto weight_of = [&](std::size_t k) {
+                    if (block.mixed) return xyz[3 + k].lane[lane];
+                    return k == 0 ? mesh.first_weights[b].lane[lane] : xyz[2 + k].lane[lane];
+                };
+                const std::size_t first = block.first_bone + (block.mixed ? lane * block.influences : 0);
+                const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);
+                result.rest_points[vertex] = {xyz[0].lane[lane], xyz[1].lane[lane], xyz[2].lane[lane]};
+                for (std::size_t k = 0; k < block.influences; ++k) {
+                    // Of weight 0 are those that fill up a mixed block.
+                    if (weight_of(k) == 0.0f) continue;
+                    const auto bone = static_cast<std::size_t>(mesh.bones[first + k]);
+                    call(vertex, Influence<float>{mesh.used_bones[bone], weight_of(k)});
+                }
+            }
+        }
+    };
+    for_each_influence([&](std::size_t vertex, const Influence<float>&) { ++result.offsets[vertex + 1]; });
+    std::partial_sum(result.offsets.begin(), result.offsets.end(), result.offsets.begin());
+    result.influences.resize(result.offsets.back());
+    std::vector<std::uint32_t> next(result.offsets.begin(), result.offsets.end() - 1);
+    for_each_influence([&](std::size_t vertex, const Influence<float>& influence) {
+        result.influences[next[vertex]++] = influence;
+    });
+    return result;
+}
+
+std::vector<float> unpack_values(const PackedMesh& mesh, std::span<const Lanes<float>> packed,
+                                 std::size_t vertices) {
+    std::vector<float> values(vertices);
+    for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
+        for (std::size_t lane = 0; lane < mesh.blocks[b].vertices; ++lane) {
+            values[static_cast<std::size_t>(mesh.vertices[b].lane[lane])] = packed[b].lane[lane];
+        }
+    }
+    return values;
 }
 
 std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values) {

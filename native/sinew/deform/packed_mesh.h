@@ -40,6 +40,13 @@ struct Run {
     std::array<std::uint16_t, 3> floats;  // a bit for each of the coordinates x y z x y z ... of the block
 };
 
+/// Which bones come first for some vertex, and with each of them which others: each pair once. Filled up to a multiple
+/// of kLanes with a bone and itself.
+struct BonePairs {
+    std::vector<std::int32_t> first;
+    std::vector<std::int32_t> later;
+};
+
 /// A bound mesh in the order in which it is deformed: vertices with the same bones in the same order are
 /// neighbours, so that a bone is read once for many.
 struct PackedMesh {
@@ -50,6 +57,7 @@ struct PackedMesh {
     std::vector<Run> runs;
     std::vector<std::int32_t> bones;       // indices into used_bones
     std::vector<std::int32_t> used_bones;  // rising, each once: bones as the caller numbers them
+    BonePairs pairs;
 };
 
 /// rest_points  [vertices]
@@ -62,6 +70,23 @@ struct PackedMesh {
 /// Writes other rest points [vertices] to `rows`, which are those of `mesh` or a copy of them.
 void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
                    std::span<Lanes<float>> rows) noexcept;
+
+/// What a mesh was packed of.
+struct UnpackedMesh {
+    std::vector<Vec3<float>> rest_points;
+    std::vector<std::uint32_t> offsets;
+    std::vector<Influence<float>> influences;
+};
+
+/// Undoes pack(), but for weights of 0.
+///
+/// rows  of `mesh`, or with other rest points
+[[nodiscard]] UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows,
+                                  std::size_t vertices);
+
+/// Undoes pack_values().
+[[nodiscard]] std::vector<float> unpack_values(const PackedMesh& mesh, std::span<const Lanes<float>> packed,
+                                               std::size_t vertices);
 
 /// A number of each vertex [vertices] in the order of the mesh: [blocks]. Lanes without a vertex repeat the last.
 [[nodiscard]] std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values);

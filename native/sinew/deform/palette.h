@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include "sinew/deform/packed_mesh.h"
 #include "sinew/transform/affine.h"
 
 namespace sinew {
@@ -39,6 +40,8 @@ inline constexpr std::size_t kSizesAtOnce = 8;
 struct Palette {
     Float4* bones = nullptr;   // Kernel::rest_row.size() a bone
     float* sizes = nullptr;    // squares, of the translation, from that of kMinSize on; infinite: kLong
+    // Whether some vertex of which this bone is the first may be added plainly.
+    std::uint8_t* may_be_plain = nullptr;
     Float4* scales = nullptr;  // kDisplacementRows a bone, where it has scale
     std::uint8_t* has_scale = nullptr;  // not written where no bone has
     std::int32_t* scaled = nullptr;     // indices of bones to be prepared one by one
@@ -68,6 +71,11 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
 
 /// Palette::sizes of a bone with this translation.
 [[nodiscard]] float size_of(const Vec3<double>& translation, double length_squared = 0.0) noexcept;
+
+/// Whether bones are added plainly of which the first and the smallest have these of Palette::sizes.
+[[nodiscard]] inline bool is_plain(float first, float least) noexcept {
+    return !(first < kAlike * kAlike * least);
+}
 
 [[nodiscard]] bool is_identity(const Affine<float>& a) noexcept;
 

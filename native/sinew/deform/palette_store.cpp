@@ -32,6 +32,7 @@ PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t b
         Memory& memory = memory_[k];
         memory.float4s = std::make_unique_for_overwrite<Float4[]>(kMax * (of_bones + of_scales));
         memory.sizes = std::make_unique_for_overwrite<float[]>(kMax * of_sizes);
+        memory.may_be_plain = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * bones);
         if (may_scale) {
             // A bone may be listed twice: for its rest axes, and for its pose.
             memory.scaled = std::make_unique_for_overwrite<std::int32_t[]>(kMax * 2 * bones);
@@ -41,6 +42,7 @@ PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t b
             Palette& palette = palettes_[k][i];
             palette.bones = memory.float4s.get() + i * (of_bones + of_scales);
             palette.sizes = memory.sizes.get() + i * of_sizes;
+            palette.may_be_plain = memory.may_be_plain.get() + i * bones;
             if (!may_scale) continue;
             palette.scales = palette.bones + of_bones;
             palette.scaled = memory.scaled.get() + i * 2 * bones;

@@ -66,6 +66,7 @@ private:
     struct Memory {
         std::unique_ptr<Float4[]> float4s;
         std::unique_ptr<float[]> sizes;
+        std::unique_ptr<std::uint8_t[]> may_be_plain;
         std::unique_ptr<std::int32_t[]> scaled;
         std::unique_ptr<std::uint8_t[]> has_scale;
     };

@@ -290,13 +290,12 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// One vertex of a mixed block: a bone's row is added as it lies in memory, Float4 by Float4. Whether that is the right
-/// way to add these bones.
+/// One vertex of a mixed block: a bone's row is added as it lies in memory, Float4 by Float4.
 ///
 /// weights  of each influence, kLanes apart
 /// sums     where the sum's Float4s are written, 4 * kLanes apart
 template <class Rigid, bool kPlain>
-HWY_INLINE bool blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
+HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              const float* weights, float* sums) {
     const Four d;
     using V4 = Vec<Four>;
@@ -304,8 +303,6 @@ HWY_INLINE bool blend_vertex(const Palette& palette, const std::int32_t* bones, 
         return &palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k])];
     };
     const Float4* const first = row_at(0);
-    const float size = palette.sizes[bones[0]];
-    float least = size;
     V4 sum[kRowFloat4s];
     for (std::size_t q = 0; q < kRowFloat4s; ++q) sum[q] = hn::Load(d, first[q].value.data());
     V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
@@ -314,7 +311,6 @@ HWY_INLINE bool blend_vertex(const Palette& palette, const std::int32_t* bones, 
     }
     for (std::size_t k = 1; k < count; ++k) {
         const Float4* const row = row_at(k);
-        least = std::min(least, palette.sizes[bones[k]]);
         const V4 weight = hn::Set(d, weights[kLanes * k]);
         const V4 quaternion = hn::Load(d, row->value.data());
         const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
@@ -328,7 +324,6 @@ HWY_INLINE bool blend_vertex(const Palette& palette, const std::int32_t* bones, 
         quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
     }
     for (std::size_t q = 0; q < kRowFloat4s; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
-    return kPlain == is_plain(size, least);
 }
 
 /// Apart, so that its registers are not those of every vertex.
@@ -351,8 +346,10 @@ void deform_mixed(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
         const float* const weights = weights_of(rows) + lane;
         float* const to = sums[0] + 4 * lane;
-        if (!blend_vertex<Rigid, false>(palette, bones, block.influences, weights, to)) {
+        if (is_plain(palette, bones, block.influences)) {
             blend_vertex_plainly<Rigid>(palette, bones, block.influences, weights, to);
+        } else {
+            blend_vertex<Rigid, false>(palette, bones, block.influences, weights, to);
         }
     }
     const Full d;

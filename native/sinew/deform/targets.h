@@ -21,3 +21,10 @@
                 {&HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare)}, \
         }                                                                      \
     }
+
+// The same for a single function: an array of pointers to it.
+#define SINEW_TARGETS_OF(function)                                                                           \
+    {                                                                                                        \
+        HWY_CHOOSE_AVX3(function), HWY_CHOOSE_AVX2(function), HWY_CHOOSE_SSE4(function),                     \
+            HWY_CHOOSE_SSSE3(function), &HWY_STATIC_DISPATCH(function)                                       \
+    }

@@ -177,13 +177,12 @@ inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t 
 
 using Four = hn::CappedTag<float, 4>;
 
-/// One vertex, x, y and z in the lanes: the same operations in the same order. Whether that is the right way to add
-/// these bones.
+/// One vertex, x, y and z in the lanes: the same operations in the same order.
 ///
 /// rows  of the block, from this vertex's lane on
 /// to    the vertex's point
 template <bool kPlain>
-HWY_INLINE bool deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
+HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
                               const float* rows, Vec3<float>* to) {
     const Four four;
     using V4 = Vec<Four>;
@@ -191,9 +190,6 @@ HWY_INLINE bool deform_vertex(const Frame& frame, const std::int32_t* bones, std
     const V4 y = hn::Set(four, rows[kLanes]);
     const V4 z = hn::Set(four, rows[2 * kLanes]);
     const float* const weights = rows + 3 * kLanes;
-    const auto size_of = [&](std::size_t k) {
-        return frame.palette->sizes[static_cast<std::size_t>(bones[k])];
-    };
     const auto moved_by = [&](const V4* columns) HWY_ATTR {
         return hn::MulAdd(columns[0], x, hn::MulAdd(columns[1], y, hn::MulAdd(columns[2], z, columns[3])));
     };
@@ -204,10 +200,8 @@ HWY_INLINE bool deform_vertex(const Frame& frame, const std::int32_t* bones, std
     for (std::size_t c = 0; c < kLbsColumns; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
     const V4 by_first = moved_by(first);
     sum = kPlain ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
-    float least = size_of(0);
     for (std::size_t k = 1; k < count; ++k) {
         const float* const stored = columns_of_bone(frame, bones[k]);
-        least = std::min(least, size_of(k));
         V4 columns[kLbsColumns];
         for (std::size_t c = 0; c < kLbsColumns; ++c) {
             columns[c] = hn::Load(four, stored + 4 * c);
@@ -218,7 +212,6 @@ HWY_INLINE bool deform_vertex(const Frame& frame, const std::int32_t* bones, std
     alignas(16) float point[4];
     hn::Store(sum, four, point);
     std::memcpy(to, point, sizeof(Vec3<float>));
-    return kPlain == is_plain(size_of(0), least);
 }
 
 /// Apart, so that its registers are not those of every vertex.
@@ -234,8 +227,10 @@ inline void deform_mixed(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
         const float* const of_vertex = rows->lane.data() + lane;
         Vec3<float>* const to = &frame.points[frame.mesh->vertices[b].lane[lane]];
-        if (!deform_vertex<false>(frame, bones, block.influences, of_vertex, to)) {
+        if (is_plain(*frame.palette, bones, block.influences)) {
             deform_plain_vertex(frame, bones, block.influences, of_vertex, to);
+        } else {
+            deform_vertex<false>(frame, bones, block.influences, of_vertex, to);
         }
     }
 }

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What numpy makes an array of is taken as that array is; pickles give the same bits; what things look like printed."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+import sinew
+from rigs import random_rig
+from test_deformer import every_method
+
+RIG = random_rig(70, vertices=60, scaled=True)
+EXPECTED = RIG.deform("dq")
+
+
+class Arraylike:
+    """As tensors of other libraries are."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __array__(self, dtype=None, copy=None):
+        return self.array if dtype is None else self.array.astype(dtype)
+
+
+def strided(array):
+    """The same numbers, each axis the other way round and every second element of a larger array."""
+    large = np.zeros([2 * length for length in array.shape], array.dtype)
+    turned = large[tuple(slice(None, None, -2) for _ in array.shape)]
+    turned[...] = array
+    return turned
+
+
+FORMS = {
+    "lists": np.ndarray.tolist,
+    "tuples": lambda a: tuple(map(tuple, a.tolist())) if a.ndim == 2 else tuple(a.tolist()),
+    "wide": lambda a: a.astype(np.float64 if a.dtype.kind == "f" else np.int64),
+    "unsigned": lambda a: a if a.dtype.kind == "f" else a.astype(np.uint16),
+    "swapped bytes": lambda a: a.astype(a.dtype.newbyteorder()),
+    "strided": strided,
+    "fortran": np.asfortranarray,
+    "with __array__": Arraylike,
+    "memoryview": memoryview,
+    "subclass": lambda a: a.view(np.recarray),
+    "masked without masks": np.ma.asarray,
+}
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_every_form_of_the_same_numbers_gives_the_same_bits(form):
+    deformer = sinew.Deformer(*map(form, RIG.mesh), "dq", form(RIG.rest_bones))
+    np.testing.assert_array_equal(deformer.deform(form(RIG.transforms)), EXPECTED)
+    binding = sinew.Binding(*map(form, RIG.mesh), form(RIG.rest_bones))
+    np.testing.assert_array_equal(sinew.Deformer(binding, "dq").deform(form(RIG.transforms)), EXPECTED)
+    deformer.set_rest_points(form(RIG.rest_points))
+    space, inverses = RIG.transforms[0], np.linalg.inv(RIG.rest_bones.astype(np.float64))
+    np.testing.assert_array_equal(
+        deformer.deform(form(RIG.transforms), bones_from_model=form(space), rest_inverses=form(inverses)),
+        RIG.deform("dq", bones_from_model=space, rest_inverses=inverses),
+    )
+    shares = np.linspace(0, 1, 60, dtype=np.float32)
+    np.testing.assert_array_equal(
+        sinew.Deformer(binding, "lbs", mix=["dq", form(shares)]).deform(RIG.transforms),
+        sinew.Deformer(binding, "lbs", mix=("dq", shares)).deform(RIG.transforms),
+    )
+
+
+def test_halves_and_integers_are_numbers():
+    points = np.float16([[0, 1, 2], [0.5, 0.25, 8]])
+    for given in (points, points.astype(np.float32), points.tolist()):
+        deformer = sinew.Deformer(given, [0, 0, 1], [True], [3])
+        np.testing.assert_array_equal(deformer.deform(np.int8([np.eye(4)] * 2)), points)
+
+
+def test_a_mesh_without_influences_may_be_of_empty_lists():
+    deformer = sinew.Deformer([[1, 2, 3]], [0, 0], [], [])
+    np.testing.assert_array_equal(deformer.deform(np.zeros((0, 4, 4))), [[1, 2, 3]])
+
+
+@pytest.mark.parametrize(
+    ("dtypes", "promoted"),
+    [
+        (("f4", "f4"), "f4"),
+        (("f4", "f8"), "f8"),
+        (("f8", "f4"), "f8"),
+        (("f4", "f2"), "f4"),
+        (("i2", "f4"), "f4"),
+        (("i4", "f4"), "f8"),
+        (("i8", "i8"), "f8"),
+        (("?", "?"), "f4"),
+        (("f4", ">f8"), "f8"),
+        ((">f4", "f4"), "f4"),
+    ],
+)
+def test_arrays_are_promoted_as_numpy_does(dtypes, promoted):
+    a, b = (np.eye(4).astype(dtype) for dtype in dtypes)
+    result = sinew.affine.compose(a, b)
+    assert result.dtype == promoted
+    np.testing.assert_array_equal(result, np.eye(4))
+    if "?" not in dtypes:
+        assert np.result_type(np.float16, a, b) in (result.dtype, np.float16)
+
+
+def test_numbers_change_no_type():
+    axis = np.float32([0, 0, 1])
+    for angle in (1, 0.5, np.float64(0.5), np.int64(1), True):
+        assert sinew.affine.from_axis_angle(axis, angle).dtype == np.float32
+        assert sinew.affine.from_axis_angle(axis.tolist(), angle).dtype == np.float64
+    assert sinew.affine.from_axis_angle(axis, np.array(0.5)).dtype == np.float64
+    assert sinew.affine.from_axis_angle(axis, [0.5, 1]).shape == (2, 4, 4)
+
+
+def test_splines_and_skeletons_promote_all_of_a_call():
+    keys = np.tile(np.float32([1, 0, 0, 0, 0, 0, 0, 0]), (3, 1))
+    assert sinew.spline.catmull_rom(keys, np.float32([0, 1, 2]), 0.5).transforms.dtype == np.float32
+    assert sinew.spline.catmull_rom(keys, [0, 1, 2], 0.5).transforms.dtype == np.float64
+    assert sinew.interpolate.blend(keys, [1, 2, 3]).transforms.dtype == np.float64
+    skeleton = sinew.Skeleton([-1, 0, 1])
+    assert skeleton.root_relative(keys.tolist()).dtype == np.float64
+    assert skeleton.interpolate(keys, keys.astype(float), 0.5)[0].dtype == np.float64
+    assert skeleton.spline(keys[None], np.float32([0]), 0.5)[0].dtype == np.float32
+    assert skeleton.spline_vector(keys[None], [0], 0.5)[0].dtype == np.float64
+
+
+@pytest.mark.parametrize("threads", [0, 1, np.int8(2), np.uint64(3), True, np.array(2), 10**30])
+def test_threads_are_any_integer(threads):
+    np.testing.assert_array_equal(RIG.deform("dq", threads=threads), EXPECTED)
+
+
+# --- Pickles
+
+
+def again(value):
+    return pickle.loads(pickle.dumps(value))
+
+
+@every_method
+def test_pickles_give_the_same_bits(method):
+    # Of sets large and small, without influences, with weights of 0 and of any sum.
+    rig = random_rig(71, vertices=500, most_influences=4, scaled=True)
+    weights = rig.weights * np.float32(3.7)
+    weights[::7] = 0
+    bones = rig.bones % 3
+    for mesh in ((*rig.mesh[:2], bones, weights), (*rig.mesh[:3], weights)):
+        for rest_bones in (None, rig.rest_bones):
+            binding = sinew.Binding(*mesh, rest_bones)
+            deformer = sinew.Deformer(binding, method)
+            expected = deformer.deform(rig.transforms)
+            for other in (again(deformer), copy.copy(deformer), sinew.Deformer(again(binding), method)):
+                np.testing.assert_array_equal(other.deform(rig.transforms), expected)
+                assert repr(other) == repr(deformer)
+                assert other.bone_count == deformer.bone_count
+
+
+def test_pickles_keep_the_rest_points_of_now_and_the_mix():
+    binding = sinew.Binding(*RIG.mesh)
+    shares = np.linspace(-0.5, 1.5, 60, dtype=np.float32)
+    deformer = sinew.Deformer(binding, "lbs", mix=("log", shares))
+    deformer.set_rest_points(RIG.rest_points + np.float32(1))
+    other = again(deformer)
+    assert other.mixed_method == "log"
+    np.testing.assert_array_equal(other.deform(RIG.transforms), deformer.deform(RIG.transforms))
+    np.testing.assert_array_equal(
+        sinew.Deformer(again(binding)).deform(RIG.transforms), sinew.Deformer(binding).deform(RIG.transforms)
+    )
+
+
+def test_pickles_keep_bones_that_are_named_without_weight():
+    binding = sinew.Binding([[0, 0, 0], [1, 0, 0]], [0, 2, 2], [0, 9], [1, 0])
+    other = again(binding)
+    assert (
+        (other.bone_count, other.influence_count) == (binding.bone_count, binding.influence_count) == (10, 1)
+    )
+    nothing = again(sinew.Binding(np.zeros((0, 3)), [0], [], []))
+    assert (nothing.vertex_count, nothing.bone_count) == (0, 0)
+
+
+def test_skeletons_can_be_pickled():
+    skeleton = again(sinew.Skeleton([-1, 0, 0]))
+    bones = np.tile(np.eye(4), (3, 1, 1)) * 2
+    np.testing.assert_array_equal(
+        skeleton.root_relative(bones), sinew.Skeleton([-1, 0, 0]).root_relative(bones)
+    )
+
+
+@pytest.mark.parametrize(
+    ("of", "state", "message"),
+    [
+        (sinew.Binding, None, "state: expected a tuple of 5, as pickling makes it, got NoneType"),
+        (sinew.Binding, (1, 2), "state: expected a tuple of 5, as pickling makes it, got a tuple of 2"),
+        (sinew.Binding, (None,) * 5, r"rest_points: expected float32 \[n, 3\], got NoneType"),
+        (
+            sinew.Binding,
+            ([[0, 0, 0]], [0, 1], [0], [2.0], None),
+            "influence_weights: expected normalised ones",
+        ),
+        (sinew.Deformer, ((), "lbs", None), "state: expected a tuple of 5"),
+        (sinew.Deformer, (([[0, 0, 0]], [0, 0], [], [], None), "l", None), "method: expected one of"),
+        (sinew.Skeleton, (), "state: expected a tuple of 1"),
+    ],
+)
+def test_states_of_other_things_are_refused(of, state, message):
+    with pytest.raises(ValueError, match=message):
+        of.__new__(of).__setstate__(state)
+
+
+# --- How things look
+
+
+def test_what_things_look_like():
+    binding = sinew.Binding(*RIG.mesh)
+    counts = f"60 vertices, {binding.influence_count} influences, 15 bones>"
+    assert repr(binding) == f"<sinew.Binding: {counts}"
+    assert repr(sinew.Deformer(binding, "dq")) == f"<sinew.Deformer dq: {counts}"
+    mixed = sinew.Deformer(binding, "lbs", mix=("qv", np.zeros(60)))
+    assert repr(mixed) == f"<sinew.Deformer lbs mixed with qv: {counts}"
+    assert repr(sinew.Skeleton([-1, 0])) == "<sinew.Skeleton: 2 bones>"
