@@ -38,14 +38,14 @@ int main() {
         Scene scene = make_scene({kind, 10'000});
         const std::string of = std::string("/") + kKindNames[static_cast<int>(kind)];
         for (const MethodInfo& method : kMethods) {
-            const Deformer deformer(scene.data(), method);
+            const Deformer deformer(scene.data_for(method), method);
             count(std::string(method.name) + of, [&] { deformer.deform(scene.pose, {{}, 1}, scene.points); });
         }
         count("bind" + of, [&] { const Deformer deformer(scene.data(), Dq::info); });
     }
     Scene bones = make_scene({Kind::chain, 1000, 1000, 1});
     for (const MethodInfo& method : kMethods) {
-        const Deformer deformer(bones.data(), method);
+        const Deformer deformer(bones.data_for(method), method);
         count(std::string(method.name) + "/bones", [&] {
             deformer.deform(bones.pose, {{}, 1}, bones.points);
         });

@@ -21,7 +21,7 @@ struct Bound {
     std::map<int, Deformer> deformers;  // by the number of the method
 
     const Deformer& deformer(const MethodInfo& method) {
-        return deformers.try_emplace(method.number, scene.data(), method).first->second;
+        return deformers.try_emplace(method.number, scene.data_for(method), method).first->second;
     }
 };
 

@@ -40,8 +40,18 @@ struct Scene {
     std::vector<glm::quat> rotations;
     std::vector<glm::vec3> translations;
     std::vector<Vec3<float>> points;
+    std::vector<float> centres;  // [vertices][3] on the axis: what Cor keeps
+    std::vector<VertexData> vertex_data;
 
-    BindData data() const { return {plain.rest_points, offsets, bones, weights, {}}; }
+    BindData data() const { return {plain.rest_points, offsets, bones, weights}; }
+
+    /// With what the method keeps of each vertex.
+    BindData data_for(const MethodInfo& method) {
+        BindData bound = data();
+        vertex_data.assign(1, {method, centres});
+        if (method.vertex_floats > 0) bound.vertex_data = vertex_data;
+        return bound;
+    }
 
     /// of, share  [count]; the plain loops see the first four
     void add_vertex(const glm::vec3& rest, std::size_t count, const std::size_t* of, const float* share);

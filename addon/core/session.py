@@ -13,6 +13,7 @@ import sinew
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
+from .vertex_data import VertexData
 
 LINEAR = "lbs"
 
@@ -41,15 +42,23 @@ class Binding:
     """A mesh bound to bones. It computes only frames that differ from the last.
 
     mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for none of it
+    vertex_data  what methods keep of each vertex; None where none that does is used
     """
 
-    def __init__(self, weighting: Weighting, mix_weights: np.ndarray | None = None) -> None:
+    def __init__(
+        self,
+        weighting: Weighting,
+        mix_weights: np.ndarray | None = None,
+        vertex_data: VertexData | None = None,
+    ) -> None:
         self.weighting = weighting
         self.mix_weights = mix_weights
+        self.vertex_data = vertex_data
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # By purpose: the packed mesh and the deformer, each with the rest points that it was made from.
-        self._packed: dict[str, tuple[sinew.Binding, np.ndarray]] = {}
+        # By purpose, and by the methods that keep data of vertices: the packed mesh; by purpose the deformer; each
+        # with the rest points that it was made from.
+        self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
@@ -139,9 +148,11 @@ class Binding:
         """Deforms `rest_points` with the deformer of `purpose`, which is made again where it does not fit."""
         deformer, points = self._bound.get(purpose, (None, None))
         if deformer is None or (deformer.method, deformer.mixed_method or "") != (frame.method, frame.mix):
-            if purpose not in self._packed:
-                self._packed[purpose] = (self._pack(frame, rest_points), rest_points)
-            packed, points = self._packed[purpose]
+            data = self._vertex_data_of(frame)
+            key = (purpose, frozenset(data))
+            if key not in self._packed:
+                self._packed[key] = (self._pack(frame, rest_points, data), rest_points)
+            packed, points = self._packed[key]
             mix = (frame.mix, self.mix_weights) if frame.mix and self.mix_weights is not None else None
             deformer = sinew.Deformer(packed, frame.method, mix=mix)
         if points is not rest_points:
@@ -155,6 +166,15 @@ class Binding:
             rest_inverses=rest_inverses,
         )
 
+    def replace_vertex_data(self, vertex_data: VertexData) -> None:
+        """For a mesh of other points or triangles. Where the old data was used, the next frame is deformed anew."""
+        old, self.vertex_data = self.vertex_data, vertex_data
+        if old is None or not old.is_used:
+            return
+        self._packed.clear()
+        self._bound.clear()
+        self._last = None
+
     def _weights_changed(self, frame: Frame) -> bool:
         """Whether the influences differ from the last frame's: they can depend on the rest points."""
         last = self._last
@@ -164,7 +184,16 @@ class Binding:
             frame.bones_from_model, last.bones_from_model
         )
 
-    def _pack(self, frame: Frame, rest_points: np.ndarray) -> sinew.Binding:
+    def _vertex_data_of(self, frame: Frame) -> dict[str, np.ndarray]:
+        """By the name of the method."""
+        if self.vertex_data is None:
+            return {}
+        made = {name: self.vertex_data.of(name, frame.bones_from_model) for name in (frame.method, frame.mix)}
+        return {name: data for name, data in made.items() if data is not None}
+
+    def _pack(
+        self, frame: Frame, rest_points: np.ndarray, vertex_data: dict[str, np.ndarray]
+    ) -> sinew.Binding:
         points = frame.rest_points
         if self.weighting.depends_on_points:
             points = transformed(points, frame.bones_from_model)
@@ -175,6 +204,7 @@ class Binding:
             influences.bones,
             influences.weights,
             rest_bones=self.bones.rest_axes,
+            vertex_data=vertex_data,
         )
 
 

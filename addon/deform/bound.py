@@ -12,6 +12,7 @@ from ..attach import attach, properties
 from ..attach.modifier_options import ModifierOptions
 from ..core.rig import Bones, RigFacts
 from ..core.session import Binding, SkinStack, SkinStage
+from ..core.vertex_data import VertexData
 from ..io import armature_io
 from . import source, survey
 from .changes import Changes
@@ -57,20 +58,22 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     mix_group = properties.of(obj).mix.group
     if old is not None and old.mix_group == mix_group and _equals_but_for_points(old, read_now, bones):
+        if not read_now.has_same_surface(old.source):
+            for stage in old.skin_stack.skin_stages:
+                weighting = stage.binding.weighting
+                stage.binding.replace_vertex_data(VertexData(weighting, read_now.points, read_now.triangles))
         if np.array_equal(read_now.points, old.source.points):
             # The same array tells that nothing moved.
             read_now.points = old.source.points
         return replace(old, source=read_now)
     options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
     mix_weights = _mix_weights(obj, read_now, mix_group)
-    stages = [
-        SkinStage(
-            Binding(option.weighting(obj, read_now.weights, its_bones), mix_weights),
-            option.mask_weights(obj, read_now.weights),
-            option.multi,
-        )
-        for option, its_bones in zip(options, bones, strict=True)
-    ]
+    stages = []
+    for option, its_bones in zip(options, bones, strict=True):
+        weighting = option.weighting(obj, read_now.weights, its_bones)
+        vertex_data = VertexData(weighting, read_now.points, read_now.triangles)
+        binding = Binding(weighting, mix_weights, vertex_data)
+        stages.append(SkinStage(binding, option.mask_weights(obj, read_now.weights), option.multi))
     weighting = stages[0].binding.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]

@@ -21,6 +21,7 @@ class Source:
     """Read once, and again when it may be out of date.
 
     points            float32 [vertices, 3], object space, without shape keys
+    triangles         int32 [triangles, 3]
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  of those when changes were looked at last
@@ -29,6 +30,7 @@ class Source:
     group_names: list[str]
     weights: GroupWeights
     points: np.ndarray
+    triangles: np.ndarray
     shape_keys: ShapeKeys | None
     from_front: bool = False
     key_values: np.ndarray | None = None
@@ -47,6 +49,10 @@ class Source:
     def equals_but_for_points(self, other: Source) -> bool:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
+    def has_same_surface(self, other: Source) -> bool:
+        """Whether points and triangles are the same, as far as methods keep something that is made of them."""
+        return np.array_equal(self.points, other.points) and np.array_equal(self.triangles, other.triangles)
+
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
     """False as long as Blender has not evaluated what stands in front: it was just made, or Sinew was off and
@@ -62,10 +68,12 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
     if properties.of(obj).upstream_proxy is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
         points = mesh_io.read_points(mesh)
-        return Source(names, mesh_io.read_group_weights(mesh), points, None, from_front=True)
+        triangles = mesh_io.read_triangles(mesh)
+        return Source(names, mesh_io.read_group_weights(mesh), points, triangles, None, from_front=True)
     weights = mesh_io.read_group_weights(obj.data)
     points = mesh_io.read_points(obj.data)
-    return Source(names, weights, points, mesh_io.read_shape_keys(obj, weights))
+    triangles = mesh_io.read_triangles(obj.data)
+    return Source(names, weights, points, triangles, mesh_io.read_shape_keys(obj, weights))
 
 
 def has_changed(

@@ -41,10 +41,16 @@ def _read_key_points(block: bpy.types.ShapeKey) -> np.ndarray:
     return points
 
 
-def read_surface(mesh: bpy.types.Mesh) -> Surface:
+def read_triangles(mesh: bpy.types.Mesh) -> np.ndarray:
+    """int32 [triangles, 3]: their vertices."""
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return triangles
+
+
+def read_surface(mesh: bpy.types.Mesh) -> Surface:
+    triangles = read_triangles(mesh)
     edges = np.empty((len(mesh.edges), 2), dtype=np.int32)
     mesh.edges.foreach_get("vertices", edges.ravel())
     points = read_points(mesh)

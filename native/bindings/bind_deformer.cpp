@@ -52,41 +52,66 @@ struct BindArrays {
     py::array_t<std::int32_t> bones;
     py::array_t<float> weights;
     std::vector<Affine<float>> rest_bones;
+    std::vector<py::array_t<float>> vertex_arrays;
+    std::vector<VertexData> vertex_data;
 
     [[nodiscard]] BindData data() const {
-        return {as_points(points), as_span(offsets), as_span(bones), as_span(weights), rest_bones};
+        return {as_points(points), as_span(offsets), as_span(bones),
+                as_span(weights),  rest_bones,       vertex_data};
     }
 };
 
+/// From a dict of arrays by the names of methods.
+void add_vertex_data(const py::object& vertex_data, BindArrays& arrays) {
+    if (!py::isinstance<py::dict>(vertex_data)) {
+        fail("vertex_data", "None or a dict of arrays by names of methods", describe(vertex_data));
+    }
+    for (const auto& [name, values] : py::reinterpret_borrow<py::dict>(vertex_data)) {
+        const MethodInfo method = checked_method(py::reinterpret_borrow<py::object>(name), "vertex_data");
+        const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
+        const std::string wanted =
+            "of " + std::string(method.name) + " float32 [vertices, " + std::to_string(floats) + "]";
+        const auto array = checked<float>(values, "vertex_data", 2, wanted, kMaxVertices);
+        if (array.shape(1) != floats) fail("vertex_data", wanted, describe(values));
+        arrays.vertex_arrays.push_back(array);
+        arrays.vertex_data.push_back({method, as_span(arrays.vertex_arrays.back())});
+    }
+}
+
 BindArrays checked_arrays(const py::object& rest_points, const py::object& influence_offsets,
                           const py::object& influence_bones, const py::object& influence_weights,
-                          const py::object& rest_bones) {
+                          const py::object& rest_bones, const py::object& vertex_data) {
     BindArrays arrays{
         checked_points(rest_points, "rest_points"),
         checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]",
                               kMaxVertices + 1),
         checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences),
         checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences),
+        {},
+        {},
         {}};
     if (!rest_bones.is_none()) arrays.rest_bones = checked_affines(rest_bones, "rest_bones");
+    if (!vertex_data.is_none()) add_vertex_data(vertex_data, arrays);
     return arrays;
 }
 
 Binding make_binding(const py::object& rest_points, const py::object& influence_offsets,
                      const py::object& influence_bones, const py::object& influence_weights,
-                     const py::object& rest_bones) {
-    return Binding(
-        checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights, rest_bones)
-            .data());
+                     const py::object& rest_bones, const py::object& vertex_data) {
+    return Binding(checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights,
+                                  rest_bones, vertex_data)
+                       .data());
 }
 
 Deformer make_deformer(const py::object& rest_points, const py::object& influence_offsets,
                        const py::object& influence_bones, const py::object& influence_weights,
-                       const py::object& method, const py::object& rest_bones) {
+                       const py::object& method, const py::object& rest_bones,
+                       const py::object& vertex_data) {
     const MethodInfo row = checked_method(method, "method");
-    return Deformer(
-        checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights, rest_bones).data(),
-        row);
+    return Deformer(checked_arrays(rest_points, influence_offsets, influence_bones, influence_weights,
+                                   rest_bones, vertex_data)
+                        .data(),
+                    row);
 }
 
 /// The argument `mix`, and the array that MixData points at.
@@ -105,7 +130,10 @@ MixArguments checked_mix(const py::object& mix) {
     const char* const wanted = "None or (method, weights)";
     if (!py::isinstance<py::tuple>(mix) && !py::isinstance<py::list>(mix)) fail("mix", wanted, describe(mix));
     const py::tuple pair(mix);
-    if (pair.size() != 2) fail("mix", wanted, std::string(py::isinstance<py::tuple>(mix) ? "a tuple of " : "a list of ") + std::to_string(pair.size()));
+    if (pair.size() != 2)
+        fail("mix", wanted,
+             std::string(py::isinstance<py::tuple>(mix) ? "a tuple of " : "a list of ") +
+                 std::to_string(pair.size()));
     const MethodInfo second = checked_method(pair[0], "mix");
     return {second, checked<float>(pair[1], "mix", 1, "weights float32 [vertices]", kMaxVertices)};
 }
@@ -135,8 +163,18 @@ py::tuple state_of(const BoundMesh& mesh) {
         }
         rest_bones = output.take();
     }
+    py::object vertex_data = py::none();
+    if (!mesh.vertex_data.empty()) {
+        py::dict by_method;
+        for (const auto& [method, values] : mesh.vertex_data) {
+            const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
+            by_method[py::str(std::string(method.name))] =
+                array_of(values).reshape({static_cast<py::ssize_t>(mesh.rest_points.size()), floats});
+        }
+        vertex_data = by_method;
+    }
     return py::make_tuple(points, array_of(mesh.influence_offsets), array_of(mesh.influence_bones),
-                          array_of(mesh.influence_weights), rest_bones);
+                          array_of(mesh.influence_weights), rest_bones, vertex_data);
 }
 
 py::tuple state_of(const Deformer& deformer) {
@@ -157,8 +195,8 @@ py::object part_of(const py::object& state, std::size_t size, std::size_t index)
 }
 
 BindArrays arrays_of_state(const py::object& state) {
-    return checked_arrays(part_of(state, 5, 0), part_of(state, 5, 1), part_of(state, 5, 2), part_of(state, 5, 3),
-                          part_of(state, 5, 4));
+    return checked_arrays(part_of(state, 6, 0), part_of(state, 6, 1), part_of(state, 6, 2),
+                          part_of(state, 6, 3), part_of(state, 6, 4), part_of(state, 6, 5));
 }
 
 Binding binding_of_state(const py::object& state) {
@@ -305,29 +343,50 @@ void set_rest_points(Deformer& deformer, const py::object& rest_points) {
 void bind_deformer(py::module_& m) {
     py::class_<Binding>(m, "Binding",
                         "A mesh bound to bones: immutable, and shared by the deformers made of it.")
-        .def(py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
-             py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
-             "rest_points: float32 [vertices, 3], model space.\n"
-             "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
-             "influence_bones: int32 [influences].\n"
-             "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
-             "    At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.\n"
-             "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the "
-             "space\n"
-             "    of the bone transforms; read where a bone is scaled and the method is rigid. None: "
-             "identity.\n\n"
-             "Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is lost: "
-             "lists, float64,\nint64 whose numbers fit. All input is copied. Raises ValueError that names the "
-             "argument, what was wanted and\nwhat came. Can be pickled: what was bound, with weights "
-             "normalised.")
+        .def(
+            py::init(&make_binding), py::arg("rest_points"), py::arg("influence_offsets"),
+            py::arg("influence_bones"), py::arg("influence_weights"), py::arg("rest_bones") = py::none(),
+            py::arg("vertex_data") = py::none(),
+            "rest_points: float32 [vertices, 3], model space.\n"
+            "influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.\n"
+            "influence_bones: int32 [influences].\n"
+            "influence_weights: float32 [influences], >= 0, any sum (normalised inside).\n"
+            "    At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.\n"
+            "rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the "
+            "space\n"
+            "    of the bone transforms; read where a bone is scaled and the method is rigid, and by sbs. "
+            "None: "
+            "identity.
+            "
+            "vertex_data: a dict of what methods keep of each vertex, float32 [vertices, "
+            "Method.vertex_floats] by
+            "
+            "    the method's name: {\"cor\": sinew.centres_of_rotation(...)}. A method whose data is not here
+            "
+            "    does without: each vertex is its own centre under cor, which is linear blending.
+
+            "
+            "Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is "
+            "lost: "
+            "lists, float64,
+            int64 whose numbers fit.All input is copied
+                .Raises ValueError that names the
+            "
+            "argument, what was wanted and
+            what came.Can be pickled
+            : what was bound, with weights
+              "
+              "normalised.")
         .def_property_readonly("vertex_count", &Binding::vertex_count, "Vertices of the mesh.")
         .def_property_readonly("influence_count", &Binding::influence_count, "Influences of positive weight.")
         .def_property_readonly("bone_count", &Binding::bone_count,
                                "One more than the highest bone that an influence names.")
         .def("__repr__", [](const Binding& binding) { return "<sinew.Binding: " + counts_of(binding); })
-        .def(py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
+        .def(
+            py::pickle([](const Binding& binding) { return state_of(binding.unpack()); }, &binding_of_state));
 
-    py::class_<Deformer>(m, "Deformer", "A binding and a method, ready to deform at any pose.\n\n"
+    py::class_<Deformer>(m, "Deformer",
+                         "A binding and a method, ready to deform at any pose.\n\n"
                          "Can be pickled, with the rest points that it has then and a binding of its own.")
         .def(py::init(&make_deformer_of), py::arg("binding"), py::arg("method") = "lbs",
              py::arg("mix") = py::none(),
@@ -339,7 +398,7 @@ void bind_deformer(py::module_& m) {
              "`mix`.")
         .def(py::init(&make_deformer), py::arg("rest_points"), py::arg("influence_offsets"),
              py::arg("influence_bones"), py::arg("influence_weights"), py::arg("method") = "lbs",
-             py::arg("rest_bones") = py::none(),
+             py::arg("rest_bones") = py::none(), py::arg("vertex_data") = py::none(),
              "With a binding of its own, of the arguments that Binding has.")
         .def_property_readonly(
             "method", [](const Deformer& deformer) { return std::string(deformer.method().name); },

@@ -101,7 +101,8 @@ py::object spline(const py::object& any_keys, const py::object& any_times, const
     });
 }
 
-py::object spline_of_vectors(const py::object& any_keys, const py::object& any_times, const py::object& any_at) {
+py::object spline_of_vectors(const py::object& any_keys, const py::object& any_times,
+                             const py::object& any_at) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
     return with_representation(keys, "keys", "keys", [&]<class Row>(Row) {
         return with_element(keys, "keys", "", [&]<class T>(T) {

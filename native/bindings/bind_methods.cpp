@@ -39,8 +39,15 @@ py::tuple tuple_of(const Range& range) {
 }
 
 py::tuple names_of(Needs needs) {
-    if (needs == Needs::nothing) return py::tuple();
-    return py::make_tuple("rest_bones");
+    py::list names;
+    const auto add = [&](Needs of, const char* name) {
+        if (has(needs, of)) names.append(name);
+    };
+    add(Needs::rest_bones, "rest_bones");
+    add(Needs::vertex_data, "vertex_data");
+    add(Needs::topology, "topology");
+    add(Needs::precomputation, "precomputation");
+    return py::tuple(names);
 }
 
 /// A property that is the text of this field.
@@ -97,8 +104,14 @@ void bind_methods(py::module_& m) {
             "Number that .blend files store; never changes.")
         .def_property_readonly(
             "needs", [](const MethodInfo& row) { return names_of(row.needs); },
-            "What it takes besides points, influences and bone transforms: \"rest_bones\" where bones are "
-            "scaled.");
+            "What it takes besides points, influences and bone transforms: \"rest_bones\", their axes where "
+            "bones\n"
+            "are scaled; \"vertex_data\", numbers of each vertex that Binding takes; \"topology\", triangles "
+            "that\n"
+            "these are made from; \"precomputation\", a function that makes them.")
+        .def_property_readonly(
+            "vertex_floats", [](const MethodInfo& row) { return row.vertex_floats; },
+            "How many numbers its vertex data has for each vertex; 0: it has none.");
 
     py::class_<StageInfo> stage(m, "Stage", "The facts of a stage: what may follow a method.");
     def_facts(stage, "Stage");

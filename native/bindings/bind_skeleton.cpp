@@ -119,11 +119,12 @@ py::object spline_vector_form(const Skeleton& skeleton, const py::object& any_ke
 }  // namespace
 
 void bind_skeleton(py::module_& m) {
-    py::class_<Skeleton>(m, "Skeleton",
-                         "A hierarchy of bones; parents come before their children.\n\n"
-                         "Its methods take each bone relative to its parent, in any representation, layouts as in "
-                         "sinew.affine,\nsinew.quat_vec and sinew.dual_quat, and promote arrays as these do. "
-                         "They raise ValueError that names\nthe argument, what was wanted and what came.")
+    py::class_<Skeleton>(
+        m, "Skeleton",
+        "A hierarchy of bones; parents come before their children.\n\n"
+        "Its methods take each bone relative to its parent, in any representation, layouts as in "
+        "sinew.affine,\nsinew.quat_vec and sinew.dual_quat, and promote arrays as these do. "
+        "They raise ValueError that names\nthe argument, what was wanted and what came.")
         .def(py::init(&make_skeleton), py::arg("parents"),
              "parents: int32 [bones], the index of each bone's parent, -1 for a root.\n\n"
              "Raises ValueError where a parent does not come before its child.")
@@ -135,10 +136,13 @@ void bind_skeleton(py::module_& m) {
         .def(py::pickle(
             [](const Skeleton& skeleton) {
                 const auto parents = skeleton.parents();
-                return py::make_tuple(py::array_t<std::int32_t>(static_cast<py::ssize_t>(parents.size()), parents.data()));
+                return py::make_tuple(
+                    py::array_t<std::int32_t>(static_cast<py::ssize_t>(parents.size()), parents.data()));
             },
             [](const py::tuple& state) {
-                if (state.size() != 1) fail("state", "a tuple of 1, as pickling makes it", "a tuple of " + std::to_string(state.size()));
+                if (state.size() != 1)
+                    fail("state", "a tuple of 1, as pickling makes it",
+                         "a tuple of " + std::to_string(state.size()));
                 return make_skeleton(state[0]);
             }))
         .def("root_relative", &relative_to_root, py::arg("transforms"),

@@ -47,7 +47,8 @@ bool is_double(const py::handle& value, const char* argument, const std::string&
 void promote(std::span<py::object> values, std::span<const char* const> arguments);
 
 template <std::size_t N>
-std::array<py::object, N> promoted(const std::array<const char*, N>& arguments, std::array<py::object, N> values) {
+std::array<py::object, N> promoted(const std::array<const char*, N>& arguments,
+                                   std::array<py::object, N> values) {
     promote(values, arguments);
     return values;
 }

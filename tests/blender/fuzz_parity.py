@@ -364,11 +364,11 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
     shapes = []
     for points in (rest_points, rest_points + moved):
-        links = [
-            core_session.SkinStage(core_session.Binding(k.binding.weighting), k.mask, k.multi)
-            for k in skinned.bound.skin_stack.skin_stages
-        ]
-        chain = core_session.SkinStack(links)
+        stages = []
+        for known in skinned.bound.skin_stack.skin_stages:
+            binding = core_session.Binding(known.binding.weighting, vertex_data=known.binding.vertex_data)
+            stages.append(core_session.SkinStage(binding, known.mask, known.multi))
+        chain = core_session.SkinStack(stages)
         chain.deform(points.astype(np.float32), skinned.shown.frames)
         shapes.append(chain.points)
     return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent

@@ -130,7 +130,7 @@ TEST_P(Deform, bones_from_model_goes_there_and_back) {
     const Affine<float> bones_from_model = cast<float>(rotation * scaling<double>({2.0, 0.5, -1.5}));
     const auto points = deformed(Deformer(scene.data(), method()), scene, {bones_from_model, 0});
     Scene other = scene;
-    for (Vec3<float>& point : other.rest_points) point = transform_point(bones_from_model, point);
+    other.transform(bones_from_model);
     const auto moved = deformed(Deformer(other.data(), method()), other);
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         const Vec3<float> expected = transform_point(inverse(bones_from_model), moved[vertex]);

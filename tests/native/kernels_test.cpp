@@ -271,7 +271,7 @@ TEST_P(Kernels, bones_from_model_goes_there_and_back) {
     const Affine<float> bones_from_model{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
     const auto points = deformed(Deformer(scene.data(), method()), scene, {bones_from_model, 0});
     Scene other = scene;
-    for (Vec3<float>& point : other.rest_points) point = transform_point(bones_from_model, point);
+    other.transform(bones_from_model);
     const auto moved = in_double(method(), other);
     const Affine<double> back = inverse(cast<double>(bones_from_model));
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {

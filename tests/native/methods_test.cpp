@@ -30,6 +30,10 @@ TEST(Methods, stored_numbers_stay) {
     EXPECT_EQ(find_method("lbs")->number, 1);
     EXPECT_EQ(find_method("qv")->number, 2);
     EXPECT_EQ(find_method("dq")->number, 3);
+    EXPECT_EQ(find_method("log")->number, 4);
+    EXPECT_EQ(find_method("cor")->number, 5);
+    EXPECT_EQ(find_method("sbs")->number, 6);
+    EXPECT_EQ(find_method("dib")->number, 7);
 }
 
 TEST(Methods, every_field_says_something) {
@@ -39,6 +43,7 @@ TEST(Methods, every_field_says_something) {
         EXPECT_FALSE(method.label.empty()) << method.name;
         EXPECT_FALSE(method.description.empty()) << method.name;
         EXPECT_FALSE(method.source.empty()) << method.name;
+        EXPECT_EQ(method.vertex_floats > 0, has(method.needs, Needs::vertex_data)) << method.name;
     }
 }
 

@@ -23,16 +23,47 @@ struct Scene {
     std::vector<Affine<float>> rest_bones;
     std::vector<Affine<float>> posed_from_rest;
 
-    BindData data() const { return {rest_points, offsets, bones, weights, rest_bones}; }
+    std::vector<float>
+        vertex_numbers;  // [vertices][kVertexNumbers] any points: what methods keep of a vertex
+
+    static constexpr std::size_t kVertexNumbers = 3;
+
+    BindData data() const {
+        vertex_data_.clear();
+        for (const MethodInfo& method : kMethods) {
+            if (method.vertex_floats > 0) vertex_data_.push_back({method, vertex_numbers});
+        }
+        return {rest_points, offsets, bones, weights, rest_bones, vertex_data_};
+    }
+
+    template <class T>
+    std::vector<T> numbers_of(std::size_t vertex) const {
+        const auto first = vertex_numbers.begin() + static_cast<std::ptrdiff_t>(kVertexNumbers * vertex);
+        return {first, first + kVertexNumbers};
+    }
 
     void add_vertex(const Vec3<float>& rest, const std::vector<Influence<float>>& influences) {
         rest_points.push_back(rest);
+        vertex_numbers.insert(vertex_numbers.end(), {0.5f * rest.y, 0.5f * rest.z, 0.5f * rest.x});
         for (const Influence<float>& influence : influences) {
             bones.push_back(influence.bone);
             weights.push_back(influence.weight);
         }
         offsets.push_back(static_cast<std::int32_t>(bones.size()));
     }
+
+    /// Takes the mesh to another space.
+    void transform(const Affine<float>& by) {
+        for (std::size_t vertex = 0; vertex < rest_points.size(); ++vertex) {
+            rest_points[vertex] = transform_point(by, rest_points[vertex]);
+            float* const at = &vertex_numbers[kVertexNumbers * vertex];
+            const Vec3<float> point = transform_point(by, Vec3<float>(at[0], at[1], at[2]));
+            for (int i = 0; i < 3; ++i) at[i] = point[i];
+        }
+    }
+
+private:
+    mutable std::vector<VertexData> vertex_data_;
 };
 
 /// Bones 2, 5, ... are stretched along their own axes, every second of those mirrored; 1 to 8 influences.
@@ -85,8 +116,13 @@ std::vector<Vec3<T>> by_skinning(const Scene& scene) {
             influences.push_back(
                 {scene.bones[i], static_cast<T>(static_cast<double>(scene.weights[i]) / sum)});
         }
-        points.push_back(
-            Method::template deform_vertex<T>(palette, influences, Vec3<T>(scene.rest_points[vertex])));
+        const Vec3<T> rest(scene.rest_points[vertex]);
+        if constexpr (Method::info.vertex_floats > 0) {
+            const std::vector<T> numbers = scene.numbers_of<T>(vertex);
+            points.push_back(Method::template deform_vertex<T>(palette, influences, rest, numbers));
+        } else {
+            points.push_back(Method::template deform_vertex<T>(palette, influences, rest));
+        }
     }
     return points;
 }

@@ -52,10 +52,16 @@ Bones<Method> prepared(const Rig& rig) {
     return bones;
 }
 
+/// centre  where the method keeps one of the vertex
 template <class Method>
 Vec3<double> skinned(const Bones<Method>& bones, const std::vector<Influence<double>>& influences,
-                     const Vec3<double>& rest) {
-    return Method::template deform_vertex<double>(bones, influences, rest);
+                     const Vec3<double>& rest, const Vec3<double>& centre = Vec3<double>(0.0)) {
+    if constexpr (Method::info.vertex_floats > 0) {
+        const double numbers[] = {centre.x, centre.y, centre.z};
+        return Method::template deform_vertex<double>(bones, influences, rest, numbers);
+    } else {
+        return Method::template deform_vertex<double>(bones, influences, rest);
+    }
 }
 
 template <class Method>
@@ -174,7 +180,8 @@ double change_by_space(const Rig& rig, const Affine<double>& other_from_space,
     for (Affine<double>& bone : moved.posed_from_rest) bone = other_from_space * bone * space_from_other;
     for (Affine<double>& bone : moved.rest_bones) bone = other_from_space * bone;
     const Vec3<double> in_other_space =
-        skinned<Method>(prepared<Method>(moved), influences, transform_point(other_from_space, rest));
+        skinned<Method>(prepared<Method>(moved), influences, transform_point(other_from_space, rest),
+                        other_from_space.translation);
     return distance(transform_point(space_from_other, in_other_space),
                     skinned<Method>(prepared<Method>(rig), influences, rest));
 }
@@ -263,7 +270,7 @@ struct RigidOf<std::tuple<>, Rigid...> {
 };
 template <class Method, class... Others, class... Rigid>
 struct RigidOf<std::tuple<Method, Others...>, Rigid...>
-    : std::conditional_t<Method::info.needs == Needs::rest_bones,
+    : std::conditional_t<has(Method::info.needs, Needs::rest_bones),
                          RigidOf<std::tuple<Others...>, Rigid..., Method>,
                          RigidOf<std::tuple<Others...>, Rigid...>> {};
 
@@ -402,6 +409,139 @@ TEST(Log, jumps_where_a_bone_passes_180_degrees) {
     EXPECT_LT(distance(at(179.999, 0.5), {0, 0, 1}), 1e-4);
     EXPECT_LT(distance(at(180.001, 0.5), {0, 0, -1}), 1e-4);
     EXPECT_LT(distance(at(179.999, 1.0), at(180.001, 1.0)), 1e-4);
+}
+
+/// Bones that rotate any way about one point each, which two neighbours share.
+Rig chain(std::uint32_t seed) {
+    Random random(seed);
+    Rig rig;
+    Affine<double> motion = to_affine(random.motion(2.0));
+    for (int bone = 0; bone < 6; ++bone) {
+        const Vec3<double> joint = random.vector(2.0);
+        const Quat<double> turn = about<double>(random.vector(1.0), random.uniform(-170.0, 170.0));
+        if (bone > 0) motion = motion * Affine<double>{to_mat3(turn), joint - rotate(turn, joint)};
+        rig.posed_from_rest.push_back(motion);
+        rig.rest_bones.push_back({to_mat3(random.rotation()), joint});
+    }
+    return rig;
+}
+
+TEST(Sbs, is_dq_for_two_bones_that_share_a_joint) {
+    Random random(30);
+    for (std::uint32_t seed = 0; seed < 50; ++seed) {
+        const Rig rig = chain(seed);
+        for (std::int32_t bone = 0; bone < 5; ++bone) {
+            const double weight = random.uniform(0.0, 1.0);
+            const std::vector<Influence<double>> influences{{bone, weight}, {bone + 1, 1.0 - weight}};
+            const Vec3<double> rest = random.vector(3.0);
+            EXPECT_LT(distance(skinned<Sbs>(prepared<Sbs>(rig), influences, rest),
+                               skinned<Dq>(prepared<Dq>(rig), influences, rest)),
+                      1e-11);
+        }
+    }
+}
+
+TEST(Sbs, the_joint_of_three_bones_is_their_centre) {
+    Random random(31);
+    const Vec3<double> joint(0.5, -1.0, 2.0);
+    const Vec3<double> moved(3.0, 2.0, 1.0);
+    Bones<Sbs> bones;
+    for (int bone = 0; bone < 3; ++bone) {
+        const Quat<double> q = random.rotation();
+        bones.push_back(Sbs::prepare(Affine<double>{to_mat3(q), moved - rotate(q, joint)},
+                                     Affine<double>{Mat3<double>(1.0), random.vector(5.0)}));
+    }
+    const auto centre = Sbs::rotation_centre(3, [&](std::size_t i) { return bones[i]; });
+    EXPECT_LT(distance(centre, joint), 1e-12);
+}
+
+TEST(Sbs, bones_that_rotate_alike_have_the_mean_of_their_heads) {
+    const Quat<double> q = about<double>({1, 2, 3}, 50.0);
+    Bones<Sbs> bones;
+    for (const double along : {1.0, 2.0, 6.0}) {
+        bones.push_back(Sbs::prepare(Affine<double>{to_mat3(q), {along, 0, 7}},
+                                     Affine<double>{Mat3<double>(1.0), {along, 0, 0}}));
+    }
+    for (const std::size_t count : {2, 3}) {
+        const auto centre = Sbs::rotation_centre(count, [&](std::size_t i) { return bones[i]; });
+        EXPECT_LT(distance(centre, {count == 2 ? 1.5 : 3.0, 0, 0}), 1e-15);
+    }
+}
+
+// About one axis: the centre is free along it, and stays as near to the heads as can be.
+TEST(Sbs, hinges_keep_the_free_direction) {
+    for (const std::size_t count : {2, 3, 4}) {
+        Bones<Sbs> bones;
+        for (std::size_t i = 0; i < count; ++i) {
+            const Quat<double> q = about<double>({0, 0, 1}, 35.0 * static_cast<double>(i));
+            const Vec3<double> joint(1, 2, 0);
+            bones.push_back(Sbs::prepare(Affine<double>{to_mat3(q), joint - rotate(q, joint)},
+                                         Affine<double>{Mat3<double>(1.0), {0, 0, 4}}));
+        }
+        const auto centre = Sbs::rotation_centre(count, [&](std::size_t i) { return bones[i]; });
+        EXPECT_LT(distance(centre, {1, 2, 4}), 1e-13) << count;
+    }
+}
+
+TEST(Cor, about_any_centre_rotates_as_the_blend) {
+    Random random(32);
+    const Rig rig = rigid_rig(33);
+    const Bones<Cor> bones = prepared<Cor>(rig);
+    for (int i = 0; i < 20; ++i) {
+        const auto influences = random.influences<double>(4, 6);
+        const Vec3<double> centre = random.vector(2.0);
+        const Vec3<double> rest = random.vector(2.0);
+        // The centre moves linearly, and distances from it stay.
+        const Vec3<double> moved = skinned<Cor>(bones, influences, centre, centre);
+        EXPECT_LT(distance(moved, skinned<Lbs>(prepared<Lbs>(rig), influences, centre)), 1e-14);
+        EXPECT_NEAR(distance(skinned<Cor>(bones, influences, rest, centre), moved), distance(rest, centre),
+                    1e-14);
+    }
+}
+
+TEST(Cor, without_a_centre_is_linear_blending) {
+    const Rig rig = rigid_rig(34);
+    const std::vector<Influence<double>> influences{{0, 0.3}, {1, 0.5}, {4, 0.2}};
+    const Bones<Cor> bones = prepared<Cor>(rig);
+    const Vec3<double> rest(1, -2, 0.5);
+    EXPECT_LT(distance(Cor::deform_vertex<double>(bones, influences, rest),
+                       skinned<Lbs>(prepared<Lbs>(rig), influences, rest)),
+              1e-14);
+}
+
+TEST(Dib, is_where_the_logarithms_cancel) {
+    Random random(35);
+    for (std::uint32_t seed = 0; seed < 40; ++seed) {
+        const Rig rig = rigid_rig(seed);
+        const Bones<Dib> bones = prepared<Dib>(rig);
+        const auto influences = random.influences<double>(6, 6);
+        // The motion, of what it does to four points.
+        const Vec3<double> origin = skinned<Dib>(bones, influences, {0, 0, 0});
+        Affine<double> blend{Mat3<double>(0.0), origin};
+        for (int axis = 0; axis < 3; ++axis) {
+            Vec3<double> unit(0.0);
+            unit[axis] = 1.0;
+            blend.linear[axis] = skinned<Dib>(bones, influences, unit) - origin;
+        }
+        EXPECT_LT(test::rotation_error(blend.linear), 1e-13);
+        Twist<double> sum;
+        for (const auto& [bone, weight] : influences) {
+            const Affine<double> difference =
+                inverse(blend) * rig.posed_from_rest[static_cast<std::size_t>(bone)];
+            sum = sum + weight * to_twist(to_quat_vec(difference));
+        }
+        EXPECT_LT(glm::length(sum.angular) + glm::length(sum.linear), 1e-6) << seed;
+    }
+}
+
+TEST(Dib, spreads_a_twist_of_two_bones_evenly) {
+    const Rig rig{{{}, {to_mat3(about<double>({1, 0, 0}, 170.0)), {0, 0, 0}}},
+                  std::vector<Affine<double>>(2)};
+    for (const double weight : {0.1, 0.3, 0.5, 0.9}) {
+        const Vec3<double> result =
+            skinned<Dib>(prepared<Dib>(rig), {{0, 1.0 - weight}, {1, weight}}, {2.0, 1.0, 0.0});
+        EXPECT_LT(distance(result, rotate(about<double>({1, 0, 0}, 170.0 * weight), {2.0, 1.0, 0.0})), 1e-13);
+    }
 }
 
 TEST(Heaviest, is_the_first_of_equals) {

@@ -2,14 +2,16 @@
 """Skinning in float64 numpy and matrix form, from the papers: the oracle of the library.
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
-Collins, Zara, O'Sullivan 2008, algorithm 1 (dq) and Alexa 2002 (log); slow, one vertex at a time, and does
-not use the formulas of the library where others exist. Quaternions are (w, x, y, z).
+Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor) and Kavan,
+Zara 2005 (sbs); slow, one vertex at a time, and does not use the formulas of the library where others exist.
+Quaternions are (w, x, y, z).
 """
 
 import functools
 
 import numpy as np
 import scipy.linalg
+from scipy.spatial.transform import Rotation
 
 
 def nearest_rotation(matrix):
@@ -146,11 +148,105 @@ def log(point, motions, rotations, weights):
     return (scipy.linalg.expm(total) @ np.append(point, 1.0))[:3], margin
 
 
-METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "log": log}
+def rigid_parts(motions, rotations, heads):
+    """The translations of the bones' rigid motions: with its rotation each takes the bone's head where the whole bone
+    takes it."""
+    return np.array(
+        [(m @ np.append(h, 1.0))[:3] - r @ h for m, r, h in zip(motions, rotations, heads, strict=True)]
+    )
 
 
-def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=None):
+def blended_rotation(rotations, weights):
+    """The 3x3 rotation of the sum of quaternions, and the margin."""
+    quaternions = np.array([quaternion(r) for r in rotations])
+    signs, margin = in_one_hemisphere(quaternions, weights)
+    blended = (signs * weights) @ quaternions
+    return rotation(blended / np.linalg.norm(blended)), margin
+
+
+def about(centre, point, motions, rotations, weights, heads):
+    """Rotated by the blend about `centre`, which the rigid motions' weighted mean moves; then what bones scale."""
+    translations = rigid_parts(motions, rotations, heads)
+    rotated, margin = blended_rotation(rotations, weights)
+    scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - translations
+    return rotated @ (point - centre) + weights @ (rotations @ centre + translations + scaled), margin
+
+
+def cor(point, motions, rotations, weights, heads, centre=None):
+    return about(point if centre is None else centre, point, motions, rotations, weights, heads)
+
+
+# Rotations of a set that differ by less along a direction leave its centre free there.
+SAME_ROTATION = 1e-3
+
+
+def sbs(point, motions, rotations, weights, heads):
+    """The centre by the singular values of the equations of all pairs; the tie is also where one is left out."""
+    translations = rigid_parts(motions, rotations, heads)
+    start, count, margin = heads.mean(axis=0), len(rotations), 1.0
+    centre = start
+    if count > 1:
+        first, second = np.triu_indices(count, 1)
+        equations = (rotations[first] - rotations[second]).reshape(-1, 3)
+        wanted = (translations[second] - translations[first]).ravel()
+        u, sizes, vt = np.linalg.svd(equations, full_matrices=False)
+        least = SAME_ROTATION * count
+        kept = sizes > least
+        inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
+        centre = start + vt.T @ (inverse * (u.T @ (wanted - equations @ start)))
+        margin = np.abs(sizes / least - 1.0).min()
+    result, of_signs = about(centre, point, motions, rotations, weights, heads)
+    return result, min(margin, of_signs)
+
+
+def logarithms(rotations, translations):
+    """Of rigid motions [n]: rotation vectors, by scipy, and what the exponential's integral over unit time takes to the
+    translations."""
+    vectors = Rotation.from_matrix(rotations).as_rotvec()
+    return vectors, np.linalg.solve(integral(vectors), translations[..., None])[..., 0]
+
+
+def integral(vectors):
+    """The 3x3 matrices by which the exponentials of rotation vectors [n] and linear parts make translations."""
+    x, y, z = vectors.T
+    k = np.zeros((len(vectors), 3, 3))
+    k[:, 0, 1], k[:, 0, 2], k[:, 1, 2] = -z, y, -x
+    k -= k.transpose(0, 2, 1)
+    angle = np.maximum(np.linalg.norm(vectors, axis=1), 1e-4)[:, None, None]
+    return np.eye(3) + (1.0 - np.cos(angle)) / angle**2 * k + (angle - np.sin(angle)) / angle**3 * (k @ k)
+
+
+def dib(point, motions, rotations, weights):
+    """Iterated to the end. The ties are at 180 degrees from the result, and where the iteration is slow."""
+    quaternions, shifts = rigid_terms(point, motions, rotations)
+    duals = np.array(
+        [0.5 * left_multiplication([0.0, *t]) @ q for q, t in zip(quaternions, shifts, strict=True)]
+    )
+    signs, margin = in_one_hemisphere(quaternions, weights)
+    real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals
+    length = np.linalg.norm(real)
+    rotated, translated = rotation(real / length), translation(real / length, dual / length)
+    for step in range(200):
+        angular, linear = logarithms(rotated.T @ rotations, (shifts - translated) @ rotated)
+        vector, along = weights @ angular, weights @ linear
+        translated = translated + rotated @ (integral(vector[None])[0] @ along)
+        rotated = rotated @ Rotation.from_rotvec(vector).as_matrix()
+        margin = min(margin, np.pi - np.linalg.norm(angular, axis=1).max())
+        if max(np.abs(vector).max(), np.abs(along).max() / max(1.0, np.abs(linear).max())) < 1e-9:
+            break
+    return rotated @ point + translated, margin if step < 40 else 0.0
+
+
+METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "cor": cor, "sbs": sbs, "log": log, "dib": dib}
+# Those that also read where bones are at rest, and those that keep something of each vertex.
+WITH_HEADS = {"cor", "sbs"}
+WITH_VERTEX_DATA = {"cor"}
+
+
+def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=None, vertex_data=None):
     """Deformed points float64 [vertices, 3], and [vertices] how far each is from a tie of signs.
+
+    vertex_data  as sinew.Binding takes it
 
     A vertex without influences, or with all weights zero, stays.
     """
@@ -166,7 +262,10 @@ def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=
         share = np.asarray(weights[span], np.float64)
         if share.sum() > 0.0:
             of = bones[span]
+            more = [rest_bones[of, :3, 3]] if method in WITH_HEADS else []
+            if method in WITH_VERTEX_DATA and vertex_data is not None:
+                more.append(vertex_data[method][vertex].astype(np.float64))
             points[vertex], margins[vertex] = METHODS[method](
-                points[vertex], transforms[of], rotations[of], share / share.sum()
+                points[vertex], transforms[of], rotations[of], share / share.sum(), *more
             )
     return points, margins

@@ -4,6 +4,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import reference
 import sinew
 from reference import rotation
 
@@ -46,13 +47,24 @@ class Rig:
     weights: np.ndarray
     transforms: np.ndarray
     rest_bones: np.ndarray
+    centres: np.ndarray  # any point for each vertex, which cor rotates it about
 
     @property
     def mesh(self):
         return self.rest_points, self.offsets, self.bones, self.weights
 
+    @property
+    def vertex_data(self):
+        return {"cor": self.centres.copy()}
+
+    def binding(self):
+        return sinew.Binding(*self.mesh, self.rest_bones, self.vertex_data)
+
     def deformer(self, method):
-        return sinew.Deformer(*self.mesh, method, self.rest_bones)
+        return sinew.Deformer(*self.mesh, method, self.rest_bones, self.vertex_data)
+
+    def reference(self, method):
+        return reference.deform(method, *self.mesh, self.transforms, self.rest_bones, self.vertex_data)
 
     def deform(self, method, **options):
         return self.deformer(method).deform(self.transforms, **options)
@@ -85,4 +97,5 @@ def random_rig(seed, vertices=200, bones=15, extent=1.0, most_influences=12, sca
         weights=rng.uniform(0.05, 1.0, counts.sum()).astype(np.float32),
         transforms=transforms.astype(np.float32),
         rest_bones=rest_bones.astype(np.float32),
+        centres=rng.uniform(-extent, extent, (vertices, 3)).astype(np.float32),
     )

@@ -25,7 +25,7 @@ every_method = pytest.mark.parametrize("method", METHODS)
 
 
 def assert_agrees(method, rig, extent, tolerance=TOLERANCE):
-    expected, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
+    expected, margins = rig.reference(method)
     sure = margins > NO_TIE
     assert sure.mean() > 0.95
     errors = np.linalg.norm(rig.deform(method) - expected, axis=1)[sure] / extent
@@ -39,12 +39,21 @@ def test_methods_have_a_reference():
 def test_methods_say_what_they_are():
     rows = sinew.methods()
     assert len({row.number for row in rows}) == len({row.name for row in rows}) == len(rows)
-    assert {row.name: row.number for row in rows}.items() >= {"lbs": 1, "qv": 2, "dq": 3, "log": 4}.items()
+    assert {row.name: row.number for row in rows}.items() >= {
+        "lbs": 1,
+        "qv": 2,
+        "dq": 3,
+        "log": 4,
+        "cor": 5,
+        "sbs": 6,
+        "dib": 7,
+    }.items()
     for row in rows:
         assert row.label
         assert row.description
         assert row.source
-        assert set(row.needs) <= {"rest_bones"}
+        assert set(row.needs) <= {"rest_bones", "vertex_data", "topology", "precomputation"}
+        assert (row.vertex_floats > 0) == ("vertex_data" in row.needs)
         assert row.name in repr(row)
         assert parameters_are_whole(row.parameters)
 
@@ -116,6 +125,7 @@ def test_agrees_with_the_reference_with_sheared_bones(method):
 def test_agrees_with_the_reference_with_identity_rest_bones(method):
     rig = random_rig(22, scaled=True)
     expected, margins = reference.deform(method, *rig.mesh, rig.transforms)
+    # Nor with what methods keep of vertices: cor then rotates each vertex about itself.
     points = sinew.Deformer(*rig.mesh, method).deform(rig.transforms)
     np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=TOLERANCE)
 
@@ -153,7 +163,7 @@ def test_rigid_motion_after_the_pose_commutes(method, scaled):
         pytest.skip("the logarithm of a product is no sum of logarithms: rotations are measured from rest")
     rig = random_rig(26, scaled=scaled)
     motion = random_motion(np.random.default_rng(27), 2.0)
-    _, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
+    _, margins = rig.reference(method)
     moved = rig.with_motions(motion @ rig.transforms.astype(np.float64)).deform(method)
     expected = transform(motion, rig.deform(method).astype(np.float64))
     np.testing.assert_allclose(moved[margins > NO_TIE], expected[margins > NO_TIE], atol=4 * TOLERANCE)
@@ -217,12 +227,13 @@ def test_log_is_finite_for_whatever_is_finite(size):
 def change_by_space(method, rig, other_from_space):
     """The largest distance by which points differ when rest points, rest bones and motions are given in
     another space and the result is taken back."""
-    _, margins = reference.deform(method, *rig.mesh, rig.transforms, rig.rest_bones)
+    _, margins = rig.reference(method)
     back = np.linalg.inv(other_from_space)
     other = rig.with_motions(
         other_from_space @ rig.transforms.astype(np.float64) @ back,
         rest_points=transform(other_from_space, rig.rest_points.astype(np.float64)).astype(np.float32),
         rest_bones=(other_from_space @ rig.rest_bones.astype(np.float64)).astype(np.float32),
+        centres=transform(other_from_space, rig.centres.astype(np.float64)).astype(np.float32),
     )
     points = transform(back, other.deform(method).astype(np.float64))
     return np.linalg.norm(points - rig.deform(method), axis=1)[margins > NO_TIE].max()
@@ -313,6 +324,7 @@ def test_twists_keep_the_distance_from_their_axis(method):
         np.column_stack([1 - weights, weights]).ravel(),
         np.array([np.eye(4), about((1, 0, 0), 170)], np.float32),
         np.tile(np.eye(4, dtype=np.float32), (2, 1, 1)),
+        np.tile(np.float32([2, 0, 0]), (9, 1)),
     )
     points = rig.deform(method)
     np.testing.assert_allclose(np.hypot(points[:, 1], points[:, 2]), 1.0, atol=1e-6)
@@ -361,7 +373,9 @@ def test_set_rest_points_equals_a_new_deformer(method):
 def test_input_is_copied(method):
     rig = random_rig(37, scaled=True)
     arrays = [array.copy() for array in (*rig.mesh, rig.rest_bones)]
-    deformer = sinew.Deformer(*arrays[:4], method, arrays[4])
+    data = rig.vertex_data
+    deformer = sinew.Deformer(*arrays[:4], method, arrays[4], data)
+    data["cor"][...] = 0
     for array in arrays:
         array[...] = 0
     np.testing.assert_array_equal(deformer.deform(rig.transforms), rig.deform(method))
@@ -373,9 +387,10 @@ def test_bones_from_model_equals_doing_it_by_hand(method):
     bones_from_model = random_motion(np.random.default_rng(39), 2.0) @ np.diag([2.0, 0.5, -1.5, 1.0])
     points = rig.deform(method, bones_from_model=bones_from_model.astype(np.float32))
     other = rig.with_(
-        rest_points=transform(bones_from_model, rig.rest_points.astype(np.float64)).astype(np.float32)
+        rest_points=transform(bones_from_model, rig.rest_points.astype(np.float64)).astype(np.float32),
+        centres=transform(bones_from_model, rig.centres.astype(np.float64)).astype(np.float32),
     )
-    _, margins = reference.deform(method, *other.mesh, other.transforms, other.rest_bones)
+    _, margins = other.reference(method)
     expected = transform(np.linalg.inv(bones_from_model), other.deform(method).astype(np.float64))
     np.testing.assert_allclose(points[margins > NO_TIE], expected[margins > NO_TIE], atol=10 * TOLERANCE)
 
@@ -427,7 +442,7 @@ def test_out_may_be_a_part_of_a_larger_array(method):
 def test_out_may_be_the_array_of_rest_points(method):
     rig = random_rig(43)
     points = rig.rest_points.copy()
-    deformer = sinew.Deformer(points, *rig.mesh[1:], method)
+    deformer = sinew.Deformer(points, *rig.mesh[1:], method, vertex_data=rig.vertex_data)
     expected = deformer.deform(rig.transforms)
     for _ in range(2):
         np.testing.assert_array_equal(deformer.deform(rig.transforms, out=points), expected)
@@ -436,7 +451,7 @@ def test_out_may_be_the_array_of_rest_points(method):
 @every_method
 def test_bone_transforms_may_have_three_rows(method):
     rig = random_rig(44, scaled=True)
-    deformer = sinew.Deformer(*rig.mesh, method, rig.rest_bones[:, :3])
+    deformer = sinew.Deformer(*rig.mesh, method, rig.rest_bones[:, :3], rig.vertex_data)
     np.testing.assert_array_equal(deformer.deform(rig.transforms[:, :3]), rig.deform(method))
 
 
@@ -469,7 +484,7 @@ def test_layout_of_the_input_means_nothing(method):
     assert not motions.flags.c_contiguous
     every_second = [np.repeat(array, 2, axis=0)[::2] for array in rig.mesh]
     assert not any(array.flags.c_contiguous for array in every_second)
-    deformer = sinew.Deformer(*every_second, method, rest_bones)
+    deformer = sinew.Deformer(*every_second, method, rest_bones, rig.vertex_data)
     np.testing.assert_array_equal(deformer.deform(motions), expected)
     deformer.set_rest_points(np.asfortranarray(rig.rest_points))
     np.testing.assert_array_equal(deformer.deform(np.asfortranarray(rig.transforms)), expected)
@@ -573,7 +588,7 @@ def test_deforms_in_a_forked_child():
 @pytest.mark.parametrize("other", METHODS)
 def test_mix_is_each_vertex_share_of_two_methods(method, other):
     rig = random_rig(70, vertices=600, most_influences=3, scaled=True)
-    binding = sinew.Binding(*rig.mesh, rig.rest_bones)
+    binding = rig.binding()
     shares = np.clip(np.linspace(-0.5, 1.5, 600, dtype=np.float32), 0.0, 1.0)
     deformer = sinew.Deformer(binding, method, mix=(other, shares))
     assert (deformer.method, deformer.mixed_method) == (method, other)
@@ -588,7 +603,7 @@ def test_mix_is_each_vertex_share_of_two_methods(method, other):
 @every_method
 def test_deformers_share_a_binding(method):
     rig = random_rig(71, scaled=True)
-    binding = sinew.Binding(*rig.mesh, rig.rest_bones)
+    binding = rig.binding()
     counts = (binding.vertex_count, binding.influence_count, binding.bone_count)
     deformer, other = (sinew.Deformer(binding, method) for _ in range(2))
     assert counts == (deformer.vertex_count, deformer.influence_count, deformer.bone_count)
@@ -605,7 +620,7 @@ def test_deformers_share_a_binding(method):
 
 def test_mix_in_another_space_goes_there_and_back():
     rig = random_rig(72, scaled=True)
-    binding = sinew.Binding(*rig.mesh, rig.rest_bones)
+    binding = rig.binding()
     space = random_motion(np.random.default_rng(73), 2.0).astype(np.float32)
     shares = np.random.default_rng(74).uniform(0, 1, 200).astype(np.float32)
     a, b = (
@@ -651,7 +666,12 @@ def unaligned(array):
 @every_method
 def test_unaligned_input_is_copied(method):
     rig = random_rig(51, scaled=True)
-    deformer = sinew.Deformer(*(unaligned(array) for array in rig.mesh), method, unaligned(rig.rest_bones))
+    deformer = sinew.Deformer(
+        *(unaligned(array) for array in rig.mesh),
+        method,
+        unaligned(rig.rest_bones),
+        {"cor": unaligned(rig.centres)},
+    )
     np.testing.assert_array_equal(deformer.deform(unaligned(rig.transforms)), rig.deform(method))
     deformer.set_rest_points(unaligned(rig.rest_points))
     inverses = np.tile(np.eye(4), (len(rig.transforms), 1, 1))

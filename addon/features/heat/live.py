@@ -119,9 +119,10 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         shown = skinned.shown
         if mesh is None or shown.frames is None or len(mesh.vertices) != len(shown.rest_points):
             return None
+        known = [(stage, stage.binding) for stage in skinned.bound.skin_stack.skin_stages]
         stages = [
-            SkinStage(Binding(stage.binding.weighting, stage.binding.mix_weights), stage.mask, stage.multi)
-            for stage in skinned.bound.skin_stack.skin_stages
+            SkinStage(Binding(b.weighting, b.mix_weights, b.vertex_data), stage.mask, stage.multi)
+            for stage, b in known
         ]
         parts.append(Part(obj, skinned, skinned.bound, mesh_io.read_surface(mesh), SkinStack(stages)))
     if not parts:

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any, Literal, final, overload
 
@@ -28,10 +29,10 @@ class Parameter:
         """One sentence."""
     @property
     def unit(self) -> str:
-        """"", "length", "angle" (radians) or "factor"."""
+        """ "", "length", "angle" (radians) or "factor"."""
     @property
     def kind(self) -> Literal["float", "int", "bool", "enum", "vertex_group", "method"]:
-        """"float", "int", "bool", "enum" (one of `choices`), "vertex_group" (a weight for each vertex)
+        """ "float", "int", "bool", "enum" (one of `choices`), "vertex_group" (a weight for each vertex)
         or "method" (the name of a method)."""
     @property
     def default(self) -> float | int | bool | str | None:
@@ -69,6 +70,9 @@ class Method:
     def needs(self) -> tuple[str, ...]:
         """What it takes besides points, influences and bone transforms: "rest_bones" where bones are scaled."""
     @property
+    def vertex_floats(self) -> int:
+        """How many numbers it keeps of each vertex: an argument `vertex_data` of Binding."""
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its settings, one Parameter each."""
 
@@ -101,6 +105,30 @@ def stages() -> tuple[Stage, ...]:
 def keep_thread_state() -> None:
     """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and that
     calls it often, is 50 to 100 us a call faster. Safe to call again, and on any thread."""
+
+def centres_of_rotation(
+    rest_points: ArrayLike,
+    influence_offsets: ArrayLike,
+    influence_bones: ArrayLike,
+    influence_weights: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    exact: bool = False,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> NDArray[np.float32] | None:
+    """What the method "cor" keeps of each vertex: its optimised centre of rotation, float32 [vertices, 3],
+    model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest points.
+
+    rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.
+    triangles: int32 [triangles, 3], vertices.
+    exact: by the definition itself, slowly; else triangles of like weights are added up.
+    threads: how many at most; None: as many as help. The result is the same bit for bit.
+    progress: None, or a callable that is called on this thread with the share that is done, 0 to 1.
+        Where it returns False the work ends, and the result is None. What it raises comes through.
+
+    Precomputations of other methods take `threads` and `progress` alike. The GIL is released.
+    """
 
 @final
 class Skeleton:
@@ -163,6 +191,7 @@ class Binding:
         influence_bones: ArrayLike,
         influence_weights: ArrayLike,
         rest_bones: ArrayLike | None = None,
+        vertex_data: dict[str, ArrayLike] | None = None,
     ) -> None:
         """rest_points: float32 [vertices, 3], model space.
         influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
@@ -170,13 +199,15 @@ class Binding:
         influence_weights: float32 [influences], >= 0, any sum (normalised inside).
             At most 2^31 - 1 vertices and influences, 65,536 influences a vertex, 1,048,576 bones.
         rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], orthonormal, Y along the bone, in the space
-            of the bone transforms; read where a bone is scaled and the method is rigid. None: identity.
+            of the bone transforms; read where a bone is scaled and the method is rigid, and by sbs. None:
+            identity.
+        vertex_data: a dict of what methods keep of each vertex, float32 [vertices, Method.vertex_floats] by
+            the method's name: {"cor": sinew.centres_of_rotation(...)}. A method whose data is not here
+            does without: each vertex is its own centre under cor, which is linear blending.
 
         Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is lost:
-        lists, float64,
-        int64 whose numbers fit. All input is copied. Raises ValueError that names the argument, what was
-        wanted and
-        what came. Can be pickled: what was bound, with weights normalised.
+        lists, float64, int64 whose numbers fit. All input is copied. Raises ValueError that names the
+        argument, what was wanted and what came. Can be pickled: what was bound, with weights normalised.
         """
     @property
     def vertex_count(self) -> int:
@@ -215,6 +246,7 @@ class Deformer:
         influence_weights: ArrayLike,
         method: str = "lbs",
         rest_bones: ArrayLike | None = None,
+        vertex_data: dict[str, ArrayLike] | None = None,
     ) -> None:
         """With a binding of its own, of the arguments that Binding has."""
     @property

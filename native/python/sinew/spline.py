@@ -24,9 +24,7 @@ from .interpolate import Method
 __all__ = ["Blended", "catmull_rom", "catmull_rom_vector"]
 
 
-def catmull_rom(
-    keys: ArrayLike, times: ArrayLike, at: ArrayLike, method: Method = "dlb"
-) -> Blended[Any]:
+def catmull_rom(keys: ArrayLike, times: ArrayLike, at: ArrayLike, method: Method = "dlb") -> Blended[Any]:
     """Blend form: the keys blended by `method` with the weights of the spline (Smith 2013, section 3.2.2).
 
     Rigid for every method but matrix_linear. keys: in the layout of the method.

@@ -18,41 +18,44 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Numbers of a bone's row: two Float4.
+/// Numbers of a bone's row, unless its method has more: two Float4.
 inline constexpr std::size_t kRow = 8;
 
+/// The most that a method has.
+inline constexpr std::size_t kMaxRow = 16;
+
 /// The weighted sum of rows.
-template <class D>
+template <class D, std::size_t kNumbers = kRow>
 struct Sum {
-    Vec<D> value[kRow];
+    Vec<D> value[kNumbers];
 };
 
-template <class D>
+template <class D, std::size_t kNumbers>
 HWY_INLINE void add_row(D d, Vec<D> weight, const float* row, std::size_t begin, std::size_t end,
-                        Sum<D>& sum) {
+                        Sum<D, kNumbers>& sum) {
     for (std::size_t i = begin; i < end; ++i) {
         sum.value[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.value[i]);
     }
 }
 
 /// A weighted sum, and that of the quaternions alone so far: the next is added in its hemisphere.
-template <class D>
+template <class D, std::size_t kNumbers>
 struct Blend {
-    Sum<D> sum;
+    Sum<D, kNumbers> sum;
     Vec<D> quaternion[4];
 };
 
 /// The base that rows are added without where they are added plainly.
-inline constexpr float kNoBase[kRow] = {};
+inline constexpr float kNoBase[kMaxRow] = {};
 
 /// plain  whether the first row is added by its weight
-template <class D>
-HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight, bool plain) {
-    Blend<D> blend;
-    for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Set(d, row[i]);
+template <std::size_t kNumbers, class D>
+HWY_INLINE Blend<D, kNumbers> begin_blend(D d, const float* row, Vec<D> weight, bool plain) {
+    Blend<D, kNumbers> blend;
+    for (std::size_t i = 0; i < kNumbers; ++i) blend.sum.value[i] = hn::Set(d, row[i]);
     for (std::size_t i = 0; i < 4; ++i) blend.quaternion[i] = hn::Mul(weight, hn::Set(d, row[i]));
     if (plain) {
-        for (std::size_t i = 0; i < kRow; ++i) blend.sum.value[i] = hn::Mul(weight, hn::Set(d, row[i]));
+        for (std::size_t i = 0; i < kNumbers; ++i) blend.sum.value[i] = hn::Mul(weight, hn::Set(d, row[i]));
     }
     return blend;
 }
@@ -63,14 +66,15 @@ HWY_INLINE Blend<D> begin_blend(D d, const float* row, Vec<D> weight, bool plain
 /// Products and sums of the dot product are rounded one by one, in the order of the mixed kernel: both
 /// must decide a tie alike.
 template <class Rigid, class D>
-HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight, Blend<D>& blend) {
+HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> weight,
+                               Blend<D, Rigid::kNumbers>& blend) {
     Vec<D>* const quaternion = blend.quaternion;
     const Vec<D> dot = hn::Add(
         hn::Add(hn::Mul(hn::Set(d, row[0]), quaternion[0]), hn::Mul(hn::Set(d, row[2]), quaternion[2])),
         hn::Add(hn::Mul(hn::Set(d, row[1]), quaternion[1]), hn::Mul(hn::Set(d, row[3]), quaternion[3])));
     const auto away = hn::Lt(dot, hn::Zero(d));
     const Vec<D> signed_weight = hn::IfThenElse(away, hn::Neg(weight), weight);
-    for (std::size_t i = 0; i < kRow; ++i) {
+    for (std::size_t i = 0; i < Rigid::kNumbers; ++i) {
         const Vec<D> difference = hn::Set(d, row[i] - base[i]);
         const Vec<D> negated = hn::Set(d, -row[i] - base[i]);
         const Vec<D> by =
@@ -82,8 +86,9 @@ HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> 
     return signed_weight;
 }
 
+template <std::size_t kNumbers = kRow>
 HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
-    return palette.bones[kRow / 4 * static_cast<std::size_t>(bone)].value.data();
+    return palette.bones[kNumbers / 4 * static_cast<std::size_t>(bone)].value.data();
 }
 
 /// What the scale of `bone` adds to `rest`, or false where it has none.

@@ -109,11 +109,12 @@ void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<fl
     for (std::size_t i = 0; i < used.size(); i += kMax) {
         const auto bones = used.subspan(i, std::min(kMax, used.size() - i));
         const Motions motions = load_motions(posed_from_rest, bones);
-        BoneVec row[kRow];
+        constexpr std::size_t kNumbers = Rigid::kNumbers;
+        BoneVec row[kNumbers];
         Rigid::write_row(rotations(motions), motions.translation, row);
-        alignas(64) double numbers[kRow][kMax];
+        alignas(64) double numbers[kNumbers][kMax];
         alignas(64) double rigid[kMax];
-        for (std::size_t k = 0; k < kRow; ++k) hn::Store(row[k], d, numbers[k]);
+        for (std::size_t k = 0; k < kNumbers; ++k) hn::Store(row[k], d, numbers[k]);
         const BoneVec sizes =
             hn::Max(dot(motions.translation, motions.translation), hn::Set(d, kMinSize * kMinSize));
         const hn::Rebind<float, BoneTag> floats;
@@ -123,8 +124,8 @@ void prepare_rigid(std::span<const std::int32_t> used, std::span<const Affine<fl
             if (rigid[lane] == 0.0) {
                 palette.scaled[palette.scaled_count++] = static_cast<std::int32_t>(i + lane);
             }
-            float* const to = palette.bones[kRow / 4 * (i + lane)].value.data();
-            for (std::size_t k = 0; k < kRow; ++k) to[k] = static_cast<float>(numbers[k][lane]);
+            float* const to = palette.bones[kNumbers / 4 * (i + lane)].value.data();
+            for (std::size_t k = 0; k < kNumbers; ++k) to[k] = static_cast<float>(numbers[k][lane]);
         }
     }
 }

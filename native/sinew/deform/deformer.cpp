@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "sinew/deform/bone_sets.h"
+#include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/kernels.h"
 #include "sinew/deform/mixed_blocks.h"
 #include "sinew/deform/packed_mesh.h"
@@ -26,101 +28,6 @@ constexpr std::size_t kVerticesWorthAThread = 32768;
 // nothing.
 constexpr std::size_t kBlocksOfAChunk = 256;
 
-// How far from 1 the sum of normalised weights may be, each of which was rounded.
-constexpr double kNormalised = 1e-5;
-
-[[noreturn]] void fail(const std::string& argument, const std::string& wanted, const std::string& got) {
-    throw std::invalid_argument(argument + ": expected " + wanted + ", got " + got);
-}
-
-template <class T>
-bool is_finite(const Vec3<T>& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-void check_points(std::span<const Vec3<float>> points) {
-    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        if (!is_finite(points[vertex])) {
-            fail("rest_points", "finite values", "NaN or infinity at vertex " + std::to_string(vertex));
-        }
-    }
-}
-
-void check_limit(const std::string& argument, const std::string& of, std::size_t limit, std::size_t got) {
-    if (got > limit) fail(argument, "at most " + std::to_string(limit) + " " + of, std::to_string(got));
-}
-
-/// bone_count  one more than the highest bone that an influence names
-void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bone_count) {
-    if (!rest_bones.empty() && rest_bones.size() < bone_count) {
-        fail("rest_bones", "at least " + std::to_string(bone_count) + " bones",
-             std::to_string(rest_bones.size()));
-    }
-    for (std::size_t bone = 0; bone < rest_bones.size(); ++bone) {
-        const auto& [linear, translation] = rest_bones[bone];
-        if (!is_finite(linear[0]) || !is_finite(linear[1]) || !is_finite(linear[2]) ||
-            !is_finite(translation)) {
-            fail("rest_bones", "finite values", "NaN or infinity at bone " + std::to_string(bone));
-        }
-    }
-}
-
-void check(const BindData& data) {
-    const std::size_t vertex_count = data.rest_points.size();
-    const std::size_t influence_count = data.influence_bones.size();
-    check_limit("rest_points", "vertices", kMaxVertices, vertex_count);
-    check_limit("influence_bones", "influences", kMaxInfluences, influence_count);
-    check_points(data.rest_points);
-    if (data.influence_weights.size() != influence_count) {
-        fail("influence_weights",
-             "one for each of the " + std::to_string(influence_count) + " influence_bones",
-             std::to_string(data.influence_weights.size()));
-    }
-    if (data.influence_offsets.size() != vertex_count + 1) {
-        fail("influence_offsets", std::to_string(vertex_count + 1) + " values (vertices + 1)",
-             std::to_string(data.influence_offsets.size()));
-    }
-    if (data.influence_offsets.front() != 0) {
-        fail("influence_offsets", "0 at the start", std::to_string(data.influence_offsets.front()));
-    }
-    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
-        if (data.influence_offsets[vertex + 1] < data.influence_offsets[vertex]) {
-            fail("influence_offsets", "values that never fall",
-                 std::to_string(data.influence_offsets[vertex + 1]) + " after " +
-                     std::to_string(data.influence_offsets[vertex]) + " at vertex " + std::to_string(vertex));
-        }
-    }
-    if (static_cast<std::size_t>(data.influence_offsets.back()) != influence_count) {
-        fail("influence_offsets", std::to_string(influence_count) + " at the end (the number of influences)",
-             std::to_string(data.influence_offsets.back()));
-    }
-    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
-        const auto count =
-            static_cast<std::size_t>(data.influence_offsets[vertex + 1] - data.influence_offsets[vertex]);
-        if (count > kMaxVertexInfluences) {
-            fail("influence_offsets",
-                 "at most " + std::to_string(kMaxVertexInfluences) + " influences a vertex",
-                 std::to_string(count) + " at vertex " + std::to_string(vertex));
-        }
-    }
-    for (std::size_t i = 0; i < influence_count; ++i) {
-        const std::int32_t bone = data.influence_bones[i];
-        if (bone < 0) {
-            fail("influence_bones", "indices of bones, 0 or more",
-                 std::to_string(bone) + " at influence " + std::to_string(i));
-        }
-        if (static_cast<std::size_t>(bone) >= kMaxBones) {
-            fail("influence_bones", "indices of bones below " + std::to_string(kMaxBones),
-                 std::to_string(bone) + " at influence " + std::to_string(i));
-        }
-        const float weight = data.influence_weights[i];
-        if (!std::isfinite(weight) || weight < 0.0f) {
-            fail("influence_weights", "finite values, 0 or more",
-                 std::to_string(weight) + " at influence " + std::to_string(i));
-        }
-    }
-}
-
 /// The kernel of each method, in the order of the list.
 const Kernel& kernel_at(std::size_t method) noexcept {
     static const auto kernels =
@@ -134,6 +41,25 @@ std::size_t checked_method(const std::string& argument, const MethodInfo& method
     std::string names;
     for (const MethodInfo& known : kMethods) names += (names.empty() ? "" : ", ") + std::string(known.name);
     fail(argument, "one of " + names, "a method of number " + std::to_string(method.number));
+}
+
+/// The index of the method.
+std::size_t checked_vertex_data(const VertexData& data, std::size_t vertex_count) {
+    const std::size_t index = checked_method("vertex_data", data.method);
+    const std::string name(kMethods[index].name);
+    const std::size_t floats = kMethods[index].vertex_floats;
+    if (floats == 0) fail("vertex_data", "that of methods that need it", "that of " + name);
+    if (data.values.size() != vertex_count * floats) {
+        fail("vertex_data", std::to_string(vertex_count * floats) + " numbers of " + name,
+             std::to_string(data.values.size()));
+    }
+    for (std::size_t i = 0; i < data.values.size(); ++i) {
+        if (!std::isfinite(data.values[i])) {
+            fail("vertex_data", "finite values",
+                 "NaN or infinity of " + name + " at vertex " + std::to_string(i / floats));
+        }
+    }
+    return index;
 }
 
 MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, std::size_t vertex_count) {
@@ -160,6 +86,7 @@ struct Binding::Packed {
     PackedMesh mesh;
     std::vector<Affine<float>> rest_bones;      // of mesh.used_bones; or empty: all identity
     std::vector<std::int32_t> stretched_bones;  // of mesh.used_bones, those whose axes are not of unit length
+    std::array<std::vector<Lanes<float>>, kMethodCount> vertex_rows;  // of each method; empty: none
     std::size_t vertex_count;
     std::size_t influence_count;
     std::size_t bone_count = 0;
@@ -173,30 +100,13 @@ Binding::Packed::Packed(const BindData& data) {
     }
     check_rest_bones(data.rest_bones, bone_count);
 
-    std::vector<std::uint32_t> offsets{0};
-    std::vector<Influence<float>> influences;
-    offsets.reserve(vertex_count + 1);
-    influences.reserve(data.influence_bones.size());
-    for (std::size_t vertex = 0; vertex < vertex_count; ++vertex) {
-        const auto begin = static_cast<std::size_t>(data.influence_offsets[vertex]);
-        const auto end = static_cast<std::size_t>(data.influence_offsets[vertex + 1]);
-        double sum = 0.0;
-        for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(data.influence_weights[i]);
-        if (data.is_normalised && sum != 0.0 && !(std::abs(sum - 1.0) < kNormalised)) {
-            fail("influence_weights", "normalised ones, of sum 1",
-                 "sum " + std::to_string(sum) + " at vertex " + std::to_string(vertex));
-        }
-        for (std::size_t i = begin; i < end; ++i) {
-            const float weight = data.influence_weights[i];
-            if (weight > 0.0f) {
-                const double share = static_cast<double>(weight) / (data.is_normalised ? 1.0 : sum);
-                influences.push_back({data.influence_bones[i], static_cast<float>(share)});
-            }
-        }
-        offsets.push_back(static_cast<std::uint32_t>(influences.size()));
+    const NormalisedInfluences normalised = normalised_influences(data);
+    influence_count = normalised.influences.size();
+    mesh = pack(data.rest_points, normalised.offsets, normalised.influences);
+    for (const VertexData& of_method : data.vertex_data) {
+        const std::size_t method = checked_vertex_data(of_method, vertex_count);
+        vertex_rows[method] = pack_values(mesh, of_method.values, of_method.method.vertex_floats);
     }
-    influence_count = influences.size();
-    mesh = pack(data.rest_points, offsets, influences);
 
     if (data.rest_bones.empty()) return;
     for (const std::int32_t bone : mesh.used_bones) {
@@ -210,18 +120,24 @@ Binding::Packed::Packed(const BindData& data) {
 
 BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
     const UnpackedMesh unpacked = sinew::unpack(mesh, rows, vertex_count);
-    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}};
+    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}, {}};
     bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
     for (const auto& [bone, weight] : unpacked.influences) {
         bound.influence_bones.push_back(bone);
         bound.influence_weights.push_back(weight);
     }
-    const std::size_t named = mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
+    const std::size_t named =
+        mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
     if (named < bone_count) {
         // Named without weight, and dropped: of the last vertex, which takes it without weight.
         bound.influence_bones.push_back(static_cast<std::int32_t>(bone_count) - 1);
         bound.influence_weights.push_back(0.0f);
         ++bound.influence_offsets.back();
+    }
+    for (std::size_t i = 0; i < kMethodCount; ++i) {
+        if (vertex_rows[i].empty()) continue;
+        bound.vertex_data.push_back(
+            {kMethods[i], unpack_values(mesh, vertex_rows[i], vertex_count, kMethods[i].vertex_floats)});
     }
     if (rest_bones.empty()) return bound;
     bound.rest_bones.resize(bone_count);
@@ -254,12 +170,24 @@ struct Deformer::State {
         return std::span(kernels).first(mix ? 2 : 1);
     }
 
+    [[nodiscard]] std::span<const Lanes<float>> rows() const {
+        return own_rows.empty() ? std::span(packed->mesh.rows) : std::span(own_rows);
+    }
+
     std::shared_ptr<const Binding::Packed> packed;
     std::vector<Lanes<float>> own_rows;  // empty: those of the binding
     std::array<std::size_t, 2> methods;  // indices in the list; the second is that of the mix
     std::array<const Kernel*, 2> kernels;
     std::optional<MixWeights> mix;
+    BoneSets sets;  // none unless a kernel wants them
     PaletteStore palettes;
+
+private:
+    [[nodiscard]] BoneSets wanted_sets() const {
+        const auto wants = [](const Kernel* kernel) { return kernel->set_bone_size > 0; };
+        return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh, rows())
+                                                            : BoneSets{};
+    }
 };
 
 Deformer::State::State(std::shared_ptr<const Binding::Packed> from, std::vector<Lanes<float>> rows,
@@ -270,7 +198,8 @@ Deformer::State::State(std::shared_ptr<const Binding::Packed> from, std::vector<
       kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
       mix(with ? std::optional(checked_mix(packed->mesh, with->weights, packed->vertex_count))
                : std::nullopt),
-      palettes(kernels_in_use(), packed->mesh.used_bones.size()) {}
+      sets(wanted_sets()),
+      palettes(kernels_in_use(), packed->mesh.used_bones.size(), sets.bones.size()) {}
 
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
     : state_(std::make_unique<State>(binding.packed_, std::vector<Lanes<float>>{}, method, mix)) {}
@@ -317,10 +246,8 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
     const Binding::Packed& packed = *state_->packed;
     if (points.size() != packed.vertex_count) return;
     const PaletteStore::Reading reading(state_->palettes);
-    const Bones bones{packed.mesh.used_bones, packed.stretched_bones, posed_from_rest, packed.rest_bones,
-                      options.bones_from_model};
-    const Lanes<float>* const rows =
-        state_->own_rows.empty() ? packed.mesh.rows.data() : state_->own_rows.data();
+    const Bones bones{packed.mesh.used_bones, packed.stretched_bones,   posed_from_rest,
+                      packed.rest_bones,      options.bones_from_model, &state_->sets};
     const bool same_space = is_identity(options.bones_from_model);
     std::array<Float4, kDisplacementRows> bones_from_model;
     std::array<Float4, kDisplacementRows> model_from_bones;
@@ -337,10 +264,18 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         const Kernel& kernel = *state_->kernels[k];
         Palette& palette = reading.palette(k);
         prepare(kernel, bones, palette);
-        find_plain(packed.mesh.pairs, packed.mesh.used_bones.size(), palette);
+        if (kernel.set_bone_size > 0) {
+            // The pairs are those of bones, not of rows: each set is tested.
+            std::fill_n(palette.may_be_plain, state_->sets.bones.size(), std::uint8_t{1});
+        } else {
+            find_plain(packed.mesh.pairs, packed.mesh.used_bones.size(), palette);
+        }
         const bool changes_space = kernel.is_rigid && !same_space;
+        const std::vector<Lanes<float>>& vertex_rows = packed.vertex_rows[state_->methods[k]];
         work.frames[k] = {&packed.mesh,
-                          rows,
+                          state_->rows().data(),
+                          vertex_rows.empty() ? nullptr : vertex_rows.data(),
+                          kernel.set_bone_size > 0 ? state_->sets.entries.data() : packed.mesh.bones.data(),
                           &palette,
                           changes_space ? bones_from_model.data() : nullptr,
                           changes_space ? model_from_bones.data() : nullptr,

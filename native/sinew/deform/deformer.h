@@ -21,6 +21,13 @@ inline constexpr std::size_t kMaxVertexInfluences = std::size_t{1} << 16;
 inline constexpr std::size_t kMaxBones = std::size_t{1}
                                          << 20;  // an influence names one of 0 to kMaxBones - 1
 
+/// What a method keeps of each vertex, as the function that makes it gives it: of Cor, centres_of_rotation(). It
+/// belongs to the rest points that it was made from, and stays as it is where set_rest_points() gives others.
+struct VertexData {
+    MethodInfo method;
+    std::span<const float> values;  // [vertices][method.vertex_floats] finite; model space
+};
+
 /// What a Binding is made of. Nothing is kept by reference.
 struct BindData {
     std::span<const Vec3<float>> rest_points;  // [vertices] model space
@@ -30,21 +37,33 @@ struct BindData {
     std::span<const float> influence_weights;       // [influences] >= 0; any sum, normalised inside
     std::span<const Affine<float>>
         rest_bones{};  // [bones] orthonormal, Y along the bone; empty: all identity.
-                       // Read where a bone is scaled and the method is rigid
-    bool is_normalised = false;  // of a BoundMesh: weights have sum 1 but for rounding, and are taken as they are
+                       // Read where a bone is scaled and the method is rigid, and by Sbs
+    std::span<const VertexData>
+        vertex_data{};  // of each method once at most; a method whose data is not here
+                        // does without, as its deform_vertex() says
+    bool is_normalised =
+        false;  // of a BoundMesh: weights have sum 1 but for rounding, and are taken as they are
 };
 
 /// What a Binding keeps of its BindData, to store it and to make one anew that gives the same bits. Influences have
 /// weights of sum 1. One of weight 0 may name the highest bone that was named.
 struct BoundMesh {
+    /// VertexData that is not only referred to.
+    struct OwnVertexData {
+        MethodInfo method;
+        std::vector<float> values;
+    };
+
     std::vector<Vec3<float>> rest_points;
     std::vector<std::int32_t> influence_offsets;
     std::vector<std::int32_t> influence_bones;
     std::vector<float> influence_weights;
     std::vector<Affine<float>> rest_bones;  // of bones without influences: identity
+    std::vector<OwnVertexData> vertex_data;
 
+    /// Without vertex data.
     [[nodiscard]] BindData data() const {
-        return {rest_points, influence_offsets, influence_bones, influence_weights, rest_bones, true};
+        return {rest_points, influence_offsets, influence_bones, influence_weights, rest_bones, {}, true};
     }
 };
 
@@ -63,7 +82,7 @@ class SINEW_EXPORT Binding {
 public:
     /// Throws std::invalid_argument that names the field, what was wanted and what came: sizes that do not
     /// fit or are beyond the limits above, offsets that do not rise from 0 to the number of influences, a
-    /// negative bone, a weight that is negative, a value that is not finite.
+    /// negative bone, a weight that is negative, a value that is not finite, vertex data of a method that keeps none.
     explicit Binding(const BindData& data);
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;

@@ -14,7 +14,9 @@ namespace sinew {
 /// What every block of one frame reads.
 struct Frame {
     const PackedMesh* mesh;
-    const Lanes<float>* rows;  // of the mesh, or with other rest points
+    const Lanes<float>* rows;         // of the mesh, or with other rest points
+    const Lanes<float>* vertex_rows;  // [blocks][MethodInfo::vertex_floats]; null: the method has none
+    const std::int32_t* bones;        // as PackedMesh::bones, or BoneSets::entries
     const Palette* palette;
     const Float4* bones_from_model;  // displacements of points to the space of the bones and back;
     const Float4* model_from_bones;  // null: the same space
@@ -48,7 +50,11 @@ struct Kernel {
     /// the bones and back. A method that is not rigid has that space in its bones.
     bool is_rigid;
 
-    /// Fills `palette` for `bones`, all of which are posed.
+    /// Bytes of a prepared bone, where the palette has a row for each bone of each set of bones (BoneSets); 0 where
+    /// it has one for each bone.
+    std::size_t set_bone_size;
+
+    /// Fills `palette` for `bones`, all of which are posed unless rows are those of sets.
     void (*prepare)(const Kernel& kernel, const Bones& bones, Palette& palette);
 
     std::array<TargetKernel, kTargetCount> targets;

@@ -29,6 +29,7 @@ using Vec = hn::Vec<D>;
 struct MeshPointers {
     const Block* blocks;
     const Lanes<float>* rows;
+    const Lanes<float>* vertex_rows;
     const Lanes<std::int32_t>* vertices;
     const Run* runs;
     Vec3<float>* points;
@@ -36,7 +37,8 @@ struct MeshPointers {
 
 HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
     const PackedMesh& mesh = *frame.mesh;
-    return {mesh.blocks.data(), frame.rows, mesh.vertices.data(), mesh.runs.data(), frame.points};
+    return {mesh.blocks.data(),   frame.rows,       frame.vertex_rows,
+            mesh.vertices.data(), mesh.runs.data(), frame.points};
 }
 
 /// The weights of the first influence of block `b`, which is not mixed.

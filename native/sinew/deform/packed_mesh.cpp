@@ -258,7 +258,9 @@ private:
             }
         }
         std::vector<std::uint32_t> starts(mesh_.used_bones.size() + 1);
-        const auto first_of = [this](const Set& set) { return static_cast<std::size_t>(mesh_.bones[set.begin]); };
+        const auto first_of = [this](const Set& set) {
+            return static_cast<std::size_t>(mesh_.bones[set.begin]);
+        };
         for (const Set& set : sets) ++starts[first_of(set) + 1];
         std::partial_sum(starts.begin(), starts.end(), starts.begin());
         std::vector<Set> by_first(sets.size());
@@ -349,21 +351,27 @@ UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rows, 
 }
 
 std::vector<float> unpack_values(const PackedMesh& mesh, std::span<const Lanes<float>> packed,
-                                 std::size_t vertices) {
-    std::vector<float> values(vertices);
+                                 std::size_t vertices, std::size_t count) {
+    std::vector<float> values(vertices * count);
     for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
         for (std::size_t lane = 0; lane < mesh.blocks[b].vertices; ++lane) {
-            values[static_cast<std::size_t>(mesh.vertices[b].lane[lane])] = packed[b].lane[lane];
+            const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);
+            for (std::size_t i = 0; i < count; ++i) {
+                values[vertex * count + i] = packed[b * count + i].lane[lane];
+            }
         }
     }
     return values;
 }
 
-std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values) {
-    std::vector<Lanes<float>> packed(mesh.blocks.size());
+std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values,
+                                      std::size_t count) {
+    std::vector<Lanes<float>> packed(mesh.blocks.size() * count);
     for (std::size_t b = 0; b < mesh.blocks.size(); ++b) {
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
-            packed[b].lane[lane] = values[static_cast<std::size_t>(mesh.vertices[b].lane[lane])];
+            const auto vertex = static_cast<std::size_t>(mesh.vertices[b].lane[lane]);
+            for (std::size_t i = 0; i < count; ++i)
+                packed[count * b + i].lane[lane] = values[count * vertex + i];
         }
     }
     return packed;

@@ -86,9 +86,11 @@ struct UnpackedMesh {
 
 /// Undoes pack_values().
 [[nodiscard]] std::vector<float> unpack_values(const PackedMesh& mesh, std::span<const Lanes<float>> packed,
-                                               std::size_t vertices);
+                                               std::size_t vertices, std::size_t count = 1);
 
-/// A number of each vertex [vertices] in the order of the mesh: [blocks]. Lanes without a vertex repeat the last.
-[[nodiscard]] std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values);
+/// Numbers of each vertex [vertices][count] in the order of the mesh: [blocks][count]. Lanes without a vertex repeat the
+/// last.
+[[nodiscard]] std::vector<Lanes<float>> pack_values(const PackedMesh& mesh, std::span<const float> values,
+                                                    std::size_t count = 1);
 
 }  // namespace sinew

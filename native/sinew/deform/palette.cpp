@@ -33,6 +33,7 @@ bool is_identity(const Affine<float>& a) noexcept {
 void prepare(const Kernel& kernel, const Bones& bones, Palette& palette) noexcept {
     palette.scaled_count = 0;
     palette.any_scale = false;
+    if (kernel.set_bone_size > 0) return kernel.prepare(kernel, bones, palette);
     // Nearly always all of them.
     std::size_t posed = bones.used.size();
     while (posed > 0 && static_cast<std::size_t>(bones.used[posed - 1]) >= bones.posed_from_rest.size()) {

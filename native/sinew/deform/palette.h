@@ -36,18 +36,21 @@ inline constexpr float kLong = 64.0f;
 /// Sizes are written by this many: behind the last bone there is room for one less.
 inline constexpr std::size_t kSizesAtOnce = 8;
 
-/// The bones of one frame as a kernel reads them, indexed as PackedMesh::bones. Its memory is a PaletteStore's.
+/// The bones of one frame as a kernel reads them, indexed as Frame::bones. Its memory is a PaletteStore's.
 struct Palette {
-    Float4* bones = nullptr;   // Kernel::rest_row.size() a bone
-    float* sizes = nullptr;    // squares, of the translation, from that of kMinSize on; infinite: kLong
+    Float4* bones = nullptr;  // Kernel::rest_row.size() a bone
+    float* sizes = nullptr;   // squares, of the translation, from that of kMinSize on; infinite: kLong
     // Whether some vertex of which this bone is the first may be added plainly.
     std::uint8_t* may_be_plain = nullptr;
-    Float4* scales = nullptr;  // kDisplacementRows a bone, where it has scale
+    Float4* scales = nullptr;           // kDisplacementRows a bone, where it has scale
     std::uint8_t* has_scale = nullptr;  // not written where no bone has
     std::int32_t* scaled = nullptr;     // indices of bones to be prepared one by one
+    std::byte* set_bones = nullptr;     // Kernel::set_bone_size a bone
     std::size_t scaled_count = 0;
     bool any_scale = false;
 };
+
+struct BoneSets;
 
 /// The bones of a mesh in one pose.
 struct Bones {
@@ -56,6 +59,7 @@ struct Bones {
     std::span<const Affine<float>> posed_from_rest;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; or empty: all identity
     Affine<float> bones_from_model;
+    const BoneSets* sets;  // null unless the kernel wants them
 };
 
 template <class T>

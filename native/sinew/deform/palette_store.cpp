@@ -22,31 +22,36 @@ std::uint32_t of_this_process(std::uint32_t state) noexcept {
 
 }  // namespace
 
-PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones) {
+PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries) {
     // Left as the system gives it: only the first palette is ever touched where one thread at a time deforms.
     for (std::size_t k = 0; k < kernels.size(); ++k) {
         const bool may_scale = kernels[k]->is_rigid;
-        const std::size_t of_bones = kernels[k]->rest_row.size() * bones;
-        const std::size_t of_scales = may_scale ? kDisplacementRows * bones : 0;
-        const std::size_t of_sizes = bones + kSizesAtOnce;
+        const std::size_t of_set_bones = kernels[k]->set_bone_size * bones;
+        const std::size_t rows = of_set_bones > 0 ? entries : bones;
+        const std::size_t of_bones = kernels[k]->rest_row.size() * rows;
+        const std::size_t of_scales = may_scale ? kDisplacementRows * rows : 0;
+        const std::size_t of_sizes = rows + kSizesAtOnce;
         Memory& memory = memory_[k];
         memory.float4s = std::make_unique_for_overwrite<Float4[]>(kMax * (of_bones + of_scales));
         memory.sizes = std::make_unique_for_overwrite<float[]>(kMax * of_sizes);
-        memory.may_be_plain = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * bones);
+        memory.may_be_plain = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * rows);
         if (may_scale) {
             // A bone may be listed twice: for its rest axes, and for its pose.
             memory.scaled = std::make_unique_for_overwrite<std::int32_t[]>(kMax * 2 * bones);
-            memory.has_scale = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * bones);
+            memory.has_scale = std::make_unique_for_overwrite<std::uint8_t[]>(kMax * rows);
         }
+        if (of_set_bones > 0)
+            memory.set_bones = std::make_unique_for_overwrite<std::byte[]>(kMax * of_set_bones);
         for (std::size_t i = 0; i < kMax; ++i) {
             Palette& palette = palettes_[k][i];
             palette.bones = memory.float4s.get() + i * (of_bones + of_scales);
             palette.sizes = memory.sizes.get() + i * of_sizes;
-            palette.may_be_plain = memory.may_be_plain.get() + i * bones;
+            palette.may_be_plain = memory.may_be_plain.get() + i * rows;
             if (!may_scale) continue;
             palette.scales = palette.bones + of_bones;
             palette.scaled = memory.scaled.get() + i * 2 * bones;
-            palette.has_scale = memory.has_scale.get() + i * bones;
+            palette.has_scale = memory.has_scale.get() + i * rows;
+            palette.set_bones = memory.set_bones.get() + i * of_set_bones;
         }
     }
 }

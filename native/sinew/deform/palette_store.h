@@ -22,7 +22,8 @@ public:
 
     /// kernels  one or two, that each thread deforms by
     /// bones    that the mesh uses
-    PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones);
+    /// entries  of its BoneSets; 0 where no kernel wants them
+    PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries);
 
     /// Palettes that are the caller's, and the mesh to read, as long as this lives.
     class Reading {
@@ -69,6 +70,7 @@ private:
         std::unique_ptr<std::uint8_t[]> may_be_plain;
         std::unique_ptr<std::int32_t[]> scaled;
         std::unique_ptr<std::uint8_t[]> has_scale;
+        std::unique_ptr<std::byte[]> set_bones;
     };
 
     Memory memory_[kMaxKernels];

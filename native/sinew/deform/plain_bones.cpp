@@ -30,7 +30,8 @@ void mark_plain(const BonePairs& pairs, Palette& palette) {
         const auto later = hn::GatherIndex(d, palette.sizes, hn::LoadU(indices, &pairs.later[i]));
         std::uint8_t bits[8] = {};
         hn::StoreMaskBits(d, hn::Not(hn::Lt(first, hn::Mul(alike, later))), bits);
-        for (auto plain = static_cast<std::uint32_t>(bits[0] | bits[1] << 8); plain != 0; plain &= plain - 1) {
+        for (auto plain = static_cast<std::uint32_t>(bits[0] | bits[1] << 8); plain != 0;
+             plain &= plain - 1) {
             palette.may_be_plain[bones[std::countr_zero(plain)]] = 1;
         }
     }

@@ -7,6 +7,7 @@
 #define SINEW_DEFORM_RIGID_INL_H_
 #endif
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -16,7 +17,14 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-inline constexpr std::size_t kRowFloat4s = kRow / 4;
+/// Rigid in what follows is a method's kernel:
+///
+/// kNumbers        of a bone's row, a multiple of 4; the first four are the quaternion, or what has no sign
+/// kSignedFloat4s  how many Float4 of a row change their sign with the quaternion: 0 to 2
+/// add_scale       adds to a sum what a bone's scale does
+/// finish          the points, of their sum, their rest points and lane `lane` of block `b`
+template <class Rigid>
+inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
 
 // Above this many influences a set's signs are found vertex by vertex.
 inline constexpr std::size_t kMaxResolved = 32;
@@ -39,12 +47,14 @@ HWY_INLINE bool signs_agree(const float* rows, std::size_t stride, std::size_t c
 }
 
 /// What each row but the first differs from the first.
+template <std::size_t kNumbers>
 HWY_INLINE void subtract_first(float* rows, std::size_t count) {
-    const hn::CappedTag<float, kRow> d;
-    for (std::size_t i = 0; i < kRow; i += hn::Lanes(d)) {
+    // Four and no more where that is what a row is a multiple of.
+    const hn::CappedTag<float, kNumbers % 8 == 0 ? 8 : 4> d;
+    for (std::size_t i = 0; i < kNumbers; i += hn::Lanes(d)) {
         const auto first = hn::LoadU(d, rows + i);
         for (std::size_t k = 1; k < count; ++k) {
-            float* const row = rows + kRow * k + i;
+            float* const row = rows + kNumbers * k + i;
             hn::StoreU(hn::Sub(hn::LoadU(d, row), first), d, row);
         }
     }
@@ -68,24 +78,27 @@ template <class Rigid, bool kDifferences>
 HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count,
                               float* rows) {
     const Four d;
+    constexpr std::size_t kFloat4s = kRowFloat4s<Rigid>;
     const auto float4_of = [&](std::size_t k, std::size_t q) HWY_ATTR {
-        return hn::Load(d, palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k]) + q].value.data());
+        return hn::Load(d, palette.bones[kFloat4s * static_cast<std::size_t>(bones[k]) + q].value.data());
     };
-    const Vec<Four> first = float4_of(0, 0);
-    const Vec<Four> first_second = float4_of(0, 1);
-    hn::Store(first, d, rows);
-    hn::Store(first_second, d, rows + 4);
+    Vec<Four> first[kFloat4s];
+    for (std::size_t q = 0; q < kFloat4s; ++q) {
+        first[q] = float4_of(0, q);
+        hn::Store(first[q], d, rows + 4 * q);
+    }
     Vec<Four> least = hn::Set(d, 1.0f);
     for (std::size_t k = 1; k < count; ++k) {
-        Vec<Four> quad = float4_of(k, 0);
-        Vec<Four> second = float4_of(k, 1);
-        const Vec<Four> cosine = dot(quad, first);
+        Vec<Four> float4 = float4_of(k, 0);
+        const Vec<Four> cosine = dot(float4, first[0]);
         const Vec<Four> sign = hn::And(cosine, hn::SignBit(d));
         least = hn::Min(least, hn::Abs(cosine));
-        if (Rigid::kSignedFloat4s >= 1) quad = hn::Xor(quad, sign);
-        if (Rigid::kSignedFloat4s == 2) second = hn::Xor(second, sign);
-        hn::Store(kDifferences ? hn::Sub(quad, first) : quad, d, rows + kRow * k);
-        hn::Store(kDifferences ? hn::Sub(second, first_second) : second, d, rows + kRow * k + 4);
+        for (std::size_t q = 0; q < kFloat4s; ++q) {
+            if (q > 0) float4 = float4_of(k, q);
+            if (q < Rigid::kSignedFloat4s) float4 = hn::Xor(float4, sign);
+            hn::Store(kDifferences ? hn::Sub(float4, first[q]) : float4, d,
+                      rows + Rigid::kNumbers * k + 4 * q);
+        }
     }
     return hn::GetLane(least);
 }
@@ -96,16 +109,16 @@ template <class Rigid, bool kDifferences>
 float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
     float least = 1.0f;
     for (std::size_t k = 0; k < count; ++k) {
-        float* const row = rows + kRow * k;
-        std::memcpy(row, &palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k])],
-                    sizeof(Float4) * kRowFloat4s);
+        float* const row = rows + Rigid::kNumbers * k;
+        std::memcpy(row, &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])],
+                    sizeof(Float4) * kRowFloat4s<Rigid>);
         const float cosine = dot(row, rows);
         least = std::min(least, std::abs(cosine));
         if (cosine < 0.0f) {
             for (std::size_t i = 0; i < 4 * Rigid::kSignedFloat4s; ++i) row[i] = -row[i];
         }
     }
-    if (kDifferences) subtract_first(rows, count);
+    if (kDifferences) subtract_first<Rigid::kNumbers>(rows, count);
     return least;
 }
 
@@ -127,8 +140,8 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
     const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
     if (Rigid::kSignedFloat4s == 0 || least > 0.7072f) return true;
     if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
-    if (!signs_agree(rows, kRow, count)) return false;
-    if (!kPlain) subtract_first(rows, count);
+    if (!signs_agree(rows, Rigid::kNumbers, count)) return false;
+    if (!kPlain) subtract_first<Rigid::kNumbers>(rows, count);
     return true;
 }
 
@@ -136,33 +149,39 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
 ///
 /// first_weight  of the first influence, read if plain
 /// weights       of the second and those after it
-template <std::size_t kCount, bool kPlain, class D>
-HWY_INLINE Sum<D> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
-                             const float* weights) {
-    Sum<D> sum;
-    for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Set(d, rows[i]);
-    if constexpr (kPlain) {
-        const Vec<D> first = hn::Load(d, first_weight);
-        for (std::size_t i = 0; i < kRow; ++i) sum.value[i] = hn::Mul(first, sum.value[i]);
-    }
-    for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-        add_row(d, hn::Load(d, weights + kLanes * (k - 1)), rows + kRow * k, 0, kRow, sum);
+template <std::size_t kNumbers, std::size_t kCount, bool kPlain, class D>
+HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
+                                       const float* weights) {
+    Sum<D, kNumbers> sum;
+    // Eight numbers at a time, whose sums fit into registers.
+    for (std::size_t begin = 0; begin < kNumbers; begin += kRow) {
+        const std::size_t end = std::min(kNumbers, begin + kRow);
+        for (std::size_t i = begin; i < end; ++i) sum.value[i] = hn::Set(d, rows[i]);
+        if constexpr (kPlain) {
+            const Vec<D> first = hn::Load(d, first_weight);
+            for (std::size_t i = begin; i < end; ++i) sum.value[i] = hn::Mul(first, sum.value[i]);
+        }
+        for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
+            add_row(d, hn::Load(d, weights + kLanes * (k - 1)), rows + kNumbers * k, begin, end, sum);
+        }
     }
     return sum;
 }
 
 /// The same for bones with scale, or with signs that depend on the weights.
 template <class Rigid, class D>
-HWY_INLINE Sum<D> blend_bones(D d, const Palette& palette, const std::int32_t* bones, std::size_t count,
-                              bool plain, const float* first_weight, const float* weights,
-                              const Points<D>& rest) {
+HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, const std::int32_t* bones,
+                                               std::size_t count, bool plain, const float* first_weight,
+                                               const float* weights, const Points<D>& rest) {
+    constexpr std::size_t kNumbers = Rigid::kNumbers;
     const Vec<D> first = hn::Load(d, first_weight);
-    const float* const base = plain ? kNoBase : row_of(palette, bones[0]);
-    Blend<D> blend = begin_blend(d, row_of(palette, bones[0]), first, plain);
+    const float* const base = plain ? kNoBase : row_of<kNumbers>(palette, bones[0]);
+    Blend<D, kNumbers> blend = begin_blend<kNumbers>(d, row_of<kNumbers>(palette, bones[0]), first, plain);
     Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
     for (std::size_t k = 1; k < count; ++k) {
         const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
-        const Vec<D> signed_weight = add_to_blend<Rigid>(d, base, row_of(palette, bones[k]), weight, blend);
+        const Vec<D> signed_weight =
+            add_to_blend<Rigid>(d, base, row_of<kNumbers>(palette, bones[k]), weight, blend);
         Rigid::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
     }
     return blend.sum;
@@ -181,8 +200,15 @@ HWY_INLINE Spaces spaces_of(const Frame& frame) {
 
 template <class Rigid, class D>
 HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
-                                 std::size_t lane, const Sum<D>& sum, const Points<D>& rest) {
-    Points<D> points = Rigid::finish(d, sum, rest);
+                                 std::size_t lane, const Sum<D, Rigid::kNumbers>& sum,
+                                 const Points<D>& rest) {
+    Points<D> points;
+    if constexpr (Rigid::kVertexFloats > 0) {
+        points = Rigid::finish(d, sum, rest, vertex_rows_of<Rigid::kVertexFloats>(pointers, b, lane),
+                               spaces.bones_from_model);
+    } else {
+        points = Rigid::finish(d, sum, rest);
+    }
     if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
     store_points(d, pointers, b, lane, points);
 }
@@ -191,6 +217,13 @@ template <class D>
 HWY_INLINE Points<D> load_rest(D d, const Lanes<float>* rows, const Spaces& spaces, std::size_t lane) {
     const Points<D> rest = load_points(d, rows, lane);
     return spaces.bones_from_model == nullptr ? rest : displaced(d, spaces.bones_from_model, rest);
+}
+
+/// Lanes of the first number that a method keeps of each vertex; the others follow kLanes apart. Null: it has none.
+template <std::size_t kVertexFloats>
+HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t b, std::size_t lane) {
+    if (pointers.vertex_rows == nullptr) return nullptr;
+    return pointers.vertex_rows[kVertexFloats * b].lane.data() + lane;
 }
 
 HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].lane.data(); }
@@ -209,8 +242,8 @@ void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, con
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
-            const auto sum =
-                blend_rows<kCount, kPlain>(d, bone_rows, influences, first_weights, weights_of(rows) + lane);
+            const auto sum = blend_rows<Rigid::kNumbers, kCount, kPlain>(
+                d, bone_rows, influences, first_weights, weights_of(rows) + lane);
             finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, rows, spaces, lane));
         }
     }
@@ -222,7 +255,7 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     const std::size_t influences = pointers.blocks[begin].influences;
-    const std::int32_t* const bones = &frame.mesh->bones[pointers.blocks[begin].first_bone];
+    const std::int32_t* const bones = frame.bones + pointers.blocks[begin].first_bone;
     for (std::size_t b = begin; b < end; ++b) {
         const Lanes<float>* const rows = pointers.rows + pointers.blocks[b].first_row;
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
@@ -239,9 +272,9 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
 /// Blocks [begin, end), which have the same bones, where these are added plainly.
 template <class Rigid>
 HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
-    alignas(64) float rows[kMaxResolved * kRow];
+    alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
     const Block& block = frame.mesh->blocks[begin];
-    const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
+    const std::int32_t* const bones = frame.bones + block.first_bone;
     if (resolve_signs<Rigid, true>(*frame.palette, bones, block.influences, rows)) {
         deform_resolved<Rigid, 0, true>(frame, begin, end, rows);
     } else {
@@ -252,9 +285,9 @@ HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::s
 /// Blocks [begin, end), which have the same bones.
 template <class Rigid>
 void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
-    alignas(64) float rows[kMaxResolved * kRow];
+    alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
     const Block& block = frame.mesh->blocks[begin];
-    const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
+    const std::int32_t* const bones = frame.bones + block.first_bone;
     if (is_plain(*frame.palette, bones, block.influences)) return deform_plain_set<Rigid>(frame, begin, end);
     if (!resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows)) {
         return deform_unresolved<Rigid>(frame, begin, end, false);
@@ -276,7 +309,7 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
     const Spaces spaces = spaces_of(frame);
     const Block& block = pointers.blocks[b];
     const Lanes<float>* const rows = pointers.rows + block.first_row;
-    const std::int32_t* const bones = &frame.mesh->bones[block.first_bone];
+    const std::int32_t* const bones = frame.bones + block.first_bone;
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const Points<One> rest = load_rest(d, rows, spaces, lane);
         const std::int32_t* const of_vertex = bones + block.influences * lane;
@@ -300,11 +333,11 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
     const Four d;
     using V4 = Vec<Four>;
     const auto row_at = [&](std::size_t k) {
-        return &palette.bones[kRowFloat4s * static_cast<std::size_t>(bones[k])];
+        return &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])];
     };
     const Float4* const first = row_at(0);
-    V4 sum[kRowFloat4s];
-    for (std::size_t q = 0; q < kRowFloat4s; ++q) sum[q] = hn::Load(d, first[q].value.data());
+    V4 sum[kRowFloat4s<Rigid>];
+    for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, first[q].value.data());
     V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
     if (kPlain) {
         for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
@@ -315,7 +348,7 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
         const V4 quaternion = hn::Load(d, row->value.data());
         const auto below = hn::Lt(dot(quaternion, quaternions), hn::Zero(d));
         const V4 away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
-        for (std::size_t q = 0; q < kRowFloat4s; ++q) {
+        for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
             V4 by = hn::Load(d, row[q].value.data());
             if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
             if (!kPlain) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
@@ -323,7 +356,7 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
         }
         quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
     }
-    for (std::size_t q = 0; q < kRowFloat4s; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
+    for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
 }
 
 /// Apart, so that its registers are not those of every vertex.
@@ -340,9 +373,9 @@ void deform_mixed(const Frame& frame, std::size_t b) {
     const Spaces spaces = spaces_of(frame);
     const Block& block = pointers.blocks[b];
     const Lanes<float>* const rows = pointers.rows + block.first_row;
-    const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
+    const std::int32_t* bones = frame.bones + block.first_bone;
     const Palette palette = *frame.palette;
-    alignas(64) float sums[kRowFloat4s][4 * kLanes];
+    alignas(64) float sums[kRowFloat4s<Rigid>][4 * kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
         const float* const weights = weights_of(rows) + lane;
         float* const to = sums[0] + 4 * lane;
@@ -354,8 +387,8 @@ void deform_mixed(const Frame& frame, std::size_t b) {
     }
     const Full d;
     for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-        Sum<Full> sum;
-        for (std::size_t q = 0; q < kRowFloat4s; ++q) {
+        Sum<Full, Rigid::kNumbers> sum;
+        for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
             Vec<Full>* const value = sum.value + 4 * q;
             hn::LoadInterleaved4(d, sums[q] + 4 * lane, value[0], value[1], value[2], value[3]);
         }

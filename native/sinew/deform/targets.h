@@ -23,8 +23,8 @@
     }
 
 // The same for a single function: an array of pointers to it.
-#define SINEW_TARGETS_OF(function)                                                                           \
-    {                                                                                                        \
-        HWY_CHOOSE_AVX3(function), HWY_CHOOSE_AVX2(function), HWY_CHOOSE_SSE4(function),                     \
-            HWY_CHOOSE_SSSE3(function), &HWY_STATIC_DISPATCH(function)                                       \
+#define SINEW_TARGETS_OF(function)                                                       \
+    {                                                                                    \
+        HWY_CHOOSE_AVX3(function), HWY_CHOOSE_AVX2(function), HWY_CHOOSE_SSE4(function), \
+            HWY_CHOOSE_SSSE3(function), &HWY_STATIC_DISPATCH(function)                   \
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -45,8 +46,20 @@ struct Parameter {
 /// What a method takes besides points, influences and bone transforms.
 enum class Needs : unsigned {
     nothing = 0,
-    rest_bones = 1,  // where bones are scaled
+    rest_bones = 1,      // rest axes and heads of bones
+    vertex_data = 2,     // numbers of each vertex: MethodInfo::vertex_floats
+    topology = 4,        // the mesh's triangles, which the vertex data is made from
+    precomputation = 8,  // a function that makes the vertex data, in more than a frame's time
 };
+
+[[nodiscard]] constexpr Needs operator|(Needs a, Needs b) noexcept {
+    return static_cast<Needs>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
+
+/// Whether `needs` has all of `of`.
+[[nodiscard]] constexpr bool has(Needs needs, Needs of) noexcept {
+    return (static_cast<unsigned>(needs) & static_cast<unsigned>(of)) == static_cast<unsigned>(of);
+}
 
 /// Facts of a method. Each method has its own, as `info`.
 struct MethodInfo {
@@ -57,6 +70,7 @@ struct MethodInfo {
     std::string_view source;       // the papers
     Needs needs;
     std::span<const Parameter> parameters{};
+    std::size_t vertex_floats = 0;  // numbers that it keeps of each vertex
 };
 
 /// The number is the method's identity.

@@ -7,16 +7,19 @@
 #include <string_view>
 #include <tuple>
 
+#include "sinew/skinning/cor.h"
+#include "sinew/skinning/dib.h"
 #include "sinew/skinning/dq.h"
 #include "sinew/skinning/lbs.h"
 #include "sinew/skinning/log.h"
 #include "sinew/skinning/qv.h"
+#include "sinew/skinning/sbs.h"
 
 namespace sinew {
 
 /// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
 /// line and panel are made from it.
-using Methods = std::tuple<Lbs, Qv, Dq, Log>;
+using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sbs, Log, Dib>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 

@@ -379,7 +379,7 @@ void prepare_bones(const Kernel& kernel, const Bones& bones, Palette& palette) {
     }
 }
 
-constexpr Kernel kKernel{kRestRow, false, prepare_bones, SINEW_TARGETS(deform_lbs, prepare_lbs)};
+constexpr Kernel kKernel{kRestRow, false, 0, prepare_bones, SINEW_TARGETS(deform_lbs, prepare_lbs)};
 
 }  // namespace
 

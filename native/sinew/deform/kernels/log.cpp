@@ -12,21 +12,16 @@
 //
 #include "hwy/highway.h"
 #include "sinew/deform/bones-inl.h"
+#include "sinew/deform/exponential-inl.h"
 #include "sinew/deform/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// c[0] + c[1] x + c[2] x^2 + ...
-template <class D, class Number, std::size_t kCount>
-HWY_INLINE Vec<D> polynomial(D d, Vec<D> x, const Number (&c)[kCount]) {
-    Vec<D> sum = hn::Set(d, c[kCount - 1]);
-    for (std::size_t i = kCount - 1; i-- > 0;) sum = hn::MulAdd(sum, x, hn::Set(d, c[i]));
-    return sum;
-}
-
 struct LogKernel {
+    static constexpr std::size_t kNumbers = kRow;
+    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 0;
 
     /// Palette::scales holds what the scale adds to the linear part.
@@ -40,31 +35,18 @@ struct LogKernel {
         sum.value[6] = hn::MulAdd(weight, by.z, sum.value[6]);
     }
 
-    /// The exponential, as in transform/twist.h. The angle is 180 degrees at most: three polynomials of the square y of
-    /// its half are exact to 6e-8 in absolute terms, and there is no branch and no division by the angle.
+    /// The exponential, as in transform/twist.h.
     template <class D>
     static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
-        // sin(sqrt(y)) / sqrt(y), cos(sqrt(y)) and (x - sin(x)) / x^3 with x = 2 sqrt(y), for y from 0 to (pi / 2)^2.
-        static constexpr float kSinc[] = {1.0f, -0.16666658222675323f, 0.008333049714565277f,
-                                          -0.0001980901142815128f, 2.6050929591292515e-06f};
-        static constexpr float kCos[] = {1.0f,
-                                         -0.5f,
-                                         0.0416666679084301f,
-                                         -0.0013888884568586946f,
-                                         2.4801040126476437e-05f,
-                                         -2.7524663437361596e-07f,
-                                         1.990741571589183e-09f};
-        static constexpr float kRest[] = {0.1666666716337204f,    -0.033333323895931244f,
-                                          0.0031745603773742914f, -0.00017629233479965478f,
-                                          6.35449077890371e-06f,  -1.4276758975029225e-07f};
         const Points<D> angular{sum.value[0], sum.value[1], sum.value[2]};
         const Points<D> linear{sum.value[4], sum.value[5], sum.value[6]};
         const Vec<D> half = hn::Set(d, 0.5f);
         const Points<D> by_half{hn::Mul(half, angular.x), hn::Mul(half, angular.y), hn::Mul(half, angular.z)};
         const Vec<D> y =
             hn::MulAdd(by_half.x, by_half.x, hn::MulAdd(by_half.y, by_half.y, hn::Mul(by_half.z, by_half.z)));
-        const Vec<D> sinc = polynomial(d, y, kSinc);
-        const Vec<D> w = polynomial(d, y, kCos);
+        const ExponentialFactors<D> by(d, y);
+        const Vec<D> sinc = by.sinc;
+        const Vec<D> w = by.cosine;
         const Points<D> axis{hn::Mul(sinc, by_half.x), hn::Mul(sinc, by_half.y), hn::Mul(sinc, by_half.z)};
         // Divided by its square, the quaternion rotates also where rounding changed its length.
         const Vec<D> squared_norm =
@@ -75,7 +57,7 @@ struct LogKernel {
         // linear + (sinc^2 / 2) angular x linear + rest angular x (angular x linear).
         const Points<D> across = cross<D>(angular, linear);
         const Vec<D> first = hn::Mul(half, hn::Mul(sinc, sinc));
-        const Vec<D> second = polynomial(d, y, kRest);
+        const Vec<D> second = by.third;
         const Points<D> terms = add_cross<D>(
             {hn::Mul(first, across.x), hn::Mul(first, across.y), hn::Mul(first, across.z)}, angular,
             {hn::Mul(second, across.x), hn::Mul(second, across.y), hn::Mul(second, across.z)});
@@ -156,7 +138,7 @@ void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
                        scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, prepare_rigid_method<Log, write_bone>,
+constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Log, write_bone>,
                          SINEW_TARGETS(deform_log, prepare_log)};
 
 }  // namespace

@@ -19,6 +19,8 @@ namespace sinew {
 namespace HWY_NAMESPACE {
 
 struct QvKernel {
+    static constexpr std::size_t kNumbers = kRow;
+    static constexpr std::size_t kVertexFloats = 0;
     static constexpr std::size_t kSignedFloat4s = 1;
 
     /// The translation that also moves by the rotated scale.
@@ -87,7 +89,7 @@ void write_bone(const Qv::Bone<double>& bone, Float4* row, Float4* scale) {
     write_displacement(bone.scale, scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, prepare_rigid_method<Qv, write_bone>,
+constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Qv, write_bone>,
                          SINEW_TARGETS(deform_qv, prepare_qv)};
 
 }  // namespace

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+
+#include "sinew/skinning/influence.h"
+#include "sinew/skinning/method_info.h"
+#include "sinew/skinning/rotation_about.h"
+#include "sinew/skinning/scaled_rigid.h"
+
+namespace sinew {
+
+/// Skinning with optimised centres of rotation (Le, Hodgins 2016): each vertex is rotated by the blended quaternion
+/// about a point of its own, which linear blending moves. deform/centres_of_rotation.h finds these points.
+struct Cor {
+    static constexpr MethodInfo info{
+        5,
+        "cor",
+        "Centres of Rotation",
+        "Keeps the volume of twisted joints and bulges half as much as dual "
+        "quaternions where they bend; large meshes are bound a second longer",
+        "Le, Hodgins 2016",
+        Needs::rest_bones | Needs::vertex_data | Needs::topology | Needs::precomputation,
+        {},
+        3};
+    static const Kernel& kernel() noexcept;
+
+    template <class T>
+    using Bone = ScaledRigid<QuatVec<T>, T>;
+
+    /// rest_bone  orthonormal; only read where the motion has scale
+    template <class T>
+    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
+                                         const Affine<T>& rest_bone) noexcept {
+        const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
+        return {to_quat_vec(split.rigid), split.scale, split.has_scale};
+    }
+
+    /// The deformed vertex.
+    ///
+    /// bones       one for each index in `influences`; the signs of their quaternions are free
+    /// influences  at least one; weights >= 0 with sum 1
+    /// centre      of rotation, x, y, z; or empty: the vertex itself, which is linear blending of the rigid motions
+    ///
+    /// If the rotations cancel (sum below kDegenerateBlend), the heaviest influence alone moves the vertex.
+    template <class T>
+    [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
+                                               std::span<const Influence<T>> influences, const Vec3<T>& rest,
+                                               std::span<const T> centre = {}) noexcept {
+        const Vec3<T> about = centre.empty() ? rest : Vec3<T>(centre[0], centre[1], centre[2]);
+        return rotated_about(about, bones, influences, rest);
+    }
+};
+
+}  // namespace sinew

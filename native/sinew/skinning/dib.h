@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "sinew/skinning/dq.h"
+#include "sinew/skinning/rotation_about.h"
+#include "sinew/transform/twist.h"
+
+namespace sinew {
+
+/// Dual quaternion iterative blending (Kavan, Collins, Zara, O'Sullivan 2008, algorithm 3): the motion from which the
+/// weighted logarithms of all bones' motions cancel, found from that of Dq on. With two bones it is ScLERP: a twist is
+/// spread evenly, and the whole character may rotate.
+///
+/// Where a bone is 180 degrees from the blend, the shorter way to it changes, and the result jumps. Where bones are so
+/// far apart that kSteps do not suffice, it is what these lead to: finite, and on the way.
+struct Dib {
+    static constexpr MethodInfo info{
+        7,
+        "dib",
+        "Iterative Dual Quaternion",
+        "Dual quaternions with twists spread evenly along the limb; bulges as they do, at "
+        "several times the cost",
+        "Kavan, Collins, Zara, O'Sullivan 2008",
+        Needs::rest_bones};
+    static const Kernel& kernel() noexcept;
+
+    /// The most corrections. Of twelve random rotations the slowest of thousands took 17 to 1e-6 radians.
+    static constexpr int kSteps = 24;
+
+    template <class T>
+    using Bone = Dq::Bone<T>;
+
+    /// rest_bone  orthonormal; only read where the motion has scale
+    template <class T>
+    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
+                                         const Affine<T>& rest_bone) noexcept {
+        return Dq::prepare(posed_from_rest, rest_bone);
+    }
+
+    /// The deformed vertex: see Dq::deform_vertex.
+    template <class T>
+    [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
+                                               std::span<const Influence<T>> influences,
+                                               const Vec3<T>& rest) noexcept {
+        const auto motion_of = [&](const Influence<T>& influence) {
+            const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
+            DualQuat<T> motion = bone.rigid;
+            if (bone.has_scale) {
+                motion.dual = motion.dual + T(0.5) * (motion.real * pure(bone.scale_displacement(rest)));
+            }
+            return motion;
+        };
+        DualQuat<T> sum{Quat<T>(T(0), T(0), T(0), T(0)), Quat<T>(T(0), T(0), T(0), T(0))};
+        for (const Influence<T>& influence : influences) {
+            const DualQuat<T> motion = motion_of(influence);
+            const T sign = glm::dot(motion.real, sum.real) < T(0) ? T(-1) : T(1);
+            sum.real = sum.real + (sign * influence.weight) * motion.real;
+            sum.dual = sum.dual + (sign * influence.weight) * motion.dual;
+        }
+        if (glm::length(sum.real) < T(kDegenerateBlend)) {
+            return transform_point(motion_of(heaviest(influences)), rest);
+        }
+        DualQuat<T> blend = normalized(sum);
+        const T rounding = T(4) * std::numeric_limits<T>::epsilon();
+        for (int step = 0; step < kSteps; ++step) {
+            Twist<T> correction;
+            T longest = T(0);
+            for (const Influence<T>& influence : influences) {
+                if (influence.weight == T(0)) continue;
+                const Twist<T> twist = to_twist(inverse(blend) * motion_of(influence));
+                correction = correction + influence.weight * twist;
+                longest = std::max(longest, glm::length(twist.linear));
+            }
+            blend = normalized(blend * to_dual_quat(correction));
+            if (glm::length(correction.angular) <= rounding &&
+                glm::length(correction.linear) <= rounding * longest) {
+                break;
+            }
+        }
+        return rest + (rotation_displacement(blend.real, rest) + translation(blend));
+    }
+};
+
+}  // namespace sinew

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+#include <thread>
+
+#include "scene.h"
+#include "sinew/deform/centres_of_rotation.h"
+
+namespace sinew {
+namespace {
+
+using test::distance;
+using test::same_bits;
+using test::Scene;
+
+/// A tube of radius 0.5 along x, from 0 to `bones`, with a bone for each unit of length.
+struct Tube {
+    Scene scene;
+    std::vector<std::int32_t> triangles;
+
+    explicit Tube(int bones, int rings, int around) {
+        for (int ring = 0; ring < rings; ++ring) {
+            const double along = bones * static_cast<double>(ring) / (rings - 1);
+            for (int i = 0; i < around; ++i) {
+                const double angle = 2.0 * std::numbers::pi * i / around;
+                std::vector<Influence<float>> influences;
+                for (int bone = 0; bone < bones; ++bone) {
+                    const double away = std::abs(along - bone - 0.5);
+                    if (away < 1.0) influences.push_back({bone, static_cast<float>(std::cos(1.5 * away))});
+                }
+                scene.add_vertex({static_cast<float>(along), static_cast<float>(0.5 * std::cos(angle)),
+                                  static_cast<float>(0.5 * std::sin(angle))},
+                                 influences);
+                if (ring == 0) continue;
+                const int next = (i + 1) % around;
+                const std::int32_t a = around * ring + i;
+                const std::int32_t b = around * ring + next;
+                triangles.insert(triangles.end(), {a - around, b - around, b, a - around, b, a});
+            }
+        }
+    }
+
+    std::vector<Vec3<float>> centres(const PrecomputeOptions& options = {}) const {
+        return centres_of_rotation(scene.data(), triangles, options).value();
+    }
+};
+
+TEST(Centres, of_a_tube_are_on_its_axis) {
+    const Tube tube(4, 61, 24);
+    for (const bool exact : {false, true}) {
+        const auto centres = tube.centres({0, {}, exact});
+        std::size_t found = 0;
+        for (std::size_t vertex = 0; vertex < centres.size(); ++vertex) {
+            const auto count = tube.scene.offsets[vertex + 1] - tube.scene.offsets[vertex];
+            if (count < 2) continue;
+            ++found;
+            EXPECT_LT(std::hypot(centres[vertex].y, centres[vertex].z), 1e-4) << exact;
+        }
+        EXPECT_GT(found, 500u);
+    }
+}
+
+TEST(Centres, by_cells_are_near_to_those_of_the_definition) {
+    const Tube tube(4, 61, 24);
+    const auto exact = tube.centres({0, {}, true});
+    const auto by_cells = tube.centres();
+    double worst = 0.0;
+    for (std::size_t vertex = 0; vertex < exact.size(); ++vertex) {
+        worst = std::max(worst, distance(exact[vertex], by_cells[vertex]));
+    }
+    RecordProperty("worst", std::to_string(worst * 1e6) + "e-6");
+    EXPECT_LT(worst, 1e-3);  // of the diameter, which is 1
+}
+
+TEST(Centres, of_vertices_of_one_bone_are_these) {
+    Tube tube(3, 31, 12);
+    const auto centres = tube.centres();
+    std::size_t found = 0;
+    for (std::size_t vertex = 0; vertex < centres.size(); ++vertex) {
+        if (tube.scene.offsets[vertex + 1] - tube.scene.offsets[vertex] > 1) continue;
+        ++found;
+        EXPECT_TRUE(same_bits(centres[vertex], tube.scene.rest_points[vertex]));
+    }
+    EXPECT_GT(found, 10u);
+    // Without triangles no two bones meet.
+    tube.triangles.clear();
+    EXPECT_TRUE(std::ranges::equal(tube.centres(), tube.scene.rest_points, same_bits<float>));
+}
+
+TEST(Centres, threads_change_no_bit) {
+    const Tube tube(5, 101, 40);
+    const auto expected = tube.centres({1, {}, false});
+    for (const std::size_t threads : {2, 3, 7}) {
+        EXPECT_TRUE(std::ranges::equal(tube.centres({threads, {}, false}), expected, same_bits<float>))
+            << threads;
+    }
+}
+
+TEST(Centres, size_and_origin_go_with_the_mesh) {
+    const Tube tube(4, 41, 16);
+    const auto expected = tube.centres();
+    for (const double size : {1e-6, 1e6}) {
+        Tube other = tube;
+        for (Vec3<float>& point : other.scene.rest_points) point *= static_cast<float>(size);
+        const auto centres = other.centres();
+        for (std::size_t vertex = 0; vertex < centres.size(); ++vertex) {
+            ASSERT_LT(distance(Vec3<double>(centres[vertex]), size * Vec3<double>(expected[vertex])),
+                      1e-5 * size);
+        }
+    }
+}
+
+TEST(Centres, progress_rises_on_the_calling_thread) {
+    const Tube tube(5, 201, 40);
+    std::vector<double> shares;
+    std::set<std::thread::id> threads;
+    tube.centres({4,
+                  [&](double done) {
+                      shares.push_back(done);
+                      threads.insert(std::this_thread::get_id());
+                      return true;
+                  },
+                  false});
+    EXPECT_EQ(threads, std::set{std::this_thread::get_id()});
+    ASSERT_GT(shares.size(), 4u);
+    EXPECT_TRUE(std::ranges::is_sorted(shares));
+    EXPECT_EQ(shares.front(), 0.0);
+    EXPECT_EQ(shares.back(), 1.0);
+}
+
+TEST(Centres, progress_cancels_and_throws) {
+    const Tube tube(5, 201, 40);
+    for (const double at : {0.0, 0.1, 0.6, 1.0}) {
+        const auto cancel = [at](double done) { return done < at; };
+        EXPECT_FALSE(centres_of_rotation(tube.scene.data(), tube.triangles, {3, cancel, false})) << at;
+        const auto raise = [at](double done) {
+            if (done >= at) throw std::runtime_error("enough");
+            return true;
+        };
+        EXPECT_THROW((void)centres_of_rotation(tube.scene.data(), tube.triangles, {3, raise, false}),
+                     std::runtime_error)
+            << at;
+    }
+    // And the pool is as it was.
+    EXPECT_EQ(tube.centres().size(), tube.scene.rest_points.size());
+}
+
+std::string refusal(const Tube& tube) {
+    try {
+        (void)tube.centres();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "nothing thrown";
+}
+
+TEST(Centres, refuse_what_is_no_mesh) {
+    Tube tube(2, 5, 4);
+    tube.triangles[7] = 20;
+    EXPECT_EQ(refusal(tube), "triangles: expected numbers of vertices, below 20, got 20 at triangle 2");
+    tube.triangles[7] = -1;
+    EXPECT_EQ(refusal(tube), "triangles: expected numbers of vertices, below 20, got -1 at triangle 2");
+    tube.triangles.resize(4);
+    EXPECT_EQ(refusal(tube), "triangles: expected three corners each, got 4");
+    tube.scene.weights[0] = -1.0f;
+    EXPECT_EQ(refusal(tube).substr(0, 17), "influence_weights");
+}
+
+TEST(VertexData, is_checked) {
+    const Tube tube(2, 5, 4);
+    const auto refused = [&](const VertexData& data) -> std::string {
+        BindData bound = tube.scene.data();
+        bound.vertex_data = std::span(&data, 1);
+        try {
+            const Binding binding(bound);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "nothing thrown";
+    };
+    std::vector<float> values(60);
+    EXPECT_EQ(refused({Cor::info, values}), "nothing thrown");
+    EXPECT_EQ(refused({Dq::info, values}),
+              "vertex_data: expected that of methods that need it, got that of dq");
+    values[31] = std::numeric_limits<float>::infinity();
+    EXPECT_EQ(refused({Cor::info, values}),
+              "vertex_data: expected finite values, got NaN or infinity of cor at vertex 10");
+    values.pop_back();
+    EXPECT_EQ(refused({Cor::info, values}), "vertex_data: expected 60 numbers of cor, got 59");
+}
+
+}  // namespace
+}  // namespace sinew

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Optimised centres of rotation: against the definition in float64, and what they make of a tube."""
+
+import sys
+import threading
+
+import numpy as np
+import pytest
+import reference
+import sinew
+from rigs import about, shift, transform
+
+SIGMA = 0.1
+
+
+class Tube:
+    """Length 4, radius 0.5, along z, and two bones that meet in its middle; weights change smoothly over 1 unit."""
+
+    def __init__(self, rings=81, around=32):
+        self.rings, self.around = rings, around
+        along = np.repeat(np.linspace(0.0, 4.0, rings), around)
+        angle = np.tile(np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), rings)
+        self.points = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), along])
+        t = np.clip(along - 1.5, 0.0, 1.0)
+        self.weights = np.column_stack([1.0 - t * t * (3.0 - 2.0 * t), t * t * (3.0 - 2.0 * t)])
+        ring, i = np.divmod(np.arange((rings - 1) * around), around)
+        near, far = ring * around + i, ring * around + (i + 1) % around
+        self.quads = np.column_stack([near, far, far + around, near + around])
+        self.triangles = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]]).astype(np.int32)
+
+    @property
+    def mesh(self):
+        shared = self.weights > 0.0
+        return (
+            self.points.astype(np.float32),
+            np.concatenate([[0], np.cumsum(shared.sum(axis=1))]).astype(np.int32),
+            np.nonzero(shared)[1].astype(np.int32),
+            self.weights[shared].astype(np.float32),
+        )
+
+    def centres(self, **options):
+        return sinew.centres_of_rotation(*self.mesh, self.triangles, **options)
+
+    def deformed(self, method, axis, degrees):
+        joint = shift([0.0, 0.0, 2.0])
+        bones = np.array([np.eye(4), joint @ about(axis, degrees) @ np.linalg.inv(joint)])
+        deformer = sinew.Deformer(*self.mesh, method, vertex_data={"cor": self.centres()})
+        return deformer.deform(bones.astype(np.float32)).astype(np.float64), bones
+
+    def volume(self, points):
+        around, end = self.around, len(points)
+        points = np.vstack([points, points[:around].mean(axis=0), points[-around:].mean(axis=0)])
+        i = np.arange(around)
+        next_i, last = (i + 1) % around, (self.rings - 1) * around
+        lids = [np.column_stack([np.full(around, end), next_i, i])]
+        lids.append(np.column_stack([np.full(around, end + 1), last + i, last + next_i]))
+        a, b, c = (points[corner] for corner in np.concatenate([self.triangles, *lids]).T)
+        return np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
+
+    def longest_edge(self, points):
+        """Over its length at rest."""
+        edges = np.concatenate([self.quads[:, [k, (k + 1) % 4]] for k in range(4)]).T
+        posed, rest = (np.linalg.norm(p[edges[0]] - p[edges[1]], axis=1) for p in (points, self.points))
+        return (posed / rest).max()
+
+
+def bulge(points, bones):
+    """The largest distance from the nearer bone, over the radius."""
+    joint = np.array([0.0, 0.0, 2.0])
+    ends = np.zeros(3), transform(bones[1], np.array([0.0, 0.0, 4.0]))
+    distances = []
+    for end in ends:
+        along = np.clip((points - joint) @ (end - joint) / 4.0, 0.0, 1.0)
+        distances.append(np.linalg.norm(points - joint - along[:, None] * (end - joint), axis=1))
+    return np.minimum(*distances).max() / 0.5
+
+
+# What the methods do to the tube: computed apart from this code, in numpy.
+TABLE = {
+    "lbs": (0.967, 1.010, 1.003, 1.77, 0.872, 0.09),
+    "dq": (1.000, 1.088, 1.105, 2.24, 0.998, 1.0),
+    "cor": (0.998, 1.053, 1.033, 2.00, 0.998, 1.0),
+}
+
+
+@pytest.mark.parametrize("method", TABLE)
+def test_the_table_of_the_tube(method):
+    tube = Tube()
+    bent, bones = tube.deformed(method, (1, 0, 0), 90)
+    bent_far, bones_far = tube.deformed(method, (1, 0, 0), 130)
+    twisted, _bones = tube.deformed(method, (0, 0, 1), 170)
+    volume = tube.volume(tube.points)
+    found = (
+        tube.volume(bent) / volume,
+        bulge(bent, bones),
+        bulge(bent_far, bones_far),
+        tube.longest_edge(bent),
+        tube.volume(twisted) / volume,
+        np.hypot(*twisted[:, :2].T).min() / 0.5,
+    )
+    np.testing.assert_allclose(found, TABLE[method], atol=0.01)
+
+
+def leaves(points, weights):
+    """Triangles split until weights change by less than 0.1 along each edge: area, centroid, mean weights."""
+    todo, done = [(points, weights)], []
+    while todo:
+        p, w = todo.pop()
+        changes = [np.linalg.norm(w[k] - w[(k + 1) % 3]) for k in range(3)]
+        k = int(np.argmax(changes))
+        if changes[k] < 0.1:
+            area = np.linalg.norm(np.cross(p[1] - p[0], p[2] - p[0])) / 2.0
+            done.append((area, p.mean(axis=0), w.mean(axis=0)))
+            continue
+        for replaced in (k, (k + 1) % 3):
+            p_half, w_half = p.copy(), w.copy()
+            p_half[replaced] = p[[k, (k + 1) % 3]].mean(axis=0)
+            w_half[replaced] = w[[k, (k + 1) % 3]].mean(axis=0)
+            todo.append((p_half, w_half))
+    return done
+
+
+def defined_centres(points, weights, triangles):
+    """Le and Hodgins' formula as it is printed; NaN where no triangle counts.
+
+    weights  [vertices, bones], of sum 1
+    """
+    parts = [leaf for t in triangles for leaf in leaves(points[t], weights[t])]
+    areas, centroids, means = (np.array(each) for each in zip(*parts, strict=True))
+    centres = np.full_like(points, np.nan)
+    for vertex, a in enumerate(weights):
+        product = a[None, :] * means  # a_j b_j
+        crossed = a[None, :, None] * means[:, None, :]  # a_j b_k
+        near = np.exp(-(((crossed - crossed.transpose(0, 2, 1)) / SIGMA) ** 2))
+        both = product[:, :, None] * product[:, None, :] * near
+        similarity = both.sum(axis=(1, 2)) - np.trace(both, axis1=1, axis2=2)
+        if (similarity > 0.0).any():
+            share = similarity * areas
+            centres[vertex] = share @ centroids / share.sum()
+    return centres
+
+
+def three_bones():
+    """A tube whose weights of three bones change along it and around it."""
+    tube = Tube(21, 12)
+    x, y, z = tube.points.T
+    raw = np.column_stack([np.exp(-((z - c - 0.6 * x) ** 2)) for c in (0.7, 2.1, 3.3)])
+    raw[raw < 0.15] = 0.0
+    tube.weights = (raw / raw.sum(axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
+    return tube
+
+
+@pytest.mark.parametrize("tube", [Tube(41, 16), three_bones()], ids=["two bones", "three bones"])
+def test_centres_are_those_of_the_definition(tube):
+    weights = tube.weights.astype(np.float32).astype(np.float64)
+    weights /= weights.sum(axis=1, keepdims=True)
+    expected = defined_centres(tube.points.astype(np.float32).astype(np.float64), weights, tube.triangles)
+    rigid = np.isnan(expected[:, 0])
+    expected[rigid] = tube.points[rigid]
+    assert (~rigid).sum() > 100
+    # Of the diameter, which is 1.
+    assert np.linalg.norm(tube.centres(exact=True) - expected, axis=1).max() < 1e-5
+    assert np.linalg.norm(tube.centres() - expected, axis=1).max() < 0.005
+
+
+def test_points_are_those_of_the_definition():
+    tube, rng = three_bones(), np.random.default_rng(1)
+    motions = []
+    for joint in (0.0, 1.4, 2.8):
+        axis, degrees = rng.normal(size=3), rng.uniform(-100.0, 100.0)
+        motions.append(shift([0, 0, joint]) @ about(axis, degrees) @ shift([0, 0, -joint]))
+    motions = np.array(motions, np.float32)
+    centres = tube.centres(exact=True)
+    points = sinew.Deformer(*tube.mesh, "cor", vertex_data={"cor": centres}).deform(motions)
+    weights = tube.weights / tube.weights.sum(axis=1, keepdims=True)
+    defined = defined_centres(tube.points, weights, tube.triangles)
+    rigid = np.isnan(defined[:, 0])
+    defined[rigid] = tube.points[rigid]
+    expected, margins = reference.deform("cor", *tube.mesh, motions, vertex_data={"cor": defined})
+    assert (margins > 1e-3).all()
+    diagonal = np.linalg.norm(np.ptp(tube.points, axis=0))
+    assert np.linalg.norm(points - expected, axis=1).max() < 1e-5 * diagonal
+
+
+def test_bones_of_a_vertex_may_come_twice_and_in_any_order():
+    tube = three_bones()
+    points, offsets, bones, weights = tube.mesh
+    expected = tube.centres()
+    order = np.concatenate([np.arange(e - 1, b - 1, -1) for b, e in zip(offsets, offsets[1:], strict=False)])
+    swapped = sinew.centres_of_rotation(points, offsets, bones[order], weights[order], tube.triangles)
+    np.testing.assert_allclose(swapped, expected, atol=1e-5)
+    twice = sinew.centres_of_rotation(
+        points, 2 * offsets, np.repeat(bones, 2), np.repeat(weights, 2), tube.triangles
+    )
+    np.testing.assert_allclose(twice, expected, atol=1e-5)
+
+
+def test_threads_change_no_bit():
+    tube = Tube()
+    expected = tube.centres(threads=1)
+    for threads in (None, 2, 5, 10**30):
+        np.testing.assert_array_equal(tube.centres(threads=threads), expected)
+
+
+def test_progress_is_told_on_this_thread():
+    told = []
+    Tube().centres(progress=lambda done: told.append((done, threading.current_thread())), threads=2)
+    shares = [done for done, _thread in told]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert {thread for _done, thread in told} == {threading.current_thread()}
+
+
+@pytest.mark.parametrize("at", [0.0, 0.4, 0.7, 1.0])
+def test_false_cancels_and_what_is_raised_comes_through(at):
+    tube = Tube()
+    assert tube.centres(progress=lambda done: done < at) is None
+
+    def stop(done):
+        if done >= at:
+            raise KeyError("enough")
+
+    with pytest.raises(KeyError, match="enough"):
+        tube.centres(progress=stop)
+    # Nothing at all, 0 and None are no refusal.
+    assert tube.centres(progress=lambda _done: 0) is not None
+
+
+def test_other_threads_run_meanwhile():
+    tube, moved, stop = Tube(161, 64), [], threading.Event()
+
+    def count():
+        while not stop.is_set():
+            moved.append(True)
+            stop.wait(0.0005)
+
+    thread = threading.Thread(target=count)
+    interval = sys.getswitchinterval()
+    thread.start()
+    sys.setswitchinterval(1000.0)
+    try:
+        before = len(moved)
+        for _ in range(20):
+            tube.centres(threads=1)
+            if len(moved) > before:
+                break
+        seen = len(moved) > before
+    finally:
+        sys.setswitchinterval(interval)
+        stop.set()
+        thread.join()
+    assert seen
+
+
+BAD = [
+    ("triangles", [[0, 1, 2]], "int32 [triangles, 3]", "list"),
+    ("triangles", np.zeros((2, 3)), "int32 [triangles, 3]", "float64 [2, 3]"),
+    ("triangles", np.zeros((2, 4), np.int32), "int32 [triangles, 3]", "int32 [2, 4]"),
+    ("triangles", np.int32([[0, 1, 2592]]), "numbers of vertices, below 2592", "2592 at triangle 0"),
+    ("threads", 0, "None or 1 or more", "0"),
+    ("threads", 1.5, "None or 1 or more", "float"),
+    ("progress", 3, "None or a callable", "int"),
+]
+
+
+@pytest.mark.parametrize(("argument", "value", "wanted", "got"), BAD)
+def test_what_is_refused(argument, value, wanted, got):
+    tube = Tube()
+    arguments = {"triangles": tube.triangles, argument: value}
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
+        sinew.centres_of_rotation(*tube.mesh, **arguments)
+    assert str(caught.value) == f"{argument}: expected {wanted}, got {got}"
+
+
+BAD_DATA = [
+    ([], "None or a dict of arrays by names of methods", "list"),
+    ({"dq": np.zeros((2, 0), np.float32)}, "that of methods that need it", "that of dq"),
+    ({"cor": np.zeros((2, 2), np.float32)}, "of cor float32 [vertices, 3]", "float32 [2, 2]"),
+    ({"cor": np.zeros((2, 3))}, "of cor float32 [vertices, 3]", "float64 [2, 3]"),
+    ({"cor": np.zeros((1, 3), np.float32)}, "6 numbers of cor", "3"),
+    ({"cor": np.full((2, 3), np.nan, np.float32)}, "finite values", "NaN or infinity of cor at vertex 0"),
+]
+
+
+@pytest.mark.parametrize(("data", "wanted", "got"), BAD_DATA)
+def test_vertex_data_that_is_refused(data, wanted, got):
+    mesh = np.zeros((2, 3), np.float32), np.int32([0, 1, 2]), np.int32([0, 0]), np.float32([1, 1])
+    for call in (sinew.Binding, sinew.Deformer):
+        with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
+            call(*mesh, vertex_data=data)
+        assert str(caught.value) == f"vertex_data: expected {wanted}, got {got}"
