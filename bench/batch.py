@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a batch costs beside Blender's own opening and saving, and what a second Blender brings.
+"""The time of a batch beyond Blender's own opening and saving, and the gain by a second Blender.
 
     .venv/bin/python bench/batch.py [--files 48] [--repetitions 5] [--json FILE]
 
 From the first file that is done to the last, so that no start counts; the processor's time (user and system)
-is that of whole runs, starts included. Candidates take turns, and the least of each is taken, as on a shared
-machine only that is the machine's own.
+is that of whole runs, starts included. Candidates alternate, and the least of each is taken: on a shared
+machine, others make a run only longer.
 """
 
 from __future__ import annotations

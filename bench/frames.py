@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A frame in Blender: its Armature modifier beside Sinew, on the same scene in the same run.
+"""Times of a frame in Blender with the Armature modifier and with Sinew, on the same scene in the same run.
 
-One process and one file, in which Sinew is switched off and on: both take turns at a few frames. Two
-processes differ by some percent without any of Sinew's. A frame is Scene.frame_set() and then asking for the
-evaluated mesh, which is where Sinew's points arrive.
+One process and one file, in which Sinew is switched off and on alternately, a few frames each. Two processes
+differ by some percent even without Sinew. A frame is Scene.frame_set() and then reading the evaluated mesh,
+which has Sinew's points.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ import common
 import numpy as np
 
 FRAMES = 60
-# A turn, as on playback in a row; before it some frames that are not timed, for caches and what is bound.
-TURN, BEFORE = 24, 4
+# Frames in a row, as on playback, before Sinew is switched; and frames before these that are not timed, for
+# binding and caches.
+RUN, BEFORE = 24, 4
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,10 @@ def make_tube(case: Case, index: int) -> bpy.types.Object:
     rings = max(2, case.vertices // sides)
     ring, side = np.divmod(np.arange(rings * sides), sides)
     along = ring / (rings - 1) * case.bones
-    turn = side / sides * 2 * np.pi
+    angle = side / sides * 2 * np.pi
     mesh = bpy.data.meshes.new(f"Tube {index}")
     mesh.vertices.add(len(along))
-    mesh.vertices.foreach_set("co", np.stack([np.cos(turn), along, np.sin(turn)], axis=1).ravel())
+    mesh.vertices.foreach_set("co", np.stack([np.cos(angle), along, np.sin(angle)], axis=1).ravel())
     here = (np.arange(rings - 1)[:, None] * sides + np.arange(sides)).ravel()
     beside = (np.arange(rings - 1)[:, None] * sides + (np.arange(sides) + 1) % sides).ravel()
     corners = np.stack([here, beside, beside + sides, here + sides], axis=1)
@@ -216,9 +217,9 @@ def measure(case: Case, seconds: float, leave_small: bool) -> dict:
     scene = Scene(case, leave_small)
     points, times = {}, {"modifier": [], "sinew": []}
     number, end = 1, time.perf_counter() + seconds
-    while time.perf_counter() < end or len(times["sinew"]) < 2 * TURN:
-        numbers = [1 + (number + 7 * i) % FRAMES for i in range(TURN)]
-        number += 7 * TURN
+    while time.perf_counter() < end or len(times["sinew"]) < 2 * RUN:
+        numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
+        number += 7 * RUN
         for who in times:
             scene.switch(who == "sinew")
             if who not in points:
@@ -234,7 +235,7 @@ def measure(case: Case, seconds: float, leave_small: bool) -> dict:
 
 @contextmanager
 def quiet_blender() -> Iterator[Callable[[str], None]]:
-    """Gives a function that prints, while what Blender prints is not seen."""
+    """A context with a function that prints, in which Blender's own output is discarded."""
     sys.stdout.flush()
     with os.fdopen(os.dup(1), "w") as stdout, open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
@@ -256,7 +257,9 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="up to 100,000 vertices")
     parser.add_argument("--name", default="frames", help="of the file in bench/results")
     parser.add_argument(
-        "--all-by-sinew", action="store_true", help="small meshes too, which are left to Blender otherwise"
+        "--all-by-sinew",
+        action="store_true",
+        help="small meshes too, which use their Armature modifiers otherwise",
     )
     parser.add_argument("-k", default="", help="only cases whose line has this in it")
     arguments = parser.parse_args()
@@ -285,5 +288,5 @@ if __name__ == "__main__":
     try:
         main()
     finally:
-        # Left to itself it has Blender 4.2 crash and 4.5 hang at the end.
+        # Blender's own cleanup crashes 4.2 and hangs 4.5.
         sinew_addon.unregister()

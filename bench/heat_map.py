@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the heat map adds to a frame in Blender: python bench/heat_map.py [FILE.blend MESH]
 
-Without a file a tube of 100,000 vertices. Frames with each measure and without take turns; printed are
+Without a file a tube of 100,000 vertices. Frames with each measure and without alternate; printed are
 differences of the least times, milliseconds.
 """
 
@@ -23,7 +23,7 @@ SIDES, RINGS, ROUNDS, FRAMES = 200, 500, 8, range(2, 12)
 
 
 def make_tube() -> bpy.types.Object:
-    """Along X, held by two bones that bend it by 100 degrees from frame 1 to 11."""
+    """A tube along X with two bones that bend it by 100 degrees from frame 1 to 11."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     link = bpy.context.scene.collection.objects.link
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))

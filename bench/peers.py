@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's Python package beside others that Python's registry has, on the same data in the same run."""
+"""Sinew's Python package and other packages, on the same data in the same run."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def rotate(quats: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def numpy_candidates(scene: Scene) -> dict:
-    """What one writes first with numpy, all vertices at once."""
+    """The obvious code with numpy, for all vertices at once."""
     rest, bones, weights = scene.rest, scene.bones, scene.weights
     poses = sinew.affine.to_quat_vec(scene.pose)
     duals = sinew.affine.to_dual_quat(scene.pose)

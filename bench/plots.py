@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a vertex costs against influences and against bones: two plots in docs/, a table and JSON."""
+"""The time of a vertex by influences and by bones: two plots in docs/, a table and JSON."""
 
 from __future__ import annotations
 

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Playback and live posing in Blender's window: its Armature modifier beside Sinew, in one file by turns.
+"""Playback and live posing in Blender's window, with the Armature modifier and with Sinew, in one file
+alternately.
 
     blender --factory-startup --python bench/window.py -- --zip dist/sinew-0.1.0.zip [--file RIG]
 
-Blender itself plays and draws, as fast as it can; each turn switches Sinew on or off and measures
+Blender itself plays and draws, as fast as it can; each round switches Sinew on and off and measures
 
 play  frames a second of Blender's own playback
 step  milliseconds of one change of frame without drawing
 draw  milliseconds of drawing the window when nothing changed
-pose  milliseconds from turning a bone to the end of the 3D view's drawing that shows it
+pose  milliseconds from rotating a bone to the end of the 3D view's drawing that shows it
 late  of these drawings, those that did not show it yet
 """
 
@@ -46,7 +47,7 @@ def shown_point(obj: bpy.types.Object, vertex: int) -> np.ndarray:
 
 
 def farthest_vertex(obj: bpy.types.Object) -> int:
-    """One that moves when a bone in the middle turns: the farthest from the object's origin."""
+    """A vertex that moves when a bone in the middle rotates: the farthest from the object's origin."""
     points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
     obj.data.vertices.foreach_get("co", points.ravel())
     return int((points**2).sum(axis=1).argmax())
@@ -92,7 +93,7 @@ class Bench:
     def steps(self) -> Iterator[float]:
         """Yields the seconds to wait, in which Blender does what it has to."""
         yield 1.0
-        for _turn in range(self.arguments.turns):
+        for _round in range(self.arguments.turns):
             for who, on in CANDIDATES.items():
                 for obj in self.meshes:
                     obj.sinew.enabled = on
@@ -139,7 +140,7 @@ class Bench:
             drawn.append((time.perf_counter(), shown_point(obj, vertex)))
 
         handle = bpy.types.SpaceView3D.draw_handler_add(note, (), "WINDOW", "POST_PIXEL")
-        turned = bone.rotation_quaternion.copy()
+        original = bone.rotation_quaternion.copy()
         for number in range(10):
             before = shown_point(obj, vertex)
             drawn.clear()
@@ -150,14 +151,14 @@ class Bench:
                 yield 0.1
             settled = shown_point(obj, vertex)
             if np.array_equal(settled, before):
-                raise RuntimeError("the bone that is turned moves nothing")
+                raise RuntimeError("the rotated bone moves nothing")
             shows = [np.array_equal(point, settled) for _time, point in drawn]
             if True not in shows:
                 raise RuntimeError("what is drawn is not the pose")
             self.late[who] += shows.index(True)
             self.add(who, "pose", 1e3 * (drawn[shows.index(True)][0] - start))
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
-        bone.rotation_quaternion = turned
+        bone.rotation_quaternion = original
         yield 0.1
 
     def report(self) -> None:

@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from pathlib import Path
 
 from ..core import parameters
 from ..core.errors import WrongUse
+from ..core.output import folder_to_write
+
+FILES = ".blend, .glb, .gltf or .fbx"
 
 
 def count(text: str) -> int:
@@ -15,6 +19,43 @@ def count(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"expected at least 1, got {number}")
     return number
+
+
+def frame_step(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise WrongUse(f"step: expected 1 or more frames, got {number}")
+    return number
+
+
+def add_file(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="FILE", help=FILES)
+
+
+def add_files(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=FILES)
+
+
+def add_object(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--object", metavar="NAME", help="only this mesh")
+
+
+def add_engine(parser: argparse.ArgumentParser, default: str | None = "auto") -> None:
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "workbench", "cycles"),
+        default=default,
+        help="of the pictures; auto, the default: Workbench, or Cycles where there is no OpenGL",
+    )
+
+
+def add_copies(parser: argparse.ArgumentParser) -> None:
+    """Inputs, --out and --overwrite, of commands that write a file for each input."""
+    parser.add_argument("inputs", nargs="+", metavar="FILE_OR_FOLDER")
+    parser.add_argument(
+        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:

@@ -14,9 +14,8 @@ from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..core.output import folder_to_write
 from ..jobs.inputs import Job, plan_jobs
-from .arguments import add_set
+from .arguments import add_copies, add_set, frame_step
 from .console import Console
 from .outcome import Outcome
 
@@ -44,15 +43,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="+", metavar="FILE_OR_FOLDER")
+    add_copies(parser)
     parser.add_argument("--method", required=True, help="a method of `sinew methods`")
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
-    parser.add_argument("--step", type=int, default=1, metavar="N", help="every Nth of the frames")
-    parser.add_argument(
-        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace what is there already")
+    parser.add_argument("--step", type=frame_step, default=1, metavar="N", help="every Nth of the frames")
     add_set(parser)
     return parser
 
@@ -69,8 +64,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     names = [method.name for method in sinew.methods()]
     if args.method not in names:
         raise WrongUse(f"method: expected one of {', '.join(names)}, got {args.method!r}")
-    if args.step < 1:
-        raise WrongUse(f"step: expected 1 or more frames, got {args.step}")
     frames = sorted(set(parse_frames(args.frames))) if args.frames is not None else None
     suffix = EXPORTS.get(args.to, ".blend")
     jobs = [Job(job.source, job.target.with_suffix(suffix)) for job in plan_jobs(args.inputs, args.out)]

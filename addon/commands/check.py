@@ -62,7 +62,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         for path, outcome in outcomes:
             reports.append(_report(path, outcome, status))
             if not args.json:
-                console.say(_line(reports[-1]))
+                console.say(line_of(reports[-1]))
     if args.json:
         blender = None if status is None else asdict(status)
         console.say(json.dumps({"blender": blender, "files": reports}, indent=2, ensure_ascii=False))
@@ -123,7 +123,8 @@ def _missing(status: BlenderStatus) -> list[str]:
     return []
 
 
-def _line(report: dict) -> str:
+def line_of(report: dict) -> str:
+    """The line of one file without --json."""
     if report["problems"]:
         text = "; ".join(report["problems"])
     elif report["needs_sinew"]:

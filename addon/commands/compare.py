@@ -18,7 +18,7 @@ from ..core.page import page
 from ..core.scratch import scratch_folder
 from ..core.sheet import require_pillow
 from . import sheet
-from .arguments import add_set
+from .arguments import add_engine, add_files, add_object, add_set
 from .console import Console
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.csv, metrics.json and "
         "the pictures. With --out SHEET.png it draws one frame of one file into one picture instead.",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    add_files(parser)
     parser.add_argument(
         "--methods",
         default=",".join(USUAL_METHODS),
@@ -50,7 +50,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--frames", "--frame", help="such as 1,12,40-48 (default: the file's frame range; a sheet needs one)"
     )
-    parser.add_argument("--object", metavar="NAME", help="only this mesh")
+    add_object(parser)
     parser.add_argument(
         "--pictures",
         type=int,
@@ -67,12 +67,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         help="how many bones a vertex may have before it is reported (default: %(default)s)",
     )
     parser.add_argument("--size", type=int, help="pixels of each picture (default: 480; 640 in a sheet)")
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "workbench", "cycles"),
-        default="auto",
-        help="auto: Workbench, or Cycles where there is no OpenGL",
-    )
+    add_engine(parser)
     parser.add_argument(
         "--out", required=True, type=_folder_or_sheet, metavar="DIR", help="a folder, or SHEET.png"
     )

@@ -7,8 +7,8 @@ import argparse
 from dataclasses import dataclass, field
 
 from ..core.errors import SinewError, WrongUse
-from ..core.output import folder_to_write
 from ..jobs.inputs import Job, plan_jobs
+from .arguments import add_copies, frame_step
 from .console import Console
 from .outcome import Outcome
 
@@ -32,20 +32,20 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="+", metavar="FILE_OR_FOLDER")
+    add_copies(parser)
     names = ", ".join(sinew.interpolate.METHODS)
     parser.add_argument("--method", required=True, help=f"one of {names}")
     parser.add_argument(
         "--spline", action="store_true", help="a Catmull-Rom spline through the keyed poses, not key to key"
     )
     parser.add_argument(
-        "--step", type=int, default=1, metavar="FRAMES", help="from one baked key to the next (default: 1)"
+        "--step",
+        type=frame_step,
+        default=1,
+        metavar="FRAMES",
+        help="from one baked key to the next (default: 1)",
     )
     parser.add_argument("--live", action="store_true", help="keep the action, do not bake: for Sinew to play")
-    parser.add_argument(
-        "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for the copies"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace copies that are there already")
     return parser
 
 
@@ -62,8 +62,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if args.method not in sinew.interpolate.METHODS:
         names = ", ".join(sinew.interpolate.METHODS)
         raise WrongUse(f"method: expected one of {names}, got {args.method!r}")
-    if args.step < 1:
-        raise WrongUse(f"step: expected 1 or more frames, got {args.step}")
     jobs = plan_jobs(args.inputs, args.out)
     outcomes = []
     for job in console.progress(jobs, len(jobs), "Making in-betweens"):

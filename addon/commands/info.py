@@ -8,12 +8,13 @@ import json
 from pathlib import Path
 
 from ..core.errors import SinewError
+from .arguments import add_files
 from .console import Console
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
     parser = subparsers.add_parser("info", help="list the armature-deformed meshes of files")
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    add_files(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
     return parser
 

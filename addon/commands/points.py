@@ -15,7 +15,7 @@ from ..core.errors import SinewError
 from ..core.frames import parse_frames
 from ..core.names import as_file_name
 from ..core.output import file_to_write, write_whole
-from .arguments import add_set
+from .arguments import add_file, add_object, add_set
 from .console import Console
 
 
@@ -27,12 +27,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "3], its key the object's name (with %2F for /): the vertices of the final evaluated mesh in object "
         "space; and an array `frames`.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    add_file(parser)
     parser.add_argument(
         "--method", required=True, help="a method of `sinew methods`, or blender for the Armature modifier"
     )
     parser.add_argument("--frames", required=True, help="such as 1,12,40-48")
-    parser.add_argument("--object", metavar="NAME", help="only this mesh")
+    add_object(parser)
     parser.add_argument(
         "--out", required=True, type=partial(file_to_write, endings=(".npz",)), metavar="POINTS.npz"
     )

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..core.errors import SinewError, WrongUse
@@ -17,7 +18,8 @@ from ..core.golden import (
     picture_name,
 )
 from ..core.output import folder_to_write, remove, write_text
-from .arguments import add_set
+from ..core.parameters import Value, as_texts, parse
+from .arguments import add_engine, add_file, add_object, add_set
 from .console import Console
 
 # In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
@@ -30,19 +32,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         help="draw frames under one method, and compare them with golden pictures",
         description="Draws the armature-deformed meshes of a file in clay, a picture a frame, into DIR, with "
         "render.json that says how. With --against it does the same again (camera, engine, size and, where "
-        "not given, method and frames are those of the golden pictures) and compares each frame; the exit "
-        "status is 1 where one differs by more than the tolerance.",
+        "not given, method, --set and frames are those of the golden pictures) and compares each frame; the "
+        "exit status is 1 where one differs by more than the tolerance.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help=".blend, .glb, .gltf or .fbx")
+    add_file(parser)
     parser.add_argument("--method", help="a method of `sinew methods`, or blender for the Armature modifier")
     parser.add_argument("--frames", help="such as 1,12,40-48")
-    parser.add_argument("--object", metavar="NAME", help="only this mesh")
+    add_object(parser)
     parser.add_argument("--size", type=int, help="pixels of a picture's longer side (default: 640)")
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "workbench", "cycles"),
-        help="auto, the default: Workbench, or Cycles where there is no OpenGL",
-    )
+    add_engine(parser, default=None)
     parser.add_argument(
         "--own-look",
         action="store_true",
@@ -80,11 +78,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if method is None or frames is None:
         raise WrongUse("render: --method and --frames are needed where there is no --against")
     evaluate.check_methods([method])
-    evaluate.set_parameters(args.set)
+    parameters = {**parse(golden.set), **args.set} if golden is not None else args.set
+    evaluate.set_parameters(parameters)
     if golden is not None:
         _check_fits(args, golden, frames)
     _check_free(args.out, frames)
-    _draw(args, method, frames, golden, console)
+    _draw(args, method, frames, parameters, golden, console)
     console.say(f"{len(frames)} picture{'s' if len(frames) > 1 else ''} in {args.out}")
     return _judge(args, frames, console) if golden is not None else 0
 
@@ -117,6 +116,7 @@ def _draw(
     args: argparse.Namespace,
     method: str,
     frames: list[float],
+    parameters: Mapping[str, Value],
     golden: RenderSettings | None,
     console: Console,
 ) -> None:
@@ -147,7 +147,9 @@ def _draw(
             views = evaluate.whole_views(meshes, [method], frames)
         studio = render.Studio(scene, meshes, engine, size)
     names = [obj.name for obj in meshes]
-    settings = RenderSettings(args.file.name, method, frames, engine, size, args.own_look, names, views)
+    settings = RenderSettings(
+        args.file.name, method, frames, engine, size, args.own_look, names, views, as_texts(parameters)
+    )
     # Written first: it marks the pictures as made by this command, also where it is interrupted.
     write_text(args.out / SETTINGS, settings.to_json())
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):

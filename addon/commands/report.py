@@ -10,6 +10,7 @@ from ..core.errors import SinewError
 from ..core.output import folder_to_write
 from ..core.report.model import Figure, Page
 from ..core.scratch import scratch_folder
+from .arguments import add_engine
 from .console import Console
 
 PICTURE_SIZE, QUICK_PICTURE_SIZE = 520, 64
@@ -41,12 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument(
         "--blend-files", type=Path, metavar="FOLDER", help="Sinew's example rigs (blend_files/ of a checkout)"
     )
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "workbench", "cycles"),
-        default="auto",
-        help="of the pictures; auto: Workbench, or Cycles where there is no OpenGL",
-    )
+    add_engine(parser)
     parser.add_argument(
         "--quick",
         action="store_true",

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from decimal import Decimal
 from pathlib import Path
 
@@ -27,6 +27,7 @@ class RenderSettings:
     engine   "workbench" or "cycles"; with own_look the file's own
     size     pixels of the longer side
     views    one for each frame; none with own_look
+    set      parameters as NAME=VALUE
     """
 
     file: str
@@ -37,6 +38,7 @@ class RenderSettings:
     own_look: bool
     meshes: list[str]
     views: list[View]
+    set: list[str] = field(default_factory=list)
 
     def to_json(self) -> str:
         return json.dumps(asdict(self), indent=1, default=lambda array: array.tolist())
@@ -52,6 +54,8 @@ class RenderSettings:
             raise TypeError
         if not self.own_look and len(self.views) != len(self.frames):
             raise ValueError
+        if not isinstance(self.set, list) or not all(isinstance(text, str) for text in self.set):
+            raise TypeError
 
     @classmethod
     def read(cls, folder: Path) -> RenderSettings:

@@ -304,7 +304,8 @@ def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
 
 
 def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
-    """3x3: the turn of a posed bone's axes, with the modifier's own choice of a second axis under shear."""
+    """3x3: the rotation of a posed bone's axes, with the modifier's own choice of a second axis under
+    shear."""
     x, y, z = posed[:, 0], posed[:, 1] / np.linalg.norm(posed[:, 1]), posed[:, 2]
     if y @ x < 1.0:
         x = x - y * (y @ x)

@@ -23,7 +23,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "golden"
 
 
 def turned(obj: bpy.types.Object, armature: bpy.types.Object, degrees: float = 80.0) -> None:
-    """Every bone turned about an axis of its own, both objects moved."""
+    """Every bone rotated about an axis of its own, both objects moved."""
     scenes.forget_keys(armature)
     for index, bone in enumerate(armature.pose.bones):
         axis = ((1.0, 0.2, 0.1), (0.3, 1.0, -0.2), (-0.4, 0.5, 1.0))[index % 3]
@@ -34,7 +34,7 @@ def turned(obj: bpy.types.Object, armature: bpy.types.Object, degrees: float = 8
 
 
 def rotated(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    """Bones turned by 80 degrees, both objects moved"""
+    """Bones rotated by 80 degrees, both objects moved"""
     turned(obj, armature)
 
 
@@ -68,7 +68,7 @@ def mirrored(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
 
 
 def antipodal(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    """Bones more than half a turn apart: every other vertex has its groups in the opposite order"""
+    """Bones more than 180 degrees apart: every other vertex has its groups in the opposite order"""
     turned(obj, armature, degrees=150.0)
     for vertex in range(0, len(obj.data.vertices), 2):
         entries = [(e.group, e.weight) for e in obj.data.vertices[vertex].groups]

@@ -14,7 +14,7 @@ ROUTES = (EVALUATION, UPDATE)
 def force(route: str) -> None:
     """From now on Sinew takes this route; EVALUATION as far as it goes, as some rigs can not."""
     safe_mode.set_forced(route == UPDATE)
-    # Small meshes would be left to the Armature modifier, and compared with itself.
+    # Small meshes would use the Armature modifier, which would be compared with itself.
     small_meshes.is_used = False
 
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small rigs and the questions that tests ask of them."""
+"""Small rigs, and what tests read of them."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -118,7 +119,7 @@ def shapes(obj: bpy.types.Object, frames: list[float]) -> np.ndarray:
 
 
 def modifier_shapes(obj: bpy.types.Object, frames: list[float], preserve_volume: bool) -> np.ndarray:
-    """What Blender's own Armature modifiers make of an object that Sinew does not drive."""
+    """The shapes by Blender's own Armature modifiers of an object that Sinew does not deform."""
     modifiers = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
     before = [modifier.use_deform_preserve_volume for modifier in modifiers]
     for modifier in modifiers:
@@ -135,7 +136,7 @@ def add_sinew(obj: bpy.types.Object, method: str | None = None) -> None:
 
 
 def states_of(obj: bpy.types.Object) -> list:
-    """A driven object with what is known of it at this frame, for measuring."""
+    """An object that Sinew deforms, and its state at this frame, for measuring."""
     return session.states_of([obj], bpy.context.evaluated_depsgraph_get())
 
 
@@ -152,3 +153,39 @@ def bend(armature: bpy.types.Object, degrees: float, bone: int = 1) -> None:
 
 def forget_keys(armature: bpy.types.Object) -> None:
     armature.animation_data_clear()
+
+
+def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
+    """Writes an arm, and a grid of `vertices` squared that Geometry Nodes smooth so many times as Blender
+    evaluates it, which it does to open the file."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    make_arm(sides=6, rings=5)
+    group = bpy.data.node_groups.new("Slow", "GeometryNodeTree")
+    group.is_modifier = True
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    grid, blur, position, set_position, out = (
+        group.nodes.new(kind)
+        for kind in (
+            "GeometryNodeMeshGrid",
+            "GeometryNodeBlurAttribute",
+            "GeometryNodeInputPosition",
+            "GeometryNodeSetPosition",
+            "NodeGroupOutput",
+        )
+    )
+    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = vertices
+    blur.data_type = "FLOAT_VECTOR"
+    blur.inputs["Iterations"].default_value = iterations
+    value = next(socket for socket in blur.inputs if socket.enabled and socket.name == "Value")
+    group.links.new(position.outputs["Position"], value)
+    group.links.new(grid.outputs["Mesh"], set_position.inputs["Geometry"])
+    group.links.new(next(s for s in blur.outputs if s.enabled), set_position.inputs["Position"])
+    group.links.new(set_position.outputs["Geometry"], out.inputs[0])
+    obj = bpy.data.objects.new("Slow", bpy.data.meshes.new("Slow"))
+    obj.modifiers.new("Slow", "NODES").node_group = group
+    bpy.context.scene.collection.objects.link(obj)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # To save the open file would evaluate it.
+    bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
+    bpy.data.objects.remove(obj)
+    return path

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-# Changes with any edit, and says nothing of what the file holds.
+# Changes with any edit, and is not part of the file's content.
 VOLATILE = {"rna_type", "session_uid", "is_evaluated", "execution_time", "name_full", "is_active"}
 
 

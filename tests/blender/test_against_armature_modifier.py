@@ -87,7 +87,7 @@ def test_scaled_and_mirrored_bones(scale):
 
 
 def test_sheared_bones():
-    """A turned child of an unevenly scaled parent is sheared."""
+    """A rotated child of an unevenly scaled parent is sheared."""
     obj, armature = scenes.make_arm(bones=4)
     armature.pose.bones[0].scale = (1.0, 2.0, 0.5)
     assert_equal_to_modifier(obj, [3, 7, 11])
@@ -182,7 +182,7 @@ def test_hidden_armature_still_moves_the_mesh():
 
 @pytest.mark.parametrize("method", ["lbs", "qv", "dq"])
 def test_every_method_follows_rigid_motion(method):
-    """A whole armature turned as one by its root bone turns the mesh as one."""
+    """A whole armature rotated by its root bone rotates the mesh rigidly."""
     obj, armature = scenes.make_arm(bones=3)
     scenes.forget_keys(armature)
     scenes.add_sinew(obj, method)

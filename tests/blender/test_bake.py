@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes, opened again in a Blender that has never heard of Sinew, against what Sinew showed."""
+"""Bakes, opened in a Blender without Sinew, have the shapes that Sinew had."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import struct
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 import bpy
 import numpy as np
@@ -211,28 +211,15 @@ def test_stopped_anywhere_nothing_is_left(arm, tmp_path):
         assert properties.has_sinew(obj)
 
 
-@contextmanager
-def disk(folder, options):
-    """A disk in memory, mounted at a new folder."""
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
-    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
-        pytest.skip("may not mount a disk here")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
 @pytest.fixture
 def small_disk(tmp_path):
-    with disk(tmp_path / "small", "size=64k") as folder:
+    with program.disk(tmp_path / "small", "size=64k") as folder:
         yield folder
 
 
 @pytest.fixture
 def locked_folder(tmp_path):
-    with disk(tmp_path / "locked", "ro") as folder:
+    with program.disk(tmp_path / "locked", "ro") as folder:
         yield folder
 
 
@@ -460,7 +447,7 @@ def world_shapes(objects, frames):
 @pytest.mark.parametrize("stretched", [False, True])
 @pytest.mark.parametrize("kind", core.KINDS)
 def test_several_moving_objects(arm, tmp_path, kind, stretched):
-    """Children of a rig that moves as an object, turned and scaled along axes of their own; the scene's time
+    """Children of a rig that moves as an object, rotated and scaled along axes of their own; the scene's time
     remapped or not."""
     first, path = arm
     second, rig = scenes.make_arm(name="Brother")

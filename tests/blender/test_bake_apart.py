@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exports in a second Blender, as the window makes them: the same as in this one, and nothing left of those
+"""Exports in a second Blender, as the window makes them: the same as in this one, and no remains of those
 that are stopped. Here it is a Python with bpy, in the window another of the same Blender."""
 
 from __future__ import annotations

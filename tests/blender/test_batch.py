@@ -48,41 +48,6 @@ def make_rigs(folder: Path, count: int) -> list[Path]:
     return [make_rig(folder / f"rig {number:03d}.blend", 20.0 + number) for number in range(count)]
 
 
-def make_work(path: Path, vertices: int, iterations: int) -> Path:
-    """A character beside a grid of `vertices` squared, smoothed so many times whenever it is evaluated."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scenes.make_arm(sides=6, rings=5)
-    group = bpy.data.node_groups.new("Work", "GeometryNodeTree")
-    group.is_modifier = True
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    grid, blur, position, place, out = (
-        group.nodes.new(kind)
-        for kind in (
-            "GeometryNodeMeshGrid",
-            "GeometryNodeBlurAttribute",
-            "GeometryNodeInputPosition",
-            "GeometryNodeSetPosition",
-            "NodeGroupOutput",
-        )
-    )
-    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = vertices
-    blur.data_type = "FLOAT_VECTOR"
-    blur.inputs["Iterations"].default_value = iterations
-    value = next(socket for socket in blur.inputs if socket.enabled and socket.name == "Value")
-    group.links.new(position.outputs["Position"], value)
-    group.links.new(grid.outputs["Mesh"], place.inputs["Geometry"])
-    group.links.new(next(s for s in blur.outputs if s.enabled), place.inputs["Position"])
-    group.links.new(place.outputs["Geometry"], out.inputs[0])
-    obj = bpy.data.objects.new("Work", bpy.data.meshes.new("Work"))
-    obj.modifiers.new("Work", "NODES").node_group = group
-    bpy.context.scene.collection.objects.link(obj)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    # Saving as an artist does would evaluate it.
-    bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
-    bpy.data.objects.remove(obj)
-    return path
-
-
 def start_sinew(*args: object, **options: object) -> subprocess.Popen:
     return program.start_sinew(
         *args,
@@ -153,7 +118,7 @@ def driven_points(path: Path) -> dict[str, bytes]:
 
 
 def test_settings_for_files_and_objects(tmp_path):
-    """A job file's methods, by file and object, over those for all; names left out; a report that says so."""
+    """A job file's methods by file and object take precedence over those for all; exclusions; the report."""
     for name in ("hero", "extra"):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         for part in ("Body", "Face", "Hair"):
@@ -420,8 +385,8 @@ def test_resume_does_only_what_is_missing_or_changed(tmp_path):
 
 @newest_only
 def test_hang_crash_and_greed_fail_alone(tmp_path):
-    make_work(tmp_path / "in" / "a endless.blend", 500, 100_000_000)
-    make_work(tmp_path / "in" / "b greedy.blend", 8000, 1)
+    scenes.write_slow_file(tmp_path / "in" / "a endless.blend", 500, 100_000_000)
+    scenes.write_slow_file(tmp_path / "in" / "b greedy.blend", 8000, 1)
     make_rig(tmp_path / "in" / "c good.blend")
     out = tmp_path / "out"
     arguments = ("reskin", tmp_path / "in", "--method", "dq", "--out", out, *FAST, "--jobs", 1)
@@ -478,7 +443,7 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
 def test_ctrl_c_stops_cleanly(tmp_path):
     folder = tmp_path / "in"
     make_rigs(folder, 4)
-    make_work(folder / "z endless.blend", 500, 100_000_000)
+    scenes.write_slow_file(folder / "z endless.blend", 500, 100_000_000)
     process = start_sinew("reskin", folder, "--method", "dq", "--out", tmp_path / "out", *FAST, "--jobs", 2)
     lines = [process.stderr.readline() for _ in range(4)]
     assert all("1 mesh" in line for line in lines), lines

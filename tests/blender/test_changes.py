@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes made behind Sinew's back while it drives a character, each found by breaking it once."""
+"""Changes that Sinew is not told of while it deforms a character; each was a fault once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from test_editing import assert_follows
 
 @pytest.fixture
 def keyed():
-    """A driven arm with two shape keys, the second at half."""
+    """An arm with Sinew and two shape keys, the second at half."""
     obj, armature = scenes.make_arm()
     obj.shape_key_add(name="Basis")
     key = obj.shape_key_add(name="wide")

@@ -161,7 +161,7 @@ def test_tls_as_documented(rig, tmp_path, certificates):
         done = run_sinew(*arguments(rig, tmp_path / "out", address), env_more=with_config)
         assert "can run programs" not in done.stderr
         assert addresses(processes) <= {"127.0.0.1", "::1"}
-        # Who has no key is turned away, and told so in one sentence.
+        # A client without a key is refused with one sentence.
         without = run_sinew(*arguments(rig, tmp_path / "out 2", address), status=1)
         assert "how to set up TLS" in without.stderr
         plain = run_sinew(*arguments(rig, tmp_path / "out 3", address.replace("tls", "tcp")), status=1)

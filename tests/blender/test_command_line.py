@@ -38,18 +38,20 @@ def arm_file(tmp_path):
 @pytest.mark.once
 def test_help_everywhere():
     assert "reskin" in run_sinew("--help").stdout
-    # tests/python/test_documented.py holds that README names them all.
+    # tests/python/test_documented.py checks that README names them all.
     _parser, commands = make_parser()
     assert "check" in commands
     for command in commands:
         assert "usage: sinew" in run_sinew(command, "--help").stdout
 
 
+@pytest.mark.once
 def test_wrong_use_has_status_2():
     run_sinew(status=2)
     run_sinew("points", status=2)
 
 
+@pytest.mark.once
 def test_methods_is_the_table():
     printed = json.loads(run_sinew("methods", "--json").stdout)
     assert [row["name"] for row in printed["methods"]] == METHODS
@@ -149,6 +151,7 @@ def test_parameters_are_set_by_name(tmp_path):
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "status", "sentence"),
     [

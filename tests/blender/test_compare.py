@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare` and `sinew render`: what they measure, find and draw, on files whose answers are known."""
+"""`sinew compare` and `sinew render`: their numbers, findings and pictures, on files with known results."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from conftest import REPOSITORY
 from sinew_addon.commands import compare, render
 from sinew_addon.commands.console import Console
 from sinew_addon.core.errors import SinewError
+from sinew_addon.core.golden import RenderSettings
 from sinew_addon.features.pages import pictures, video
 from test_command_line import run_sinew
 
@@ -122,6 +123,7 @@ def test_several_meshes_and_modifiers_in_front_are_measured_as_one(tmp_path):
     assert ((tmp_path / "two.html").read_text(encoding="utf-8").count("<img") > 2) == NEWEST
 
 
+@pytest.mark.once
 def test_frames_below_zero(tmp_path):
     scenes.make_arm()
     path = save(tmp_path / "arm.blend")
@@ -190,7 +192,7 @@ def test_a_page_holds_its_pictures_and_a_video(tmp_path):
     assert re.findall(r'(?:src|href)="(?!data:image/png;base64,)', page) == []
     drawn = sorted((tmp_path / "wrist" / "pictures").glob("*.png"))
     assert page.count("<img") == len(drawn)
-    # Every measure is worst at the half turn.
+    # Every measure is worst at 180 degrees.
     assert {p.name for p in drawn if p.stem.count("-") == 1} == {"lbs-24.png", "dq-24.png"}
     for picture in drawn:
         assert len(opaque_pixels(picture)) > 500, picture
@@ -228,6 +230,21 @@ def test_a_video_shows_one_picture_after_the_other(tmp_path):
         bpy.ops.render.render(write_still=True)
         shown = pictures.read_picture(tmp_path / "frame.png")[24, 32, :3]
         np.testing.assert_allclose(shown, colour, atol=0.05)
+
+
+@pytest.mark.once
+def test_golden_pictures_keep_their_parameters(tmp_path):
+    scenes.make_arm()
+    path, golden, now = save(tmp_path / "arm.blend"), tmp_path / "golden", tmp_path / "now"
+    mix = ("--set", "mix=dq", "--set", "mix.group=bone.1")
+    run_sinew("render", path, "--method", "lbs", "--frames", "11", "--size", 128, *mix, "--out", golden)
+    result = run_sinew("render", path, "--against", golden, "--out", now)
+    assert "1 of 1 pictures within" in result.stdout
+    # What is given wins, and is written to the new pictures' own settings.
+    off = ("--set", "mix=off")
+    run_sinew("render", path, *off, "--against", golden, "--out", now, status=1)
+    settings = RenderSettings.read(now)
+    assert settings.set == ["mix.method=off", "mix.group=bone.1"]
 
 
 def test_golden_pictures(tmp_path):

@@ -612,7 +612,7 @@ def test_what_can_not_be_compared():
 
 
 def test_a_linked_character(tmp_path):
-    """Without an override Sinew can not drive it; its copies are local."""
+    """Without an override Sinew can not deform it; its copies are local."""
     obj, _armature = scenes.make_arm()
     expected = shapes_of_methods(obj, [1, 11])
     test_restore.save(tmp_path / "library.blend")
@@ -633,7 +633,7 @@ def test_a_linked_character(tmp_path):
 
 
 def test_without_sinew_the_file_opens(tmp_path):
-    """The copies of a saved comparison keep their places, and have Blender's nearest shapes."""
+    """The copies of a saved comparison keep their positions, and have Blender's nearest shapes."""
     obj, _armature = scenes.make_arm()
     bpy.context.scene.frame_set(11)
     compare(obj, {"lbs", "dq"})

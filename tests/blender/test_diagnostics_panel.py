@@ -63,8 +63,8 @@ def test_finds_exactly_the_planted_faults(skinned):
 
 
 def twisted_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
-    """Hard weights, but for one vertex that three bones share and one that two do. The bones turn apart until
-    frame 11: the second by 100 degrees, the third by 200 or, against the first, 160 the other way."""
+    """Hard weights, but for one vertex that three bones share and one that two do. The bones rotate apart
+    until frame 11: the second by 100 degrees, the third by 200 or, against the first, 160 the other way."""
     obj, armature = scenes.make_arm(bones=3, rings=19, weights="hard")
     scenes.forget_keys(armature)
     for group in obj.vertex_groups:
@@ -91,7 +91,7 @@ def test_what_depends_on_poses_is_found_at_the_frame_and_in_the_action():
     assert found(obj) == {}
     bpy.context.scene.frame_set(11)
     bpy.ops.sinew.check()
-    # Three bones, each less than a half turn from the next and more from the one after: the way depends.
+    # Three bones, each less than 180 degrees from the next and more from the one after: the order decides.
     assert found(obj) == {"order_of_groups": [100]}
     bpy.context.scene.frame_set(10)
     bpy.ops.sinew.check()

@@ -154,7 +154,7 @@ def test_a_simulation_behind_runs_on_the_shape_of_its_own_frame(set_up: Setup):
 
 @pytest.mark.parametrize("set_up", [still, modifier_in_front, shared_mesh])
 def test_what_follows_a_deformed_mesh_deforms_by_the_same_frame(set_up: Setup):
-    """Of the first evaluation: anything that asks later would have Blender evaluate the rest."""
+    """Read in the first evaluation: a later request would have Blender evaluate the rest."""
     followed, armature = scenes.make_arm()
     set_up(followed, armature)
     obj, follower = scenes.make_arm()
@@ -298,7 +298,7 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
     expected = {name: scenes.final_points(bpy.data.objects[name]) for name in names}
     reskin.reskin(task(path), lambda _doing: None)
     copy = str(tmp_path / "unfinished.blend")
-    # As the file has it, before Sinew looks at it: by the modifiers.
+    # As saved in the file, before Sinew deforms it: by the modifiers.
     with updates_suspended():
         bpy.ops.wm.open_mainfile(filepath=copy)
         for name in names:
@@ -311,8 +311,8 @@ def test_a_copy_holds_what_the_window_would_show(tmp_path):
 
 
 def test_objects_that_move_beside_their_armatures():
-    """Their places are of the frame when Sinew is asked, whichever thread of Blender's is the first: several
-    objects, which one action moves."""
+    """Their transforms are of the frame when Sinew deforms, whichever thread of Blender's is the first:
+    several objects, which one action moves."""
     objects = [scenes.make_arm(sides=6, rings=9, name=name)[0] for name in ("One", "Two", "Three")]
     first = objects[0]
     first.keyframe_insert("location", frame=1)
@@ -361,7 +361,7 @@ def test_the_memory_of_an_attribute_is_its_meshs_alone():
 
 
 def test_a_frame_writes_into_the_evaluated_mesh_alone():
-    """Not into the mesh itself, of which it is a copy; and who asks what Sinew gave gets the same."""
+    """Not into the mesh itself, of which it is a copy; state_of() returns the same shape."""
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(1)

@@ -78,7 +78,7 @@ def test_colours_are_those_of_the_measure(quantity, set_up):
     obj, armature = scenes.make_arm()
     if set_up is not None:
         set_up(obj)
-    # Bent so far that linear blend turns faces over.
+    # Bent so far that linear blend flips faces.
     scenes.key_pose(armature, 170.0)
     obj.modifiers["Armature"].use_deform_preserve_volume = True
     scenes.add_sinew(obj, "lbs")
@@ -346,7 +346,7 @@ def test_a_duplicate_has_colours_of_its_own():
 
 
 def test_a_render_shows_it(tmp_path):
-    """Cycles, looking along the tube's side: most of it violet to yellow, nothing of the red material."""
+    """Cycles, seen from beside the tube: most of it violet to yellow, nothing of the red material."""
     obj, _armature = scenes.make_arm()
     red = bpy.data.materials.new("Red")
     if bpy.app.version < (5, 0):

@@ -213,7 +213,7 @@ MODES = ["EDIT", "SCULPT"]
 
 @pytest.mark.parametrize("event", [*MODES, "added", "added at a frame", "changed"])
 def test_one_update_is_enough(event):
-    """What waits for the modifiers in front is not left at rest until the pose changes."""
+    """A mesh that waits for the modifiers in front does not stay at rest until the pose changes."""
     obj = arm_with("CAST" if event.startswith("added") else "SUBSURF")
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(8)

@@ -30,7 +30,7 @@ CLOSE = 2e-6
 
 
 def make_rig(modes: tuple[str, ...] = ("QUATERNION", "ZXY", "AXIS_ANGLE"), name: str = "Rig"):
-    """A chain of bones along Y, the rest turned about X by 0.3 each, one for each rotation mode."""
+    """A chain of bones along Y, at rest rotated about X by 0.3 each, one for each rotation mode."""
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     bpy.context.scene.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
@@ -50,7 +50,7 @@ def make_rig(modes: tuple[str, ...] = ("QUATERNION", "ZXY", "AXIS_ANGLE"), name:
 
 
 def key_random_poses(armature, frames=KEYS, interpolation="LINEAR", seed=1, most=2.2) -> None:
-    """Location, rotation and scale of every bone keyed; turns of at most `most` radians from the rest."""
+    """Location, rotation and scale of every bone keyed; rotations of at most `most` radians from the rest."""
     random = np.random.default_rng(seed)
     for frame in frames:
         for bone in armature.pose.bones:
@@ -207,7 +207,7 @@ def test_equals_the_library_between_keys_and_blender_at_keys(method, path):
 
 
 def test_sclerp_is_the_screw():
-    """Half a screw, in closed form: half the angle about the same line, half the shift along it."""
+    """Half a screw, in closed form: half the angle about the same line, half the translation along it."""
     armature = make_rig(("QUATERNION",))
     bone = armature.pose.bones[0]
     axis, point, angle, shift = np.array([2.0, -1.0, 2.0]) / 3.0, np.array([0.5, 1.0, -0.25]), 2.5, 1.5
@@ -233,7 +233,7 @@ def test_sclerp_is_the_screw():
 
 @pytest.mark.parametrize("interpolation", ["BEZIER", "CONSTANT", "SINE", "BACK", "ELASTIC", "BOUNCE", "EXPO"])
 def test_timing_is_that_of_the_keys(interpolation):
-    """A hinge has one way to go, so that only the timing is left: Blender's own."""
+    """A hinge has only one path, so that only the timing can differ: it is Blender's own."""
     armature = make_rig(("XYZ",))
     bone = armature.pose.bones[0]
     for frame, angle in zip(KEYS, (0.0, 1.4, 0.3, 1.0), strict=True):
@@ -367,8 +367,8 @@ def test_everything_else_in_the_action_plays_on():
 
 
 def test_channels_without_keys_are_left_alone():
-    """A bone that only turns does not swing about where it was put by hand; one turned about one axis keeps
-    its other angles."""
+    """A bone that only rotates does not swing about where it was put by hand; one rotated about one axis
+    keeps its other angles."""
     armature = make_rig(("QUATERNION", "XYZ", "XYZ"))
     turning, hinge, sliding = armature.pose.bones
     turning.location, hinge.rotation_euler = (1.0, 2.0, 3.0), (0.0, 0.5, 0.0)
@@ -501,7 +501,7 @@ def test_cycles_repeat_the_inbetweens(mode, path):
         moved[..., :3, 3] -= rounds * gain
         # float32 times and values, some rounds away.
         assert np.abs(moved - one_round).max() < 2e-5
-    # Across the seam a spline has no corner: the same speed on both sides.
+    # A spline has no corner at the seam: the same speed before and after it.
     before, at, after = film(armature, (31 - 0.01, 31, 31 + 0.01), "matrix_basis")
     corner = np.abs((after - at) - (at - before)).max()
     assert (corner < 1e-3) == (path == "spline")
@@ -718,7 +718,7 @@ np.savez(sys.argv[3], opened=opened, film=film, action=armature.animation_data.a
 
 
 def play_without_sinew(path, folder, frames) -> dict[str, np.ndarray]:
-    """The file in a Blender that has never heard of Sinew: as it opens, and its frames."""
+    """The file in a Blender without Sinew: as it opens, and its frames."""
     np.savez(folder / "frames.npz", frames=np.array(frames, dtype=float))
     result = folder / "read.npz"
     arguments = [str(path), str(folder / "frames.npz"), str(result)]
@@ -915,7 +915,8 @@ def test_bake_every_few_frames_keeps_the_keyed_poses():
 
 
 def test_baked_rotations_do_not_tumble_between_frames():
-    """Quaternions of either sign and angles of several turns at keys: neighbouring keys are written close."""
+    """Quaternions of either sign and angles beyond 360 degrees at keys: neighbouring keys are written
+    close."""
     armature = make_rig(("QUATERNION", "XYZ", "AXIS_ANGLE"))
     for number, frame in enumerate(KEYS):
         turn = Quaternion((1, 0.2, 0), 0.6 * (number + 1))

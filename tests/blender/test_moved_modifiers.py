@@ -146,7 +146,7 @@ def test_a_chain_with_a_modifier_that_has_no_armature_follows_the_pose(place):
     expected = scenes.shapes(obj, FRAMES)
     scenes.add_sinew(obj, "lbs")
     check(obj, expected)
-    # By hand, where no event of a frame mends what the evaluation left.
+    # By hand: no event of a frame then corrects the result of the evaluation.
     bone = armature.pose.bones[1]
     bone.rotation_mode, bone.rotation_euler = "XYZ", (0.5, 0.4, 0.3)
     bpy.context.view_layer.update()

@@ -151,7 +151,7 @@ def test_an_edit_behind_something_in_front_before_a_frame_is_seen():
 
 @pytest.mark.parametrize("frame", [1, 6])
 def test_applied(arm, frame):
-    """At rest, too, where a deleted one would look the same."""
+    """Also at rest, where a deleted one has the same shape."""
     shown = scenes.shapes(arm, [frame])[0]
     bpy.ops.object.modifier_apply(modifier=stack.sinew_modifier(arm).name)
     for frame in FRAMES:
@@ -177,7 +177,7 @@ def test_converted_to_a_mesh(arm):
 @pytest.mark.parametrize("frame", [1, 6])
 @pytest.mark.parametrize("enabled", [True, False])
 def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame):
-    """At rest, too, where an applied one would look the same."""
+    """Also at rest, where an applied one has the same shape."""
     expected = scenes.shapes(arm, FRAMES)
     bpy.context.scene.frame_set(frame)
     properties.of(arm).enabled = enabled

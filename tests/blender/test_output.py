@@ -13,14 +13,13 @@ import re
 import resource
 import subprocess
 import zipfile
-from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 import scenes
-from program import run_sinew, start_sinew
+from program import disk, run_sinew, start_sinew
 from sinew_addon import cli
 from sinew_addon.core import output
 from sinew_addon.core.errors import SinewError, WrongUse
@@ -75,19 +74,6 @@ def arguments_of(writer: str, inputs: dict, out: Path) -> list[str]:
     return [str(places.get(argument, argument)) for argument in arguments]
 
 
-@contextmanager
-def disk(folder: Path, options: str):
-    """A disk in memory, mounted at a new folder."""
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
-    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
-        pytest.skip("may not mount a disk here")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
 def complaint(errors: str) -> str:
     """The one line that says what is wrong."""
     (line,) = [line for line in errors.splitlines() if line.startswith("sinew: ")]
@@ -104,6 +90,7 @@ def all_in(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
 
 
+@pytest.mark.once
 def test_every_command_that_writes_is_tested_here():
     commands = re.findall(r"^    ([a-z]+)\b", run_sinew("--help").stdout, re.MULTILINE)
     assert len(commands) > 8
@@ -190,6 +177,7 @@ def test_a_write_that_stops_half_way(writer, inputs, tmp_path):
     assert all(json.loads(path.read_text()) for path in left if path.name == "report.json")
 
 
+@pytest.mark.once
 def test_a_device_is_not_replaced(tmp_path):
     """To rename a file to /dev/null would take that away from the whole machine."""
     pipe = tmp_path / "pipe.npz"
@@ -198,6 +186,7 @@ def test_a_device_is_not_replaced(tmp_path):
         output.file_to_write(pipe, (".npz",))
 
 
+@pytest.mark.once
 def test_points_replace_no_other_kind_of_file(inputs):
     before = inputs["FILE"].read_bytes()
     refused = run_sinew(*arguments_of("points", inputs, inputs["FILE"]), status=2)
@@ -215,6 +204,7 @@ def test_what_is_raised_meanwhile_leaves_nothing(tmp_path):
     assert all_in(tmp_path) == []
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("arguments", [("methods",), ("methods", "--json"), ("info", "FILE")])
 def test_standard_output_on_a_full_disk(arguments, inputs):
     with open("/dev/full", "w") as full:
@@ -264,6 +254,7 @@ def test_what_can_not_be_read(arguments, inputs, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if "unfinished" in path.name]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("option", ["--job"])
 def test_a_job_file_that_is_a_folder(option, tmp_path):
     refused = run_sinew("reskin", option, tmp_path, "--out", tmp_path / "out", status=2)
@@ -303,6 +294,7 @@ def test_names_of_objects_stay_in_the_archive(tmp_path):
             assert not re.search(r"[/\\]|^\.+$|^[A-Za-z]:", member.removesuffix(".npy")), member
 
 
+@pytest.mark.once
 def test_names_can_be_had_back():
     from urllib.parse import unquote
 
@@ -355,6 +347,7 @@ def test_no_two_frames_have_one_picture(inputs, tmp_path):
     assert len(list(out.glob("*.png"))) == 5
 
 
+@pytest.mark.once
 def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
     picture = tmp_path / "0006.png"
     picture.write_bytes(b"rendered for days")
@@ -366,11 +359,13 @@ def test_pictures_of_somebody_else_are_not_replaced(inputs, tmp_path):
     run_sinew(*command)
 
 
+@pytest.mark.once
 def test_the_wrong_ending():
     with pytest.raises(WrongUse, match=r"expected a name ending in \.png"):
         output.file_to_write("sheet.jpg", (".png",))
 
 
+@pytest.mark.once
 def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
     """Of dead runs alone: those of a live one, of another program and of nobody knows whom stay."""
     temporary = tmp_path / "tmp"
@@ -409,6 +404,7 @@ def test_scratch_folders_of_killed_runs_go(tmp_path, inputs):
             process.communicate()
 
 
+@pytest.mark.once
 def test_a_batch_clears_away_after_one_that_was_killed(tmp_path, inputs):
     temporary = tmp_path / "tmp"
     temporary.mkdir()

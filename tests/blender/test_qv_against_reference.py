@@ -31,13 +31,13 @@ def assert_equal_to_reference(obj: bpy.types.Object, frame: int) -> None:
             indices.append(bones.index(obj.vertex_groups[entry.group].name))
             weights.append(entry.weight)
         offsets.append(len(indices))
-    # The blend turns about the armature's origin, wherever the mesh object lies.
+    # The blend rotates about the armature's origin, wherever the mesh object is.
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
     rest = scenes.rest_points(obj)[::7] @ to_armature[:3, :3].T + to_armature[:3, 3]
     expected, margins = reference.deform("qv", rest, offsets, indices, weights, motions)
     back = np.linalg.inv(to_armature)
     expected = expected @ back[:3, :3].T + back[:3, 3]
-    # Within rounding of a tie of signs both sides are right.
+    # Within rounding of a tie, both signs are right.
     decided = margins > 1e-4
     assert decided.mean() > 0.95
     assert scenes.worst(

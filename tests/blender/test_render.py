@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures: what renders with Sinew equals what renders with the Armature modifier."""
+"""Pictures rendered with Sinew equal those rendered with the Armature modifier."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -49,6 +51,27 @@ def read_picture(path) -> np.ndarray:
     return pixels
 
 
+def with_and_without(
+    folder,
+    obj: bpy.types.Object,
+    method: str,
+    frames: tuple[int, int],
+    change: Callable[[], None] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rendered frames with Sinew, and those with the Armature modifier before.
+
+    change  called once Sinew is on the object
+    """
+    scene = bpy.context.scene
+    (folder / "modifier").mkdir()
+    (folder / "sinew").mkdir()
+    expected = render_animation(scene, folder / "modifier", frames)
+    scenes.add_sinew(obj, method)
+    if change is not None:
+        change()
+    return render_animation(scene, folder / "sinew", frames), expected
+
+
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "motion blur"])
 @pytest.mark.parametrize(("method", "preserve_volume"), [("lbs", False), ("dq", True)])
 def test_background_animation_equals_the_modifier(tmp_path, method, preserve_volume, motion_blur):
@@ -56,12 +79,8 @@ def test_background_animation_equals_the_modifier(tmp_path, method, preserve_vol
     scene = bpy.context.scene
     prepare(scene, motion_blur)
     obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
-    (tmp_path / "modifier").mkdir()
-    (tmp_path / "sinew").mkdir()
-    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
+    got, expected = with_and_without(tmp_path, obj, method, (5, 7))
     assert np.abs(expected[0] - expected[2]).mean() > 0.005, "nothing moves: nothing is tested"
-    scenes.add_sinew(obj, method)
-    got = render_animation(scene, tmp_path / "sinew", (5, 7))
     # Points equal to 1e-6 still move a sample across a silhouette here and there.
     assert np.abs(got - expected).mean() < 2e-4
 
@@ -85,12 +104,7 @@ def test_hidden_rig_renders_like_the_modifier(tmp_path):
     scene = bpy.context.scene
     prepare(scene, motion_blur=False)
     armature.hide_render = armature.hide_viewport = True
-    (tmp_path / "modifier").mkdir()
-    (tmp_path / "sinew").mkdir()
-    expected = render_animation(scene, tmp_path / "modifier", (9, 9))
-    scenes.add_sinew(obj, "lbs")
-    scene.frame_set(1)
-    got = render_animation(scene, tmp_path / "sinew", (9, 9))
+    got, expected = with_and_without(tmp_path, obj, "lbs", (9, 9), lambda: scene.frame_set(1))
     assert np.abs(got - expected).mean() < 2e-4
 
 
@@ -108,8 +122,8 @@ def test_after_a_render_the_current_frame_is_shown(tmp_path):
 
 def moving_parent(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     obj.parent = armature
-    for frame, place in ((1, (0.0, 0.0, 0.0)), (11, (0.5, 0.5, 0.0))):
-        armature.location = place
+    for frame, location in ((1, (0.0, 0.0, 0.0)), (11, (0.5, 0.5, 0.0))):
+        armature.location = location
         armature.keyframe_insert("location", frame=frame)
     obj.modifiers.new("Behind", "SUBSURF").render_levels = 1
 
@@ -160,12 +174,8 @@ def test_set_ups_render_like_the_modifier(tmp_path, set_up, motion_blur):
     scene = bpy.context.scene
     prepare(scene, motion_blur)
     set_up(obj, armature)
-    (tmp_path / "modifier").mkdir()
-    (tmp_path / "sinew").mkdir()
-    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
+    got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7))
     assert np.abs(expected[0] - expected[2]).mean() > 0.002, "nothing moves: nothing is tested"
-    scenes.add_sinew(obj, "lbs")
-    got = render_animation(scene, tmp_path / "sinew", (5, 7))
     assert np.abs(got - expected).mean() < 3e-4
 
 
@@ -186,11 +196,7 @@ def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered
         flags.show_render = value > 0.5
         flags.keyframe_insert("show_render", frame=frame)
     scene.frame_set(1)
-    (tmp_path / "modifier").mkdir()
-    (tmp_path / "sinew").mkdir()
-    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
-    scenes.add_sinew(obj, "lbs")
-    got = render_animation(scene, tmp_path / "sinew", (5, 7))
+    got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7))
     assert np.abs(got - expected).mean() < 3e-4
 
 
@@ -206,13 +212,12 @@ def test_keys_of_settings_and_of_modifiers_behind_are_rendered(tmp_path):
         cast.factor = float(value)
         cast.keyframe_insert("factor", frame=frame)
     scene.frame_set(11)
-    (tmp_path / "modifier").mkdir()
-    (tmp_path / "sinew").mkdir()
-    expected = render_animation(scene, tmp_path / "modifier", (5, 7))
-    scenes.add_sinew(obj, "dq")
-    for frame, method in ((8, "lbs"), (9, "dq")):
-        properties.of(obj).method = method
-        obj.keyframe_insert("sinew.method", frame=frame)
-    scene.frame_set(11)
-    got = render_animation(scene, tmp_path / "sinew", (5, 7))
+
+    def key_method() -> None:
+        for frame, method in ((8, "lbs"), (9, "dq")):
+            properties.of(obj).method = method
+            obj.keyframe_insert("sinew.method", frame=frame)
+        scene.frame_set(11)
+
+    got, expected = with_and_without(tmp_path, obj, "dq", (5, 7), key_method)
     assert np.abs(got - expected).mean() < 3e-4

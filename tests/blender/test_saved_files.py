@@ -48,7 +48,7 @@ print("FACTS " + json.dumps({
 
 
 def without_sinew(path: Path) -> tuple[np.ndarray, dict]:
-    """The shapes at FRAMES in a Blender that has never heard of Sinew, and what the file tells there."""
+    """The shapes at FRAMES in a Blender without Sinew, and the file's message there."""
     result = path.with_suffix(".npy")
     run = subprocess.run(
         [sys.executable, "-c", READ, str(path), str(result), json.dumps(FRAMES)],

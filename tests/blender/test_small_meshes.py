@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small meshes are left to their Armature modifiers while these give the same shape, and Sinew stays on."""
+"""Small meshes use their Armature modifiers while these have the same shape, and Sinew stays on."""
 
 from __future__ import annotations
 

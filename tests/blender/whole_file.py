@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All that the open file holds: every property of every datablock, walked through RNA, to compare files."""
+"""Everything in the open file: every property of every datablock, read through RNA, to compare files."""
 
 from __future__ import annotations
 
@@ -7,9 +7,14 @@ import os
 import warnings
 
 import bpy
+import numpy as np
 import scenes
 
-# Of this process, or computed anew from the rest; nothing that a file holds.
+# From so many items on, numbers of a collection are read by foreach_get: a mesh has hundreds of thousands.
+MANY = 32
+ELEMENT_TYPES = {"FLOAT": np.float32, "INT": np.int32, "BOOLEAN": np.bool_}
+
+# Properties of this process, or computed from the others; not stored in files.
 VOLATILE = {
     "bl_rna",
     "corner_normals",
@@ -24,11 +29,42 @@ VOLATILE = {
     "polygon_normals",
     "rna_type",
     "session_uid",
-    "spaces",  # 4.2 crashes when asked what an editor shows
+    "spaces",  # 4.2 crashes when an editor's content is read
     "tag",
-    "uv_sculpt",  # and when asked for its brush
+    "uv_sculpt",  # and when its brush is read
     "vertex_normals",
 }
+
+
+class Column:
+    """One property of all items of a collection, [items, ...]. Equal where all bits are."""
+
+    def __init__(self, values: np.ndarray) -> None:
+        self.values = values
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Column) or self.values.shape != other.values.shape:
+            return False
+        return self.values.tobytes() == other.values.tobytes()
+
+    def __hash__(self) -> int:
+        return hash(self.values.tobytes())
+
+    def __repr__(self) -> str:
+        return f"{self.values.shape} {self.values.dtype}"
+
+    def differences(self, path: str, other: object) -> list[str]:
+        """A line for each item that differs; `path` has [*] where its number belongs."""
+        if not isinstance(other, Column) or self.values.shape != other.values.shape:
+            return [f"{path}: {self!r} -> {other!r}"]
+        start, _star, end = path.rpartition("[*]")
+        rows = (array.values.reshape(len(array.values), -1) for array in (self, other))
+        pairs = enumerate(zip(*rows, strict=True))
+        return [
+            f"{start}[{i}]{end}: {mine} -> {theirs}"
+            for i, (mine, theirs) in pairs
+            if mine.tobytes() != theirs.tobytes()
+        ]
 
 
 def of_open_file() -> dict[str, object]:
@@ -63,16 +99,18 @@ def differences(before: dict[str, object], after: dict[str, object]) -> list[str
     """One line for each value that is not the same."""
     lines = [f"gone: {path} = {before[path]!r}" for path in before if path not in after]
     lines += [f"new: {path} = {after[path]!r}" for path in after if path not in before]
-    lines += [
-        f"{path}: {before[path]!r} -> {after[path]!r}"
-        for path in before
-        if path in after and before[path] != after[path]
-    ]
+    for path, value in before.items():
+        if path not in after or value == after[path]:
+            continue
+        if isinstance(value, Column):
+            lines += value.differences(path, after[path])
+        else:
+            lines.append(f"{path}: {value!r} -> {after[path]!r}")
     return [line if len(line) < 300 else f"{line[:300]}…" for line in lines]
 
 
 class _Walk:
-    """Through one datablock: what it holds is walked, once; what it refers to elsewhere is noted by name."""
+    """Reads one datablock: its own data once, references to other datablocks by name."""
 
     def __init__(self, found: dict[str, object], owner: bpy.types.ID) -> None:
         self.found = found
@@ -103,8 +141,11 @@ class _Walk:
             return
         if prop.type == "COLLECTION":
             self.found[path] = len(value)
-            for index, item in enumerate(value):
-                self.pointer(item, f"{path}[{index}]")
+            if len(value) >= MANY and len({type(item) for item in value}) == 1:
+                self.columns(value, path)
+            else:
+                for index, item in enumerate(value):
+                    self.pointer(item, f"{path}[{index}]")
         elif prop.type == "POINTER":
             self.pointer(value, path)
         elif getattr(prop, "is_array", False):
@@ -114,6 +155,30 @@ class _Walk:
             self.found[path] = os.path.normpath(bpy.path.abspath(value, library=self.owner.library))
         else:
             self.found[path] = repr(value)
+
+    def columns(self, items: bpy.types.bpy_prop_collection, path: str) -> None:
+        """Many items of one type: numbers of all of them at once, other properties one by one."""
+        if isinstance(items[0], bpy.types.ID) or items[0].id_data not in (None, self.owner):
+            for index, item in enumerate(items):
+                self.pointer(item, f"{path}[{index}]")
+            return
+        single = []
+        for prop in items[0].bl_rna.properties:
+            if prop.identifier in VOLATILE:
+                continue
+            # The number of a polygon's vertices differs from polygon to polygon.
+            is_ragged = (items[0].bl_rna.identifier, prop.identifier) == ("MeshPolygon", "vertices")
+            if prop.type in ELEMENT_TYPES and not prop.is_runtime and not is_ragged:
+                size = max(prop.array_length, 1)
+                values = np.empty((len(items), size), ELEMENT_TYPES[prop.type])
+                items.foreach_get(prop.identifier, values.ravel())
+                self.found[f"{path}[*].{prop.identifier}"] = Column(values)
+            else:
+                single.append(prop)
+        for index, item in enumerate(items):
+            for prop in single:
+                self.value(item, prop, f"{path}[{index}].{prop.identifier}")
+            self.custom(item, f"{path}[{index}]")
 
     def pointer(self, value: object, path: str) -> None:
         if isinstance(value, bpy.types.ID) and not getattr(value, "is_embedded_data", False):

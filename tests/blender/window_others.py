@@ -185,7 +185,7 @@ def click_during_unlocked_renders(run: Run) -> Steps:
                 # The button is grey.
                 pass
         yield from wait()
-    # As an artist would look whether all is well.
+    # As an artist checks the result.
     for name in ("Hero", "Small", "Front", "Late"):
         with contextlib.suppress(RuntimeError):
             click("sinew.add", name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads files that were saved with Sinew, in a Blender that has never heard of it.
+"""Reads files that were saved with Sinew, in a Blender without it.
 
     python window_read.py SAVED.json
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Colours, plots and the comparison of pictures."""
 
+import json
 import re
 import sys
 from xml.etree import ElementTree
@@ -15,6 +16,7 @@ from sinew_addon.core.metrics import METRICS, Summary
 from sinew_addon.core.page import legend_texts, page
 from sinew_addon.core.plots import line_plot
 from sinew_addon.core.sheet import Column, write_sheet
+from sinew_addon.core.views import View
 
 
 def lightness(colours):
@@ -184,6 +186,23 @@ def test_a_folder_that_holds_no_golden_pictures_is_named(tmp_path):
     with pytest.raises(SinewError, match="sinew render"):
         golden.RenderSettings.read(tmp_path)
     (tmp_path / golden.SETTINGS).write_text('{"frames": 3}')
+    with pytest.raises(SinewError, match="make the pictures again"):
+        golden.RenderSettings.read(tmp_path)
+
+
+def test_settings_of_golden_pictures_are_read_as_written(tmp_path):
+    view = View(np.array([0.0, -1.0, 0.0]), np.zeros(3), 1.0, 2.0, 3.0)
+    names = ("a.blend", "lbs", [1, 2.5], "cycles", 64, False, ["Body"], [view, view])
+    settings = golden.RenderSettings(*names, set=["mix.method=dq", "mix.group=Arms"])
+    path = tmp_path / golden.SETTINGS
+    path.write_text(settings.to_json())
+    assert golden.RenderSettings.read(tmp_path).to_json() == settings.to_json()
+    # Written by a version without parameters.
+    older = json.loads(settings.to_json())
+    del older["set"]
+    path.write_text(json.dumps(older))
+    assert golden.RenderSettings.read(tmp_path).set == []
+    path.write_text(json.dumps(older | {"set": [1]}))
     with pytest.raises(SinewError, match="make the pictures again"):
         golden.RenderSettings.read(tmp_path)
 
