@@ -319,7 +319,7 @@ def _position_modifier(obj: bpy.types.Object) -> None:
         obj.modifiers.move(own, first if own > first else first - 1)
 
 
-def move_out_of_chain(obj: bpy.types.Object) -> None:
+def keep_out_of_chain(obj: bpy.types.Object) -> None:
     """While the Armature modifiers deform, Sinew's is not among them: Blender does not chain Multi Modifiers
     across another one, be it off."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)

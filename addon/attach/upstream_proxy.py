@@ -92,7 +92,14 @@ def remove(obj: bpy.types.Object) -> None:
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
     """The mesh that comes to the Armature modifier; None as long as Blender has not evaluated it."""
     evaluated = properties.of(obj).upstream_proxy.evaluated_get(depsgraph)
-    return evaluated.data if evaluated.is_evaluated else None
+    if not evaluated.is_evaluated:
+        return None
+    # Of what is hidden Blender may need the position alone, as a constraint's target: then the modifiers in
+    # front are not evaluated, and the mesh is the one that they would have been given.
+    is_plain = evaluated.data == obj.data.evaluated_get(depsgraph)
+    if is_plain and not obj.visible_get(view_layer=depsgraph.view_layer):
+        return None
+    return evaluated.data
 
 
 def changes_weights(obj: bpy.types.Object) -> bool:

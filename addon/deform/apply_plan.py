@@ -50,7 +50,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
     """Raises SinewError where what stands in front can not be evaluated apart."""
     if wanted.uses_builtin:
         attach.switch(obj, on=False)
-        attach.move_out_of_chain(obj)
+        attach.keep_out_of_chain(obj)
         attach.adopt_pointers(obj)
         if wanted.state is State.OFF:
             point_store.remove_point_attributes(obj)
@@ -120,6 +120,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         properties.of(origin).scale_rule,
         properties.of(origin).leave_small,
     )
+    for stage in properties.STAGE_GROUPS:
+        properties.copy(getattr(properties.of(origin), stage), getattr(settings, stage))
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True

@@ -15,6 +15,7 @@ from ..attach.updates import is_main_thread, is_rendering_in_window, reaction
 from ..io.animation_paths import animated_paths
 from . import events, session
 from .changes import Changes, names_of_changed_meshes
+from .plan import State
 from .session import current
 
 # --- Evaluations and changes of frame
@@ -137,11 +138,12 @@ def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
 @persistent
 def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
-    of updates at once. A mesh that was there before they were called may have changed once more."""
+    of updates at once. A mesh that was there before they were called may have changed once more; so may
+    poses, which are evaluated here for what Sinew deforms after the update."""
     seen, current.seen = current.seen, None
-    names = names_of_changed_meshes(depsgraph) if seen is not None else set()
-    if not names:
+    if seen is None:
         return
+    names = names_of_changed_meshes(depsgraph)
     new = Changes(complete=True)
     with reaction() as may_react:
         for obj, state in current.pairs:
@@ -150,7 +152,12 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     state.needs_recheck = True
                 elif obj.data.name_full in names:
                     new.meshes.add(obj.data.session_uid)
-        if new.meshes:
+                if state.plan.state is State.AFTER_UPDATE:
+                    new.touched.add(obj.session_uid)
+        if new.touched and may_react and not (current.is_saving or is_rendering_in_window()):
+            with events.without_handlers():
+                depsgraph.update()
+        if new.meshes or new.touched:
             new.touched |= new.meshes
             # What Sinew does itself came before them.
             current.expected -= new.meshes

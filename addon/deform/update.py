@@ -52,8 +52,9 @@ def update(
     bones_changed = skinned is not None and bound.have_bones_changed(obj, skinned.bound, depsgraph, changes)
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
-        # What is in another scene stays as it is.
-        return None if obj.evaluated_get(depsgraph).is_evaluated else skinned
+        # What is hidden, or in another scene, stays as it is.
+        is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
+        return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
     known = None if skinned is None else skinned.bound
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
     if inspect or skinned.bound.is_of_another_stack(known):
@@ -222,8 +223,8 @@ def _request_points(
         point_store.set_rest_points(obj, skinned.bound.source.points, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
-        # The object is copied anew then: what the change of frame has set is set again, as else a render of
-        # what is hidden has it from nowhere.
+        # The object is copied anew then, and what the change of frame has set is set again: of what is hidden,
+        # originals do not have it.
         obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
 
 

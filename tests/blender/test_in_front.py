@@ -6,10 +6,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+import routes
 import scenes
 import snapshot
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.errors import SinewError
+from sinew_addon.deform import safe_mode
 from test_against_armature_modifier import assert_equal_to_modifier
 
 FRAMES = [1, 4, 8, 11]
@@ -291,3 +293,61 @@ def test_an_armature_modifier_in_front_of_what_is_in_front():
     properties.of(obj).enabled = False
     expected = scenes.modifier_shapes(obj, [1, 6, 11], preserve_volume=False)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_one_view_layer_has_it_for_its_position_alone():
+    obj, _armature = scenes.make_arm()
+    mask = obj.modifiers.new("Mask", "MASK")
+    mask.vertex_group, mask.invert_vertex_group, mask.threshold = "bone.0", True, 0.5
+    obj.modifiers.move(1, 0)
+    collection = bpy.data.collections.new("Its own")
+    bpy.context.scene.collection.children.link(collection)
+    bpy.context.scene.collection.objects.unlink(obj)
+    collection.objects.link(obj)
+    follower = bpy.data.objects.new("Follower", None)
+    bpy.context.scene.collection.objects.link(follower)
+    follower.constraints.new("COPY_TRANSFORMS").target = obj
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(8)
+    bpy.context.view_layer.layer_collection.children["Its own"].exclude = True
+    bpy.context.view_layer.update()
+    bpy.context.window.view_layer = bpy.context.scene.view_layers.new("Second")
+    got = scenes.final_points(obj)
+    assert not properties.of(obj).error
+    attach.remove(obj)
+    expected = scenes.final_points(obj)
+    assert scenes.worst(expected, scenes.rest_points(obj)[-len(expected) :]) > 0.05
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+@pytest.mark.parametrize("what", ["modifier", "transform"])
+def test_applied_with_something_in_front(what, route):
+    """Two objects have the mesh: as with any such mesh Blender has to be told to make it single."""
+    obj, _armature = scenes.make_arm()
+    obj.modifiers.new("Cast", "CAST").factor = 0.3
+    obj.modifiers.move(1, 0)
+    obj.scale = (1.2, 1.1, 0.9)
+    scenes.add_sinew(obj)
+    routes.force(route)
+    try:
+        bpy.context.scene.frame_set(8)
+        before = scenes.final_points(obj)
+        if what == "modifier":
+            for name in ("Cast", "Sinew"):
+                bpy.ops.object.modifier_apply(modifier=name, single_user=True)
+            bpy.context.view_layer.update()
+            assert not obj.modifiers
+            assert not properties.has_sinew(obj)
+            assert scenes.worst(scenes.final_points(obj), before) <= 1e-6
+        else:
+            bpy.ops.object.transform_apply(isolate_users=True)
+            bpy.context.view_layer.update()
+            got = scenes.final_points(obj)
+            assert tuple(obj.scale) == (1.0, 1.0, 1.0)
+            assert not properties.of(obj).error
+            attach.remove(obj)
+            tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+            assert scenes.worst(got, scenes.final_points(obj)) <= tolerance
+    finally:
+        safe_mode.set_forced(None)

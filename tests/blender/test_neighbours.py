@@ -114,6 +114,43 @@ def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
+def pose_bone(obj: bpy.types.Object) -> None:
+    scenes.bend(properties.of(obj).armature, 35.0)
+
+
+def move_armature(obj: bpy.types.Object) -> None:
+    properties.of(obj).armature.location.y = 0.4
+
+
+def move_mesh(obj: bpy.types.Object) -> None:
+    obj.location.y = 0.4
+
+
+@pytest.mark.parametrize("act", [pose_bone, move_armature, move_mesh])
+@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
+def test_what_a_handler_behind_sinews_poses_and_moves_is_in_the_frame(arm, neighbour, event, act):
+    calls = []
+
+    def call() -> None:
+        calls.append(event)
+        act(arm)
+
+    take_off = neighbour(event, call)
+    if event == "frame_change_post":
+        bpy.context.scene.frame_set(9)
+    else:
+        arm.update_tag()
+        bpy.context.view_layer.update()
+    got, count = scenes.final_points(arm), len(calls)
+    take_off()
+    assert count == 1
+    assert not properties.of(arm).error
+    properties.of(arm).enabled = False
+    arm.modifiers["Armature"].use_deform_preserve_volume = True
+    expected = scenes.final_points(arm)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
 def test_an_edit_in_a_handler_of_what_was_edited_is_seen_with_the_next_event(arm, neighbour, edit):
     take_off = neighbour("depsgraph_update_post", lambda: edit(arm) if arm.pass_index else None)
@@ -207,6 +244,24 @@ def test_copied_modifiers_work(arm):
     assert properties.of(other).armature == properties.of(arm).armature
     assert_equals_modifier(other)
     assert_equals_modifier(arm)
+
+
+def test_copied_modifiers_have_the_mix(arm):
+    other, _rig = scenes.make_arm(name="Other")
+    other.modifiers.clear()
+    settings = properties.of(arm)
+    settings.mix.method, settings.mix.group = "dq", "bone.1"
+    attach.use_one_method(arm, "lbs")
+    for each in (arm, other):
+        each.select_set(True)
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    bpy.context.view_layer.update()
+    assert properties.of(other).mixed_method == "dq"
+    got, expected = scenes.shapes(other, FRAMES), scenes.shapes(arm, FRAMES)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+    settings.mix.method = "OFF"
+    assert scenes.worst(got, scenes.shapes(arm, FRAMES)) > 0.005
 
 
 def test_a_node_group_removed_behind_sinews_handler(arm, neighbour):

@@ -378,7 +378,7 @@ def compare_copies(
     wanted = [key for key in ours["copies"] if key[0] not in skipped or key[0] in theirs["shapes"]]
     blender.send(what="shapes by", copies=wanted)
     for key, other in blender.receive().items():
-        points = ours["copies"][key]
+        points, other = ours["copies"][key].astype(np.float64), other.astype(np.float64)
         if key[0] in skipped and key[0] in ours["skipped"]:
             continue
         if points.shape == other.shape and len(points):

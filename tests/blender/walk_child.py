@@ -192,8 +192,13 @@ class Child:
         if side.is_method_keyed(obj):
             paths = {c.data_path for c in self.sides.curves_of(obj)}
             run = (self.claims.get(obj.name_full) or {"run": []})["run"]
-            keyed = [f'modifiers["{name}"].use_deform_preserve_volume' in paths for name in run]
-            if not all(keyed) or not side.is_on(obj):
+            keyed = {
+                modifier.name
+                for modifier in self.sides.armature_modifiers(obj)
+                if f'modifiers["{modifier.name}"].use_deform_preserve_volume' in paths
+            }
+            # Sinew's method is that of its run, and the walk keys all.
+            if keyed != set(run) or not side.is_on(obj):
                 return True
         if not side.is_on(obj):
             return False

@@ -141,13 +141,6 @@ class Walker:
     def is_editable(obj: bpy.types.Object) -> bool:
         return obj.data.library is None and obj.override_library is None
 
-    def has_upstream(self, obj: bpy.types.Object) -> bool:
-        """Whether Sinew evaluates apart what comes to the Armature modifier: two objects have the mesh then,
-        which operators of Blender that apply do not take."""
-        keys, modifiers = obj.data.shape_keys, self.modifiers(obj)
-        is_first = bool(modifiers) and modifiers[0].type == "ARMATURE"
-        return not is_first or obj.parent_type == "ARMATURE" or (keys is not None and not keys.use_relative)
-
     def armature(self, r: random.Random) -> bpy.types.Object | None:
         return self.one(r, self.armatures())
 
@@ -891,10 +884,12 @@ def join(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def apply_transform(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: w.is_editable(o) and not (w.side.has_sinew(o) and w.has_upstream(o)))
+    obj = w.editable(r)
     if obj is None or w.users(obj.data) > 1 or w.compared or not w.select(obj):
         return None
-    bpy.ops.object.transform_apply()
+    # As the window offers, where Sinew evaluates apart what stands in front: two objects have the mesh then.
+    bpy.ops.object.transform_apply(isolate_users=True)
+    obj.data.name = w.new_name("mesh")
     return f"apply the transform of {obj.name}"
 
 
@@ -1134,28 +1129,32 @@ def copy_modifiers(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def apply_modifier(w: Walker, r: random.Random) -> str | None:
-    """What deforms: Sinew's modifier, or the Armature modifier."""
+    """What deforms, Sinew's modifier or the Armature modifier, after those in front."""
     obj = w.mesh(
         r,
         lambda o: (
             not w.compared
             and len(armature_modifiers(o)) == 1
-            and len(w.modifiers(o)) == 1
+            and w.modifiers(o)[-1].type == "ARMATURE"
+            and o.parent_type != "ARMATURE"
             and w.users(o.data) == 1
             and o.data.shape_keys is None
             and o.override_library is None
             and w.side.is_on(o)
             and not w.side.has_qv(o)
-            and not w.has_upstream(o)
         ),
     )
     if obj is None or not w.select(obj):
         return None
+    in_front = [modifier.name for modifier in w.modifiers(obj)[:-1]]
+    for name in in_front:
+        bpy.ops.object.modifier_apply(modifier=name, single_user=True)
     w.before_evaluation()
     # A window has evaluated what was appended just now.
     bpy.context.view_layer.update()
     w.side.apply(obj)
-    return f"apply what deforms {obj.name}"
+    obj.data.name = w.new_name("mesh")
+    return f"apply what deforms {obj.name}, and before it {', '.join(in_front) or 'nothing'}"
 
 
 @operation(0.4)
@@ -1638,6 +1637,11 @@ def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: 
         obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
     elif what == "move":
         obj.location.z += 0.1
+    elif what == "pose":
+        for armature in dict.fromkeys(m.object for m in armature_modifiers(obj) if m.object is not None):
+            for bone in armature.pose.bones:
+                bone.rotation_mode = "XYZ"
+                bone.rotation_euler = (0.3, 0.2, -0.1)
     elif what == "name":
         obj.name = new
     elif what == "rename":
@@ -1684,7 +1688,7 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
     """Another add-on's handler, once, at a change of frame."""
     obj, when = w.mesh(r), r.choice(("frame_change_pre", "frame_change_post", "depsgraph_update_post"))
     what, number = (
-        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name")),
+        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "pose", "pose", "name")),
         r.randint(*FRAMES),
     )
     if (

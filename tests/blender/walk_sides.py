@@ -113,7 +113,10 @@ class BlenderSide:
         return modifier.show_expanded
 
     def set_preserve_volume(self, modifier: bpy.types.Modifier, on: bool) -> None:
-        modifier.show_expanded = modifier.use_deform_preserve_volume = on
+        modifier.show_expanded = on
+        # The flag itself has the keys of Sinew's method.
+        if not self.is_method_keyed(modifier.id_data):
+            modifier.use_deform_preserve_volume = on
 
     def add(self, obj: bpy.types.Object, method: str | None, leave_small: bool) -> None:
         first = next((m for m in armature_modifiers(obj) if m.object is not None), None)
