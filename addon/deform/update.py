@@ -223,8 +223,8 @@ def _request_points(
         point_store.set_rest_points(obj, skinned.bound.source.points, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
-        # The object is copied anew then, and what the change of frame has set is set again: of what is hidden,
-        # originals do not have it.
+        # The object is copied anew then, and what the change of frame has set is set again: of what is
+        # hidden, originals do not have it.
         obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
 
 
