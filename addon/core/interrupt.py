@@ -13,6 +13,10 @@ from types import FrameType
 
 _requested = False
 
+# The rooms whose code Blender may have called.
+_PACKAGE = __package__.rpartition(".")[0]
+_ON_BPY = tuple(f"{_PACKAGE}.{room}." for room in ("io", "attach", "deform", "ui", "features", "jobs.tasks"))
+
 
 @contextmanager
 def deferred() -> Iterator[None]:
@@ -47,7 +51,7 @@ def _on_interrupt(_signal: int, frame: FrameType | None) -> None:
 def _is_in_blender(frame: FrameType | None) -> bool:
     """Whether code on bpy is running, which Blender may have called."""
     while frame is not None:
-        if "blender" in frame.f_globals.get("__name__", "").split("."):
+        if frame.f_globals.get("__name__", "").startswith(_ON_BPY):
             return True
         frame = frame.f_back
     return False

@@ -102,7 +102,7 @@ def random_rotation(rng: np.random.Generator) -> Matrix:
 def make_armature(seed: int, features: set[str]) -> bpy.types.Object:
     rng = numbers(seed, "bones")
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.skin_stage(armature)
+    bpy.context.scene.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     bones = armature.data.edit_bones
@@ -158,7 +158,7 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
     mesh = bpy.data.meshes.new("Mesh")
     mesh.from_pydata(rng.uniform(-1.2, 1.2, (count, 3)).tolist(), [], [(0, 1, 2), (3, 4, 5)])
     obj = bpy.data.objects.new("Mesh", mesh)
-    bpy.context.scene.collection.objects.skin_stage(obj)
+    bpy.context.scene.collection.objects.link(obj)
     groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
     messy = has(seed, "messy weights", features)
     if messy:
@@ -254,7 +254,7 @@ def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> No
         modifier.factor = rng.uniform(-0.5, 0.8)
     elif kind == "LATTICE":
         lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
-        bpy.context.scene.collection.objects.skin_stage(lattice)
+        bpy.context.scene.collection.objects.link(lattice)
         lattice.scale = rng.uniform(2.0, 4.0, 3)
         for point in lattice.data.points:
             point.co_deform += Vector(rng.normal(0, 0.1, 3))
@@ -272,7 +272,7 @@ def add_further_armatures(
     rng = numbers(seed, "further armatures")
     other = armature.copy()
     other.data = armature.data.copy()
-    bpy.context.scene.collection.objects.skin_stage(other)
+    bpy.context.scene.collection.objects.link(other)
     other.location = rng.uniform(-0.5, 0.5, 3)
     pose(seed + 1, features, other)
     place = list(obj.modifiers).index(obj.modifiers["Armature"])
