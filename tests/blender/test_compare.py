@@ -188,8 +188,9 @@ def test_a_page_holds_its_pictures_and_a_video(tmp_path):
         *("--video", "--out", tmp_path),
     )
     page = (tmp_path / "wrist.html").read_text(encoding="utf-8")
-    # Nothing is fetched from anywhere.
-    assert re.findall(r'(?:src|href)="(?!data:image/png;base64,)', page) == []
+    # Nothing is fetched from anywhere; a plot's marks refer to shapes within the page.
+    assert re.findall(r'(?:src|href)="(?!data:image/png;base64,|#)', page) == []
+    assert len(re.findall(r'<div class="plot"><svg ', page)) == 7
     drawn = sorted((tmp_path / "wrist" / "pictures").glob("*.png"))
     assert page.count("<img") == len(drawn)
     # Every measure is worst at 180 degrees.
