@@ -356,27 +356,17 @@ void bind_deformer(py::module_& m) {
             "space\n"
             "    of the bone transforms; read where a bone is scaled and the method is rigid, and by sbs. "
             "None: "
-            "identity.
-            "
+            "identity.\n"
             "vertex_data: a dict of what methods keep of each vertex, float32 [vertices, "
-            "Method.vertex_floats] by
-            "
-            "    the method's name: {\"cor\": sinew.centres_of_rotation(...)}. A method whose data is not here
-            "
-            "    does without: each vertex is its own centre under cor, which is linear blending.
-
-            "
+            "Method.vertex_floats] by\n"
+            "    the method's name: {\"cor\": sinew.centres_of_rotation(...)}. A method whose data is not "
+            "here\n"
+            "    does without: each vertex is its own centre under cor, which is linear blending.\n\n"
             "Anything that numpy makes such arrays of is taken where nothing but digits of a fraction is "
             "lost: "
-            "lists, float64,
-            int64 whose numbers fit.All input is copied
-                .Raises ValueError that names the
-            "
-            "argument, what was wanted and
-            what came.Can be pickled
-            : what was bound, with weights
-              "
-              "normalised.")
+            "lists, float64,\nint64 whose numbers fit. All input is copied. Raises ValueError that names the "
+            "argument, what was wanted and\nwhat came. Can be pickled: what was bound, with weights "
+            "normalised.")
         .def_property_readonly("vertex_count", &Binding::vertex_count, "Vertices of the mesh.")
         .def_property_readonly("influence_count", &Binding::influence_count, "Influences of positive weight.")
         .def_property_readonly("bone_count", &Binding::bone_count,
