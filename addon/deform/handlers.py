@@ -155,6 +155,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                 if state.plan.state is State.AFTER_UPDATE:
                     new.touched.add(obj.session_uid)
         if new.touched and may_react and not (current.is_saving or is_rendering_in_window()):
+            _tag_renamed(depsgraph)
             with events.without_handlers():
                 depsgraph.update()
         if new.meshes or new.touched:
@@ -163,6 +164,15 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             current.expected -= new.meshes
             _react(depsgraph, new, may_react)
     _end_event()
+
+
+def _tag_renamed(depsgraph: bpy.types.Depsgraph) -> None:
+    """An object that was renamed in a handler loses its shape where handlers evaluate (seen on 5.2): it is
+    evaluated whole instead. Its evaluated copy has the old name until then."""
+    for update in depsgraph.updates:
+        with contextlib.suppress(ReferenceError):
+            if isinstance(update.id, bpy.types.Object) and update.id.name != update.id.original.name:
+                update.id.original.update_tag()
 
 
 @persistent

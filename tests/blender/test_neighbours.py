@@ -498,3 +498,18 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     for each in (obj, other):
         assert not animation_paths.animated_paths(each)
         assert not each.is_property_set("sinew")
+
+
+@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
+def test_another_object_renamed_behind_sinews_handler(arm, neighbour, event):
+    """Sinew evaluates what such handlers changed: a renamed object keeps its shape, be it Sinew's or not."""
+    other, _rig = scenes.make_arm(name="Other")
+    expected = scenes.shapes(other, [9])[0]
+    bpy.context.scene.frame_set(1)
+    take_off = neighbour(event, lambda: setattr(other, "name", "Renamed"))
+    bpy.context.scene.frame_set(9)
+    bpy.context.view_layer.update()
+    take_off()
+    got = scenes.final_points(other)
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(other)
+    assert_equals_modifier(arm)

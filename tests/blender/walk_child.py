@@ -207,8 +207,9 @@ class Child:
     def has_other_scale(self, obj) -> bool:
         """Whether Sinew makes something else of scaled bones than the modifier does."""
         rule = (self.claims.get(obj.name_full) or {"rule": ""})["rule"]
+        # A constraint between armatures of other sizes scales a bone that has no scale of its own.
         scaled = any(
-            tuple(round(s, 5) for s in bone.scale) != (1, 1, 1)
+            tuple(round(s, 5) for s in bone.scale) != (1, 1, 1) or len(bone.constraints)
             for modifier in self.sides.armature_modifiers(obj)
             if modifier.object is not None and modifier.object.pose is not None
             for bone in modifier.object.pose.bones
