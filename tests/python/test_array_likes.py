@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What numpy makes an array of is taken as that array is; pickles give the same bits; what things look like printed."""
+"""What numpy makes an array of is taken as that array is; pickles give the same bits; representations."""
 
 import copy
 import pickle

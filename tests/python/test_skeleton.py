@@ -106,7 +106,7 @@ def with_nan():
             random_bones()[:, :2],
             "transforms: expected float32 [.., 4, 4] or [.., 3, 4], got float32 [7, 2, 4]",
         ),
-        (random_bones().tolist() + [[1]], f"transforms: expected {LAYOUTS}, got list"),
+        ([*random_bones().tolist(), [1]], f"transforms: expected {LAYOUTS}, got list"),
         (with_nan(), "transforms: expected finite values, got NaN or infinity at index 2"),
     ],
 )

@@ -68,7 +68,8 @@ class Method:
         """The papers."""
     @property
     def needs(self) -> tuple[str, ...]:
-        """What it takes besides points, influences and bone transforms: "rest_bones" where bones are scaled."""
+        """What it takes besides points, influences and bone transforms: "rest_bones" where bones are
+        scaled."""
     @property
     def vertex_floats(self) -> int:
         """How many numbers it keeps of each vertex: an argument `vertex_data` of Binding."""
@@ -103,8 +104,8 @@ def stages() -> tuple[Stage, ...]:
     """Every stage, one Stage each. `mix` is an argument of Deformer."""
 
 def keep_thread_state() -> None:
-    """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and that
-    calls it often, is 50 to 100 us a call faster. Safe to call again, and on any thread."""
+    """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and
+    that calls it often, is 50 to 100 us a call faster. Safe to call again, and on any thread."""
 
 def centres_of_rotation(
     rest_points: ArrayLike,
@@ -138,6 +139,7 @@ class Skeleton:
     sinew.quat_vec and sinew.dual_quat, and promote arrays as these do. They raise ValueError that names
     the argument, what was wanted and what came.
     """
+
     def __init__(self, parents: ArrayLike) -> None:
         """parents: int32 [bones], the index of each bone's parent, -1 for a root.
 
@@ -184,6 +186,7 @@ class Skeleton:
 @final
 class Binding:
     """A mesh bound to bones: immutable, and shared by the deformers made of it."""
+
     def __init__(
         self,
         rest_points: ArrayLike,
@@ -225,6 +228,7 @@ class Deformer:
 
     Can be pickled, with the rest points that it has then and a binding of its own.
     """
+
     @overload
     def __init__(
         self,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What sinew.affine, sinew.quat_vec and sinew.dual_quat have alike: their functions are methods of one Representation each.
+"""What sinew.affine, sinew.quat_vec and sinew.dual_quat have alike: the functions of a Representation.
 
 Sizes [..] are of leading axes; `layout` stands for the last axes of the representation: [4, 4], [7] or [8].
 """
@@ -47,8 +47,8 @@ class Representation:
     ) -> NDArray[Any]:
         """The rotation by `angle` radians about a line and the translation along it; undoes to_screw().
 
-        axis, moment: [.., 3], Pluecker coordinates of the line: both are divided by the length of the axis, and
-            a part of the moment along it is left out. An axis of length 0 gives the identity.
+        axis, moment: [.., 3], Pluecker coordinates of the line: both are divided by the length of the axis,
+            and a part of the moment along it is left out. An axis of length 0 gives the identity.
         angle, translation: [..]; a pitch (translation per radian) gives translation = pitch * angle.
 
         Source: Daniilidis 1999, eq. 13.
@@ -62,11 +62,12 @@ class Representation:
         return self._native.from_screw_about(axis, point, angle, translation)
 
     def to_screw(self, a: ArrayLike) -> Screw[Any]:
-        """The screw that rigid `a` is (Chasles 1830): axis and moment [.., 3], angle, translation and pitch [..].
+        """The screw that rigid `a` is (Chasles 1830).
 
-        angle: 0 to pi; at pi the axis is one of its two directions. moment: point x axis. pitch: translation /
-        angle; infinite for a translation alone, whose axis is its direction, angle and moment 0, translation
-        >= 0. The identity has the axis z.
+        axis and moment [.., 3], angle, translation and pitch [..].
+        angle: 0 to pi; at pi the axis is one of its two directions. moment: point x axis.
+        pitch: translation / angle; infinite for a translation alone, whose axis is its direction, angle and
+            moment 0, translation >= 0. The identity has the axis z.
         """
         return Screw(*self._native.to_screw(a))
 
@@ -107,9 +108,10 @@ class Representation:
     def normalized(self, a: ArrayLike) -> NDArray[Any]:
         """The rigid transform nearest to `a`.
 
-        A matrix: its linear part becomes the nearest rotation (polar decomposition); one that is zero or all on
-            one line gives one of several as near.
-        A quaternion and a vector: the quaternion at unit length; one of length 0 becomes that of the identity.
+        A matrix: its linear part becomes the nearest rotation (polar decomposition); one that is zero or all
+            on one line gives one of several as near.
+        A quaternion and a vector: the quaternion at unit length; one of length 0 becomes that of the
+            identity.
         A dual quaternion: divided by its norm(); a real part of length 0 gives the identity.
         """
         return self._native.normalized(a)
@@ -131,7 +133,7 @@ class Representation:
         return self._native.transform_normal(a, normals)
 
     def rigid_distance(self, a: ArrayLike, b: ArrayLike) -> Distance[Any]:
-        """Angle of the rotation from `a` to `b`, 0 to pi, and distance between where they take the origin; both [..].
+        """How far `b` is from `a`, [..]: angle of the rotation, 0 to pi, and distance of the origin's images.
 
         The same for compose(x, a) and compose(x, b), x rigid. `a` and `b` must be rigid.
         """

@@ -6,8 +6,8 @@ a and -a are one transform.
 
 Every function takes one or many: leading axes broadcast as numpy's do, and numbers may stand for arrays of
 numbers. Arrays are anything that numpy makes one of. The result is float32 where all arrays of a call are of
-float32 or less, float64 otherwise, as numpy promotes; numbers do not count. ValueError names the argument, what
-was wanted and what came; NaN and infinity are refused.
+float32 or less, float64 otherwise, as numpy promotes; numbers do not count. ValueError names the argument,
+what was wanted and what came; NaN and infinity are refused.
 """
 
 from typing import Any
