@@ -56,8 +56,8 @@ class Binding:
         self.vertex_data = vertex_data
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # By purpose, and by the methods that keep data of vertices: the packed mesh; by purpose the deformer;
-        # each with the rest points that it was made from.
+        # The packed mesh for each purpose and the methods that keep numbers of vertices; the deformer for
+        # each purpose. Each with the rest points that it has.
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
@@ -167,7 +167,7 @@ class Binding:
         )
 
     def replace_vertex_data(self, vertex_data: VertexData) -> None:
-        """For a mesh of other points or triangles. Where the old data was used, the next frame is computed."""
+        """For a mesh of other points or triangles. Deforms the next frame anew if the old data was used."""
         old, self.vertex_data = self.vertex_data, vertex_data
         if old is None or not old.is_used:
             return

@@ -16,11 +16,6 @@ from .spaces import transformed
 PROVIDERS: dict[str, Callable[..., np.ndarray | None]] = {"cor": sinew.centres_of_rotation}
 
 
-def available_methods() -> tuple[sinew.Method, ...]:
-    """The methods whose needs can be met."""
-    return tuple(m for m in sinew.methods() if "vertex_data" not in m.needs or m.name in PROVIDERS)
-
-
 class VertexData:
     """Of a mesh at rest, without shape keys. Any thread may ask.
 

@@ -50,7 +50,7 @@ class Source:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
     def has_same_surface(self, other: Source) -> bool:
-        """Whether points and triangles are the same: methods may keep something that is made of them."""
+        """Whether points and triangles, which methods keep numbers of vertices from, are the same."""
         return np.array_equal(self.points, other.points) and np.array_equal(self.triangles, other.triangles)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Methods that Blender lacks: the oracle is the float64 reference, on Blender's own poses; qv has its own file."""
+"""Methods that Blender lacks, but for qv: the oracle is the float64 reference, on Blender's own poses."""
 
 from __future__ import annotations
 

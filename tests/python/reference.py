@@ -2,9 +2,9 @@
 """Skinning in float64 numpy and matrix form, from the papers: the oracle of the library.
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
-Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor) and Kavan,
-Zara 2005 (sbs); slow, one vertex at a time, and does not use the formulas of the library where others exist.
-Quaternions are (w, x, y, z).
+Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor) and
+Kavan, Zara 2005 (sbs); slow, one vertex at a time, and does not use the formulas of the library where others
+exist. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -149,8 +149,8 @@ def log(point, motions, rotations, weights):
 
 
 def rigid_parts(motions, rotations, heads):
-    """The translations of the bones' rigid motions: with its rotation each takes the bone's head where the whole bone
-    takes it."""
+    """The translations of the bones' rigid motions: with its rotation each takes the bone's head where the
+    whole bone takes it."""
     return np.array(
         [(m @ np.append(h, 1.0))[:3] - r @ h for m, r, h in zip(motions, rotations, heads, strict=True)]
     )
@@ -165,7 +165,7 @@ def blended_rotation(rotations, weights):
 
 
 def about(centre, point, motions, rotations, weights, heads):
-    """Rotated by the blend about `centre`, which the rigid motions' weighted mean moves; then what bones scale."""
+    """Rotated by the blend about `centre`, which the rigid motions' mean moves; then what bones scale."""
     translations = rigid_parts(motions, rotations, heads)
     rotated, margin = blended_rotation(rotations, weights)
     scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - translations
@@ -181,7 +181,7 @@ SAME_ROTATION = 1e-3
 
 
 def sbs(point, motions, rotations, weights, heads):
-    """The centre by the singular values of the equations of all pairs; the tie is also where one is left out."""
+    """The centre by the singular values of all pairs' equations; the tie is also where one is left out."""
     translations = rigid_parts(motions, rotations, heads)
     start, count, margin = heads.mean(axis=0), len(rotations), 1.0
     centre = start
@@ -200,14 +200,14 @@ def sbs(point, motions, rotations, weights, heads):
 
 
 def logarithms(rotations, translations):
-    """Of rigid motions [n]: rotation vectors, by scipy, and what the exponential's integral over unit time takes to the
-    translations."""
+    """Of rigid motions [n]: rotation vectors, by scipy, and what the exponential's integral over unit time
+    takes to the translations."""
     vectors = Rotation.from_matrix(rotations).as_rotvec()
     return vectors, np.linalg.solve(integral(vectors), translations[..., None])[..., 0]
 
 
 def integral(vectors):
-    """The 3x3 matrices by which the exponentials of rotation vectors [n] and linear parts make translations."""
+    """The 3x3 matrices by which exponentials of rotation vectors [n] make translations of linear parts."""
     x, y, z = vectors.T
     k = np.zeros((len(vectors), 3, 3))
     k[:, 0, 1], k[:, 0, 2], k[:, 1, 2] = -z, y, -x
@@ -226,7 +226,9 @@ def dib(point, motions, rotations, weights):
     real, dual = (signs * weights) @ quaternions, (signs * weights) @ duals
     length = np.linalg.norm(real)
     rotated, translated = rotation(real / length), translation(real / length, dual / length)
-    for step in range(200):
+    steps = 0
+    while steps < 200:
+        steps += 1
         angular, linear = logarithms(rotated.T @ rotations, (shifts - translated) @ rotated)
         vector, along = weights @ angular, weights @ linear
         translated = translated + rotated @ (integral(vector[None])[0] @ along)
@@ -234,7 +236,7 @@ def dib(point, motions, rotations, weights):
         margin = min(margin, np.pi - np.linalg.norm(angular, axis=1).max())
         if max(np.abs(vector).max(), np.abs(along).max() / max(1.0, np.abs(linear).max())) < 1e-9:
             break
-    return rotated @ point + translated, margin if step < 40 else 0.0
+    return rotated @ point + translated, margin if steps < 40 else 0.0
 
 
 METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "cor": cor, "sbs": sbs, "log": log, "dib": dib}

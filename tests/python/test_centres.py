@@ -3,6 +3,7 @@
 
 import sys
 import threading
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ SIGMA = 0.1
 
 
 class Tube:
-    """Length 4, radius 0.5, along z, and two bones that meet in its middle; weights change smoothly over 1 unit."""
+    """Length 4, radius 0.5, along z; two bones meet in its middle, and weights change over 1 unit."""
 
     def __init__(self, rings=81, around=32):
         self.rings, self.around = rings, around
@@ -143,7 +144,7 @@ def defined_centres(points, weights, triangles):
 def three_bones():
     """A tube whose weights of three bones change along it and around it."""
     tube = Tube(21, 12)
-    x, y, z = tube.points.T
+    x, _y, z = tube.points.T
     raw = np.column_stack([np.exp(-((z - c - 0.6 * x) ** 2)) for c in (0.7, 2.1, 3.3)])
     raw[raw < 0.15] = 0.0
     tube.weights = (raw / raw.sum(axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
@@ -186,7 +187,7 @@ def test_bones_of_a_vertex_may_come_twice_and_in_any_order():
     tube = three_bones()
     points, offsets, bones, weights = tube.mesh
     expected = tube.centres()
-    order = np.concatenate([np.arange(e - 1, b - 1, -1) for b, e in zip(offsets, offsets[1:], strict=False)])
+    order = np.concatenate([np.arange(e - 1, b - 1, -1) for b, e in pairwise(offsets)])
     swapped = sinew.centres_of_rotation(points, offsets, bones[order], weights[order], tube.triangles)
     np.testing.assert_allclose(swapped, expected, atol=1e-5)
     twice = sinew.centres_of_rotation(
