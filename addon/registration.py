@@ -21,7 +21,7 @@ def register() -> None:
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
     from .attach import properties
-    from .deform import exporters, handlers, session
+    from .deform import exporters, handlers
     from .features.bake import feature as bake
     from .features.compare import feature as compare
     from .features.diagnose import feature as diagnose

@@ -176,6 +176,18 @@ def test_pickles_keep_bones_that_are_named_without_weight():
     assert (nothing.vertex_count, nothing.bone_count) == (0, 0)
 
 
+def test_pickles_have_the_data_of_vertices():
+    centres = np.float32([[0.1, 0.2, 0.3], [-1, 2, 0.5]])
+    mesh = np.float32([[0, 0, 0], [1, 0, 0]]), [0, 2, 4], [0, 1, 0, 1], [0.5, 0.5, 0.25, 0.75]
+    binding = sinew.Binding(*mesh, vertex_data={"cor": centres})
+    bones = np.tile(np.eye(4), (2, 1, 1))
+    bones[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    expected = sinew.Deformer(binding, "cor").deform(bones)
+    assert np.abs(expected - sinew.Deformer(sinew.Binding(*mesh), "cor").deform(bones)).max() > 0.1
+    for copy in (sinew.Deformer(again(binding), "cor"), again(sinew.Deformer(binding, "cor"))):
+        np.testing.assert_array_equal(copy.deform(bones), expected)
+
+
 def test_skeletons_can_be_pickled():
     skeleton = again(sinew.Skeleton([-1, 0, 0]))
     bones = np.tile(np.eye(4), (3, 1, 1)) * 2
@@ -187,16 +199,16 @@ def test_skeletons_can_be_pickled():
 @pytest.mark.parametrize(
     ("of", "state", "message"),
     [
-        (sinew.Binding, None, "state: expected a tuple of 5, as pickling makes it, got NoneType"),
-        (sinew.Binding, (1, 2), "state: expected a tuple of 5, as pickling makes it, got a tuple of 2"),
-        (sinew.Binding, (None,) * 5, r"rest_points: expected float32 \[n, 3\], got NoneType"),
+        (sinew.Binding, None, "state: expected a tuple of 6, as pickling makes it, got NoneType"),
+        (sinew.Binding, (1, 2), "state: expected a tuple of 6, as pickling makes it, got a tuple of 2"),
+        (sinew.Binding, (None,) * 6, r"rest_points: expected float32 \[n, 3\], got NoneType"),
         (
             sinew.Binding,
-            ([[0, 0, 0]], [0, 1], [0], [2.0], None),
+            ([[0, 0, 0]], [0, 1], [0], [2.0], None, None),
             "influence_weights: expected normalised ones",
         ),
-        (sinew.Deformer, ((), "lbs", None), "state: expected a tuple of 5"),
-        (sinew.Deformer, (([[0, 0, 0]], [0, 0], [], [], None), "l", None), "method: expected one of"),
+        (sinew.Deformer, ((), "lbs", None), "state: expected a tuple of 6"),
+        (sinew.Deformer, (([[0, 0, 0]], [0, 0], [], [], None, None), "l", None), "method: expected one of"),
         (sinew.Skeleton, (), "state: expected a tuple of 1"),
     ],
 )

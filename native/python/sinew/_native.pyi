@@ -68,11 +68,12 @@ class Method:
         """The papers."""
     @property
     def needs(self) -> tuple[str, ...]:
-        """What it takes besides points, influences and bone transforms: "rest_bones" where bones are
-        scaled."""
+        """What it takes besides points, influences and bone transforms: "rest_bones", their axes where bones
+        are scaled; "vertex_data", numbers of each vertex that Binding takes; "topology", triangles that
+        these are made from; "precomputation", a function that makes them."""
     @property
     def vertex_floats(self) -> int:
-        """How many numbers it keeps of each vertex: an argument `vertex_data` of Binding."""
+        """How many numbers its vertex data has for each vertex; 0: it has none."""
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its settings, one Parameter each."""
