@@ -78,12 +78,14 @@ void bind_methods(py::module_& m) {
     def_text<&Parameter::id>(parameter, "id", "What programs say.");
     def_text<&Parameter::label>(parameter, "label", "What people read.");
     def_text<&Parameter::description>(parameter, "description", "One sentence.");
-    def_text<&Parameter::unit>(parameter, "unit", "\"\", \"length\", \"angle\" (radians) or \"factor\".");
+    def_text<&Parameter::unit>(parameter, "unit",
+                               "One of \"length\", \"angle\" (radians) and \"factor\", or empty.");
     parameter
         .def_property_readonly(
             "kind", [](const Parameter& row) { return text(name_of(row.kind)); },
-            "\"float\", \"int\", \"bool\", \"enum\" (one of `choices`), \"vertex_group\" (a weight for each "
-            "vertex)\nor \"method\" (the name of a method).")
+            "One of \"float\", \"int\", \"bool\", \"enum\" (one of `choices`), \"vertex_group\" (a weight "
+            "for each "
+            "vertex)\nand \"method\" (the name of a method).")
         .def_property_readonly("default", &initial_value, "None for a vertex group and a method.")
         .def_property_readonly(
             "min", [](const Parameter& row) { return bound_of(row, row.minimum); },

@@ -509,19 +509,19 @@ TEST(Cor, without_a_centre_is_linear_blending) {
               1e-14);
 }
 
-TEST(Dib, is_where_the_logarithms_cancel) {
+TEST(IterativeDq, is_where_the_logarithms_cancel) {
     Random random(35);
     for (std::uint32_t seed = 0; seed < 40; ++seed) {
         const Rig rig = rigid_rig(seed);
-        const Bones<Dib> bones = prepared<Dib>(rig);
+        const Bones<IterativeDq> bones = prepared<IterativeDq>(rig);
         const auto influences = random.influences<double>(6, 6);
         // The motion, of what it does to four points.
-        const Vec3<double> origin = skinned<Dib>(bones, influences, {0, 0, 0});
+        const Vec3<double> origin = skinned<IterativeDq>(bones, influences, {0, 0, 0});
         Affine<double> blend{Mat3<double>(0.0), origin};
         for (int axis = 0; axis < 3; ++axis) {
             Vec3<double> unit(0.0);
             unit[axis] = 1.0;
-            blend.linear[axis] = skinned<Dib>(bones, influences, unit) - origin;
+            blend.linear[axis] = skinned<IterativeDq>(bones, influences, unit) - origin;
         }
         EXPECT_LT(test::rotation_error(blend.linear), 1e-13);
         Twist<double> sum;
@@ -534,12 +534,12 @@ TEST(Dib, is_where_the_logarithms_cancel) {
     }
 }
 
-TEST(Dib, spreads_a_twist_of_two_bones_evenly) {
+TEST(IterativeDq, spreads_a_twist_of_two_bones_evenly) {
     const Rig rig{{{}, {to_mat3(about<double>({1, 0, 0}, 170.0)), {0, 0, 0}}},
                   std::vector<Affine<double>>(2)};
     for (const double weight : {0.1, 0.3, 0.5, 0.9}) {
-        const Vec3<double> result =
-            skinned<Dib>(prepared<Dib>(rig), {{0, 1.0 - weight}, {1, weight}}, {2.0, 1.0, 0.0});
+        const Vec3<double> result = skinned<IterativeDq>(prepared<IterativeDq>(rig),
+                                                         {{0, 1.0 - weight}, {1, weight}}, {2.0, 1.0, 0.0});
         EXPECT_LT(distance(result, rotate(about<double>({1, 0, 0}, 170.0 * weight), {2.0, 1.0, 0.0})), 1e-13);
     }
 }

@@ -184,8 +184,8 @@ def test_pickles_have_the_data_of_vertices():
     bones[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     expected = sinew.Deformer(binding, "cor").deform(bones)
     assert np.abs(expected - sinew.Deformer(sinew.Binding(*mesh), "cor").deform(bones)).max() > 0.1
-    for copy in (sinew.Deformer(again(binding), "cor"), again(sinew.Deformer(binding, "cor"))):
-        np.testing.assert_array_equal(copy.deform(bones), expected)
+    for other in (sinew.Deformer(again(binding), "cor"), again(sinew.Deformer(binding, "cor"))):
+        np.testing.assert_array_equal(other.deform(bones), expected)
 
 
 def test_skeletons_can_be_pickled():

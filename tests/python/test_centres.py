@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import reference
 import sinew
-from rigs import about, translation, transform
+from rigs import about, transform, translation
 
 SIGMA = 0.1
 

@@ -201,8 +201,8 @@ def test_log_spreads_a_twist_evenly():
 @every_method
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e6, 1e12])
 def test_finite_for_whatever_is_finite(method, size):
-    """Rotations by 180 degrees about all axes, bones without width, far bones, in every kernel that a mesh can
-    come to."""
+    """Rotations by 180 degrees about all axes, bones without width, far bones, in every kernel that a mesh
+    can come to."""
     rng = np.random.default_rng(61)
     axes = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (-1, -2, 3)]
     motions = [np.eye(4), np.diag([0.0, 0.0, 0.0, 1.0]), np.diag([-1.0, -1.0, -1.0, 1.0])]

@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any, Literal, final, overload
 
@@ -29,11 +29,11 @@ class Parameter:
         """One sentence."""
     @property
     def unit(self) -> str:
-        """ "", "length", "angle" (radians) or "factor"."""
+        """One of "length", "angle" (radians) and "factor", or empty."""
     @property
     def kind(self) -> Literal["float", "int", "bool", "enum", "vertex_group", "method"]:
-        """ "float", "int", "bool", "enum" (one of `choices`), "vertex_group" (a weight for each vertex)
-        or "method" (the name of a method)."""
+        """One of "float", "int", "bool", "enum" (one of `choices`), "vertex_group" (a weight for each vertex)
+        and "method" (the name of a method)."""
     @property
     def default(self) -> float | int | bool | str | None:
         """None for a vertex group and a method."""
@@ -195,7 +195,7 @@ class Binding:
         influence_bones: ArrayLike,
         influence_weights: ArrayLike,
         rest_bones: ArrayLike | None = None,
-        vertex_data: dict[str, ArrayLike] | None = None,
+        vertex_data: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         """rest_points: float32 [vertices, 3], model space.
         influence_offsets: int32 [vertices + 1], the first influence of each vertex, then the end.
@@ -251,7 +251,7 @@ class Deformer:
         influence_weights: ArrayLike,
         method: str = "lbs",
         rest_bones: ArrayLike | None = None,
-        vertex_data: dict[str, ArrayLike] | None = None,
+        vertex_data: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         """With a binding of its own, of the arguments that Binding has."""
     @property

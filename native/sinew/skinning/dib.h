@@ -18,7 +18,7 @@ namespace sinew {
 ///
 /// Where a bone is 180 degrees from the blend, the shorter way to it changes, and the result jumps. Where bones are so
 /// far apart that kSteps do not suffice, it is what these lead to: finite, and on the way.
-struct Dib {
+struct IterativeDq {
     static constexpr MethodInfo info{
         7,
         "dib",

@@ -19,7 +19,7 @@ namespace sinew {
 
 /// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
 /// line and panel are made from it.
-using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sbs, Log, Dib>;
+using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sbs, Log, IterativeDq>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 

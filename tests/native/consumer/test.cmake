@@ -37,7 +37,7 @@ if(UNIX AND NOT APPLE AND NOT libraries MATCHES "libsinew\\.so\\.0\\.1;")
 endif()
 # Symbols that it does not export must be absent.
 file(GLOB of_deform RELATIVE "${folder}/installed/include/sinew/deform" "${folder}/installed/include/sinew/deform/*")
-if(NOT of_deform STREQUAL "deformer.h;simd.h;thread_pool.h")
+if(NOT of_deform STREQUAL "centres_of_rotation.h;deformer.h;simd.h;thread_pool.h")
   message(FATAL_ERROR "headers of sinew/deform: ${of_deform}")
 endif()
 

@@ -224,7 +224,7 @@ HWY_INLINE Points<D> blend_iteratively(D d, const BonesOf& bones, std::size_t co
         blend.dual[i] = hn::Mul(scale, blend.dual[i]);
     }
     auto active = hn::Ge(norm, hn::Zero(d));
-    for (int step = 0; step < Dib::kSteps && !hn::AllFalse(d, active); ++step) {
+    for (int step = 0; step < IterativeDq::kSteps && !hn::AllFalse(d, active); ++step) {
         const Vec<D> zero = hn::Zero(d);
         Twists<D> correction{{zero, zero, zero}, {zero, zero, zero}};
         Vec<D> widest = zero;
@@ -327,18 +327,18 @@ namespace {
 
 constexpr Float4 kRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}};
 
-void write_bone(const Dib::Bone<double>& bone, Float4* row, Float4* scale) {
+void write_bone(const IterativeDq::Bone<double>& bone, Float4* row, Float4* scale) {
     row[0] = float4(bone.rigid.real);
     row[1] = float4(bone.rigid.dual);
     write_displacement(bone.scale, scale);
 }
 
-constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Dib, write_bone>,
+constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<IterativeDq, write_bone>,
                          SINEW_TARGETS(deform_dib, prepare_dib)};
 
 }  // namespace
 
-const Kernel& Dib::kernel() noexcept { return kKernel; }
+const Kernel& IterativeDq::kernel() noexcept { return kKernel; }
 
 }  // namespace sinew
 
