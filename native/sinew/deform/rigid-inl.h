@@ -198,6 +198,13 @@ HWY_INLINE Spaces spaces_of(const Frame& frame) {
     return {frame.bones_from_model->value.data(), frame.model_from_bones->value.data()};
 }
 
+/// Lanes of the first number that a method keeps of each vertex; the others follow kLanes apart. Null: it has none.
+template <std::size_t kVertexFloats>
+HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t b, std::size_t lane) {
+    if (pointers.vertex_rows == nullptr) return nullptr;
+    return pointers.vertex_rows[kVertexFloats * b].lane.data() + lane;
+}
+
 template <class Rigid, class D>
 HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
                                  std::size_t lane, const Sum<D, Rigid::kNumbers>& sum,
@@ -217,13 +224,6 @@ template <class D>
 HWY_INLINE Points<D> load_rest(D d, const Lanes<float>* rows, const Spaces& spaces, std::size_t lane) {
     const Points<D> rest = load_points(d, rows, lane);
     return spaces.bones_from_model == nullptr ? rest : displaced(d, spaces.bones_from_model, rest);
-}
-
-/// Lanes of the first number that a method keeps of each vertex; the others follow kLanes apart. Null: it has none.
-template <std::size_t kVertexFloats>
-HWY_INLINE const float* vertex_rows_of(const MeshPointers& pointers, std::size_t b, std::size_t lane) {
-    if (pointers.vertex_rows == nullptr) return nullptr;
-    return pointers.vertex_rows[kVertexFloats * b].lane.data() + lane;
 }
 
 HWY_INLINE const float* weights_of(const Lanes<float>* rows) { return rows[3].lane.data(); }
