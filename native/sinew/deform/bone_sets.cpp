@@ -16,8 +16,7 @@ public:
     }
 
     BoneSets run() {
-        for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
-            const Block& block = mesh_.blocks[b];
+        for (const Block& block : mesh_.blocks) {
             if (block.influences == 0) continue;
             if (!block.mixed) {
                 add(block.first_bone, block.influences, block.influences);

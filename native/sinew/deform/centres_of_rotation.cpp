@@ -214,7 +214,7 @@ private:
         std::uint32_t cell = next;
         if (!exact_) {
             const auto rounded = [](double weight) {
-                return static_cast<std::uint64_t>(weight * kCellsOfOne + 0.5);
+                return static_cast<std::uint64_t>(std::lround(weight * kCellsOfOne));
             };
             cell = table_.find_or_add(
                 static_cast<std::uint64_t>(pair) << 16 | rounded(first) << 8 | rounded(second), next);
