@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+import sinew
 from sinew_addon.attach import properties
 from sinew_addon.deform import session
 
@@ -36,9 +37,9 @@ def posed_arm(scaled: bool) -> bpy.types.Object:
 
 
 def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
-    link = session.state_of(obj).bound.skin_stack.skin_stages[0]
-    frame, rest = link.binding.last_frame, link.binding.bones.rest.astype(np.float64)
-    influences = link.binding.weighting.influences(frame.rest_points)
+    binding = session.state_of(obj).bound.binding
+    frame, rest = binding.last_frame, binding.bones.rest.astype(np.float64)
+    influences = binding.weighting.influences(frame.rest_points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(rest)
     rigid = np.tile(np.eye(4), (len(rest), 1, 1))
     for bone, motion in enumerate(motions):
@@ -47,9 +48,15 @@ def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
         rigid[bone, :3, 3] = (motion @ np.append(head, 1.0))[:3] - rigid[bone, :3, :3] @ head
     points = frame.rest_points.astype(np.float64)
     bound = (influences.offsets, influences.bones, influences.weights)
+    # Mesh and armature are in one space; by every rule, centres are those of the mesh as it is at rest.
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    triangles = np.int32([triangle.vertices[:] for triangle in mesh.loop_triangles])
+    centres = sinew.centres_of_rotation(frame.rest_points, *bound, triangles)
     if rule == "3.x":
         points, _ = reference.deform("lbs", points, *bound, np.linalg.inv(rigid) @ motions)
-    return reference.deform(method, points, *bound, motions if rule == "4.0" else rigid, rest)[0]
+    motions = motions if rule == "4.0" else rigid
+    return reference.deform(method, points, *bound, motions, rest, {"cor": centres})[0]
 
 
 @pytest.mark.parametrize("rule", ["4.0", "3.x", "none"])
