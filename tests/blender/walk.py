@@ -637,7 +637,7 @@ def main() -> int:
         without,
         args.episode,
         args.shrink,
-        args.object_state,
+        args.looks,
         lambda text: print(text, flush=True),
     )
     print(summarise(outcomes, time.monotonic() - started))
