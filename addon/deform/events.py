@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 
 import bpy
 
@@ -64,23 +63,6 @@ def unsubscribe(event: str, function: Callable) -> None:
     functions = getattr(bpy.app.handlers, event)
     if function in functions:
         functions.remove(function)
-
-
-@contextmanager
-def without_handlers() -> Iterator[None]:
-    """An evaluation inside is part of the one that Blender has told of: it calls no handlers.
-
-    Where Blender goes through one of the lists now, only for its last function.
-    """
-    lists = [getattr(bpy.app.handlers, event) for event in ("depsgraph_update_pre", "depsgraph_update_post")]
-    kept = [list(functions) for functions in lists]
-    try:
-        for functions in lists:
-            functions.clear()
-        yield
-    finally:
-        for functions, before in zip(lists, kept, strict=True):
-            functions[:] = before
 
 
 def subscribe_all(handlers: Mapping[str, Callable]) -> None:

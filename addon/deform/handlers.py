@@ -15,7 +15,6 @@ from ..attach.updates import is_main_thread, is_rendering_in_window, reaction
 from ..io.animation_paths import animated_paths
 from . import events, session
 from .changes import Changes, names_of_changed_meshes
-from .plan import State
 from .session import current
 
 # --- Evaluations and changes of frame
@@ -138,12 +137,14 @@ def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
 @persistent
 def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
-    of updates at once. A mesh that was there before they were called may have changed once more; so may
-    poses, which are evaluated here for what Sinew deforms after the update."""
+    of updates at once. A mesh that was there before they were called may have changed once more.
+
+    What they pose or move is seen with the next event, where Sinew deforms after the update: to have Blender
+    evaluate within a handler can crash it (4.2)."""
     seen, current.seen = current.seen, None
-    if seen is None:
+    names = names_of_changed_meshes(depsgraph) if seen is not None else set()
+    if not names:
         return
-    names = names_of_changed_meshes(depsgraph)
     new = Changes(complete=True)
     with reaction() as may_react:
         for obj, state in current.pairs:
@@ -152,27 +153,12 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     state.needs_recheck = True
                 elif obj.data.name_full in names:
                     new.meshes.add(obj.data.session_uid)
-                if state.plan.state is State.AFTER_UPDATE:
-                    new.touched.add(obj.session_uid)
-        if new.touched and may_react and not (current.is_saving or is_rendering_in_window()):
-            _tag_renamed(depsgraph)
-            with events.without_handlers():
-                depsgraph.update()
-        if new.meshes or new.touched:
+        if new.meshes:
             new.touched |= new.meshes
             # What Sinew does itself came before them.
             current.expected -= new.meshes
             _react(depsgraph, new, may_react)
     _end_event()
-
-
-def _tag_renamed(depsgraph: bpy.types.Depsgraph) -> None:
-    """An object that was renamed in a handler loses its shape where handlers evaluate (seen on 5.2): it is
-    evaluated whole instead. Its evaluated copy has the old name until then."""
-    for update in depsgraph.updates:
-        with contextlib.suppress(ReferenceError):
-            if isinstance(update.id, bpy.types.Object) and update.id.name != update.id.original.name:
-                update.id.original.update_tag()
 
 
 @persistent

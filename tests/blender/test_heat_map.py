@@ -316,6 +316,21 @@ def test_undo_and_redo():
     assert set(color_types()) == {"VERTEX"}
 
 
+def test_converted_to_a_mesh_it_leaves_nothing_of_itself():
+    obj, _armature = scenes.make_arm()
+    obj.data.materials.append(bpy.data.materials.new("Skin"))
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.sinew.heat_map()
+    bpy.context.view_layer.update()
+    with bpy.context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
+        bpy.ops.object.convert(target="MESH")
+    session.refresh(bpy.context)
+    assert not properties.has_sinew(obj)
+    assert heat_nodes.NAME not in obj.data.attributes
+    assert [material.name for material in obj.data.materials] == ["Skin"]
+    assert not [m for m in bpy.data.materials if m.get(heat_nodes.MARK)]
+
+
 def test_what_is_deleted_gives_the_views_back():
     obj, _armature = scenes.make_arm()
     types = color_types()

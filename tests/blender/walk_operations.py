@@ -1637,11 +1637,6 @@ def meddle(obj: bpy.types.Object, what: str, modifier: str, new: str, vertices: 
         obj.vertex_groups[0].add(vertices, 0.3, "REPLACE")
     elif what == "move":
         obj.location.z += 0.1
-    elif what == "pose":
-        for armature in dict.fromkeys(m.object for m in armature_modifiers(obj) if m.object is not None):
-            for bone in armature.pose.bones:
-                bone.rotation_mode = "XYZ"
-                bone.rotation_euler = (0.3, 0.2, -0.1)
     elif what == "name":
         obj.name = new
     elif what == "rename":
@@ -1688,7 +1683,7 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
     """Another add-on's handler, once, at a change of frame."""
     obj, when = w.mesh(r), r.choice(("frame_change_pre", "frame_change_post", "depsgraph_update_post"))
     what, number = (
-        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "pose", "pose", "name")),
+        r.choice(("rename", "toggle", "add", "delete", "weights", "move", "name")),
         r.randint(*FRAMES),
     )
     if (

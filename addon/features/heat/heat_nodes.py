@@ -55,6 +55,18 @@ def remove_colours(obj: bpy.types.Object) -> None:
         mesh_io.remove_attribute(properties.of(obj).point_buffer.data, COLOURS)
 
 
+def remove_applied(mesh: bpy.types.Mesh) -> None:
+    """What a mesh has of the group that was applied to it: the colours and their material. Faces get the
+    material of the slot in front: which they had is not in the mesh any more."""
+    if not mesh.is_editable or mesh.is_editmode:
+        return
+    mesh_io.remove_attribute(mesh, NAME)
+    for slot in reversed(range(len(mesh.materials))):
+        material = mesh.materials[slot]
+        if material is not None and material.get(MARK):
+            mesh.materials.pop(index=slot)
+
+
 def _make() -> bpy.types.NodeTree:
     points = node_group.get_or_make(POINT_BUFFER)
     inputs = {

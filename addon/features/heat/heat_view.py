@@ -29,6 +29,7 @@ def take_off(obj: bpy.types.Object) -> None:
     # First, as Blender 4.2 makes another colour attribute the active one when any attribute goes.
     sync(_objects())
     heat_nodes.remove_colours(obj)
+    heat_nodes.remove_applied(obj.data)
 
 
 def tidy() -> None:
