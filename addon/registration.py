@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import atexit
+import sys
 
 import bpy
 
@@ -40,9 +41,8 @@ def register() -> None:
     for feature in (bake, compare, heat, diagnose):
         feature.register()
     handlers.adopt_open_file()
-    # Blender unregisters its extensions before it ends; with bpy as a module nobody does, and a Python
-    # handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5.
-    atexit.register(unregister)
+    atexit.unregister(_end)
+    atexit.register(_end)
 
 
 def unregister() -> None:
@@ -55,7 +55,6 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
 
-        atexit.unregister(unregister)
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
@@ -67,6 +66,17 @@ def unregister() -> None:
         properties.unregister()
     while _registered:
         bpy.utils.unregister_class(_registered.pop())
+
+
+def _end() -> None:
+    """At the end of Python. Blender unregisters its extensions before; with bpy as a module nobody does, and a
+    Python handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5."""
+    unregister()
+    # Blender 4.2 keeps a reference to each class of property groups that was registered, which keeps the names
+    # of its module. Blender as a module ends when `bpy` is freed, and crashes where it never is.
+    for name, module in list(sys.modules.items()):
+        if name == __package__ or name.startswith(f"{__package__}."):
+            vars(module).pop("bpy", None)
 
 
 def _register_classes(classes: tuple[type, ...]) -> None:

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Python with Blender as a module ends with status 0 whatever Sinew did in it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REGISTER = """
+import bpy
+import sinew_addon
+sinew_addon.register()
+"""
+USE = """
+from sinew_addon.attach import attach
+import scenes
+obj, armature = scenes.make_arm()
+attach.add(obj, "dq")
+for frame in (3, 7):
+    bpy.context.scene.frame_set(frame)
+"""
+HEAT = """
+obj.sinew.heat = True
+bpy.context.scene.frame_set(5)
+"""
+UNREGISTER = """
+sinew_addon.unregister()
+"""
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (REGISTER,),
+        (REGISTER, UNREGISTER),
+        (REGISTER, UNREGISTER, REGISTER, UNREGISTER),
+        (REGISTER, USE, HEAT),
+        (REGISTER, USE, HEAT, UNREGISTER),
+    ],
+    ids=["registered", "unregistered", "registered again", "in use", "used"],
+)
+def test_a_script_ends_with_status_0(parts, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("".join(parts) + "print('at its end')\n")
+    ran = subprocess.run(
+        [sys.executable, script],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "at its end" in ran.stdout, ran.stdout + ran.stderr
+    assert ran.returncode == 0, ran.stderr
