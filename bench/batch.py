@@ -171,7 +171,9 @@ def main() -> None:
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     if options.files < 4:
-        parser.error("--files: 4 or more, as the largest file takes half of them, and the first is not measured")
+        parser.error(
+            "--files: 4 or more, as the largest file takes half of them, and the first is not measured"
+        )
     results: dict[str, object] = {
         "bpy": importlib.metadata.version("bpy"),
         "cores": os.cpu_count(),
