@@ -99,7 +99,7 @@ def have_bones_changed(
         bound.skin_stack.skin_stages, properties.of(obj).replaced_modifiers, strict=False
     ):
         armature, known = replaced.armature, stage.binding.bones
-        if armature is None or armature.mode == "EDIT":
+        if armature is None or armature.data.is_editmode:
             continue
         if armature.data.session_uid in changes.armatures or not known.complete:
             bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
@@ -126,6 +126,6 @@ def _mix_weights(obj: bpy.types.Object, read_now: Source, name: str) -> np.ndarr
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:
-    if armature is None or armature.mode == "EDIT":
+    if armature is None or armature.data.is_editmode:
         return Bones.none()
     return armature_io.read_bones(armature.evaluated_get(depsgraph))

@@ -45,7 +45,7 @@ def read(
         strict=False,
     ):
         flags = evaluated.modifiers[replaced.name] if is_keyed or skinned.uses_builtin else replaced
-        if armature is None or armature.mode == "EDIT" or not _takes_part(flags, mode):
+        if armature is None or armature.data.is_editmode or not _takes_part(flags, mode):
             frames.append(None)
             continue
         space = armature_io.bones_from_model(evaluated, armature)

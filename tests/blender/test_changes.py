@@ -15,6 +15,13 @@ from sinew_addon.io import animation_paths, mesh_io
 from test_editing import assert_follows
 
 
+@pytest.fixture(params=routes.ROUTES)
+def by_each_route(request):
+    routes.force(request.param)
+    yield
+    routes.release()
+
+
 @pytest.fixture
 def keyed():
     """An arm with Sinew and two shape keys, the second at half."""
@@ -126,6 +133,28 @@ def test_bones_are_edited_on_the_rest_shape():
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_follows(obj)
+
+
+@pytest.mark.usefixtures("by_each_route")
+def test_bones_that_another_armature_object_shares_are_in_edit_mode_after_undo():
+    """Blender then has only the object that the artist edits in edit mode, and the bones of both."""
+    obj, armature = scenes.make_arm()
+    sharing = armature.copy()
+    bpy.context.scene.collection.objects.link(sharing)
+    obj.modifiers["Armature"].object = sharing
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(11)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.ed.undo_push(message="In edit mode")
+    armature.data.edit_bones.new("extra").tail = (0, 0, 1)
+    bpy.ops.ed.undo_push(message="A bone more")
+    bpy.ops.ed.undo()
+    obj, sharing = bpy.data.objects["Arm"], bpy.data.objects[sharing.name]
+    assert sharing.data.is_editmode
     assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
     bpy.ops.object.mode_set(mode="OBJECT")
     assert_follows(obj)
@@ -458,23 +487,19 @@ def test_a_render_of_a_hidden_mesh_has_its_weights_and_its_keyed_method(rendered
     assert scenes.worst(got, rendered_points(obj)) > 0.01
 
 
-@pytest.mark.parametrize("route", routes.ROUTES)
-def test_visibility_that_is_keyed_while_sinew_is_on(route):
+@pytest.mark.usefixtures("by_each_route")
+def test_visibility_that_is_keyed_while_sinew_is_on():
     obj, armature = scenes.make_arm()
     scenes.forget_keys(armature)
     scenes.add_sinew(obj)
-    routes.force(route)
-    try:
-        modifier = obj.modifiers["Armature"]
-        for path in ("show_viewport", "show_render"):
-            for frame in (2, 3):
-                modifier.keyframe_insert(path, frame=frame)
-        for curve in animation_paths.curves_of(obj):
-            if ".show_" in curve.data_path:
-                curve.keyframe_points[1].co.y = 1.0
-        bpy.context.scene.frame_set(1)
-        scenes.bend(armature, 90.0)
-        bpy.context.view_layer.update()
-        assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6
-    finally:
-        safe_mode.set_forced(None)
+    modifier = obj.modifiers["Armature"]
+    for path in ("show_viewport", "show_render"):
+        for frame in (2, 3):
+            modifier.keyframe_insert(path, frame=frame)
+    for curve in animation_paths.curves_of(obj):
+        if ".show_" in curve.data_path:
+            curve.keyframe_points[1].co.y = 1.0
+    bpy.context.scene.frame_set(1)
+    scenes.bend(armature, 90.0)
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) <= 1e-6

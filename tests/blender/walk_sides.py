@@ -30,7 +30,7 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     action = animation.action if animation is not None else None
     if action is None:
         return []
-    if hasattr(action, "fcurves"):
+    if not hasattr(action, "layers"):
         return list(action.fcurves)
     slot = animation.action_slot
     bags = [s.channelbag(slot) for layer in action.layers for s in layer.strips] if slot is not None else []
@@ -41,7 +41,7 @@ def remove_curves(owner: bpy.types.ID, end: str) -> None:
     """Takes the curves off whose data path ends so."""
     action = owner.animation_data.action if owner.animation_data is not None else None
     for curve in [c for c in curves_of(owner) if c.data_path.endswith(end)]:
-        if hasattr(action, "fcurves"):
+        if not hasattr(action, "layers"):
             action.fcurves.remove(curve)
             continue
         for layer in action.layers:

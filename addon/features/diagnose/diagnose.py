@@ -156,7 +156,7 @@ def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:
     armature = attach.armature_of(obj)
     if armature is None:
         raise SinewError(f"{obj.name}: no armature deforms it; there are no weights to check")
-    if armature.mode == "EDIT":
+    if armature.data.is_editmode:
         raise SinewError(f"{armature.name} is in edit mode; leave it first")
     if obj.mode == "EDIT":
         obj.update_from_editmode()
@@ -230,7 +230,7 @@ def _compare_bones(armatures: set[str], depsgraph: bpy.types.Depsgraph) -> None:
     for obj in bpy.data.objects:
         found = _checks.get(obj.session_uid)
         armature = attach.armature_of(obj) if found is not None else None
-        if armature is None or armature.data.name_full not in armatures or armature.mode == "EDIT":
+        if armature is None or armature.data.name_full not in armatures or armature.data.is_editmode:
             continue
         bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
         found.stale |= not bones.equals(found.bones)
