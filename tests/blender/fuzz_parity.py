@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random rigs, posed at random: Sinew against Blender's Armature modifier.
+"""Random rigs, posed at random: Sinew against Blender's Armature modifier, or for methods that Blender lacks
+against the float64 reference.
 
     python tests/blender/fuzz_parity.py --rigs 10000 [--first 0] [--route both] [--keep DIR]
 
@@ -36,7 +37,9 @@ from sinew_addon.core import session as core_session
 from sinew_addon.deform import session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+import fuzz_reference
 import reference
+import sinew
 
 MARGIN = 1e-3
 # Of float32 numbers after a few operations, as a part of the diagonal.
@@ -60,8 +63,13 @@ FEATURES = (
     "bone parent",
     "parent deforms",
     "absolute keys",
+    "faces",
 )
+# Methods that Blender has, and whether with Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
+OTHERS = tuple(m.name for m in sinew.methods() if m.name not in dict(ORACLES))
+# Of a rig, by the reference: it takes a hundredth of a second for one.
+REFERENCE_VERTICES = 12
 NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
 
 
@@ -73,6 +81,7 @@ class Outcome:
     taken     the route that was taken for each that was wanted
     reason    why a shape is not Sinew's, if one is not
     left_out  how many vertices were
+    compared  with the reference, over all methods, and of these undecided by rounding
     """
 
     seed: int
@@ -80,6 +89,8 @@ class Outcome:
     taken: dict[str, str] = field(default_factory=dict)
     reason: str = ""
     left_out: int = 0
+    compared: int = 0
+    undecided: int = 0
     vertices: int = 0
 
     @property
@@ -156,7 +167,7 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
     rng = numbers(seed, "mesh")
     count = int(rng.integers(20, 120))
     mesh = bpy.data.meshes.new("Mesh")
-    mesh.from_pydata(rng.uniform(-1.2, 1.2, (count, 3)).tolist(), [], [(0, 1, 2), (3, 4, 5)])
+    mesh.from_pydata(rng.uniform(-1.2, 1.2, (count, 3)).tolist(), [], faces_of(seed, features, count))
     obj = bpy.data.objects.new("Mesh", mesh)
     bpy.context.scene.collection.objects.link(obj)
     groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
@@ -172,6 +183,14 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
     if has(seed, "shape keys", features):
         add_shape_keys(seed, features, obj)
     return obj
+
+
+def faces_of(seed: int, features: set[str], count: int) -> list[tuple[int, ...]]:
+    """Of a mesh of `count` vertices: two, or about as many as vertices."""
+    if not has(seed, "faces", features):
+        return [(0, 1, 2), (3, 4, 5)]
+    rng = numbers(seed, "faces")
+    return [tuple(rng.choice(count, 3, replace=False).tolist()) for _face in range(count)]
 
 
 def make_weights_messy(rng: np.random.Generator, count: int, groups: list[bpy.types.VertexGroup]) -> None:
@@ -303,20 +322,6 @@ def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
         bone.bbone_rollin, bone.bbone_curveoutx = rng.uniform(-1, 1), rng.uniform(-0.3, 0.3)
 
 
-def rotation_keeping_y(posed: np.ndarray) -> np.ndarray:
-    """3x3: the rotation of a posed bone's axes, with the modifier's own choice of a second axis under
-    shear."""
-    x, y, z = posed[:, 0], posed[:, 1] / np.linalg.norm(posed[:, 1]), posed[:, 2]
-    if y @ x < 1.0:
-        x = x - y * (y @ x)
-    elif x @ z < 1.0:
-        x = np.cross(y, z)
-    else:
-        x = np.cross(y, y[[1, 2, 0]])
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, y, np.cross(x, y)])
-
-
 def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, of an object that was just deformed."""
     skinned = session.state_of(obj)
@@ -337,7 +342,7 @@ def undecided_by(binding: core_session.Binding) -> np.ndarray:
     rest_axes = binding.bones.rest_axes.astype(np.float64)[:, :3, :3]
     quaternions = np.array(
         [
-            reference.quaternion(rotation_keeping_y(motion[:3, :3] @ rest) @ rest.T)
+            reference.quaternion(reference.axes_keeping_y(motion[:3, :3] @ rest) @ rest.T)
             for motion, rest in zip(motions, rest_axes, strict=True)
         ]
     )
@@ -395,6 +400,12 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
+        for method in OTHERS:
+            try:
+                error = error_to_reference(obj, armature, method, seed, outcome, route)
+            except routes.NotBySinewError as why:
+                error, outcome.reason = float("inf"), str(why)
+            outcome.errors[route, method] = error
         attach.remove(obj)
         session.forget()
     routes.release()
@@ -413,6 +424,47 @@ def error_of(
 
     Raises routes.NotBySinewError.
     """
+    shown = shape_of(obj, armature, method, outcome, route)
+    if shown.shape != expected.shape:
+        return float("inf")
+    # A pose with scale makes the mesh larger, and its rounding with it.
+    extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected, axis=0))))
+    left_out = undecided(obj) | unstable(obj, extent)
+    outcome.left_out = int(left_out.sum())
+    return float(np.abs(shown - expected)[~left_out].max(initial=0.0)) / extent
+
+
+def error_to_reference(
+    obj: bpy.types.Object, armature: bpy.types.Object, method: str, seed: int, outcome: Outcome, route: str
+) -> float:
+    """As error_of(), of some vertices, to the float64 reference."""
+    place = list(obj.modifiers).index(attach.sinew_modifier(obj))
+    behind = [m for m in list(obj.modifiers)[place:] if m.type not in ("ARMATURE", "NODES")]
+    for modifier in behind:
+        modifier.show_viewport = False
+    shown = shape_of(obj, armature, method, outcome, route)
+    state = session.state_of(obj)
+    count = min(REFERENCE_VERTICES, len(shown))
+    chosen = np.sort(numbers(seed, "reference").choice(len(shown), count, replace=False))
+    expected, decided = fuzz_reference.deform(
+        state.bound.skin_stack, state.shown.rest_points, state.shown.frames, chosen
+    )
+    extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(shown, axis=0))))
+    decided &= ~unstable(obj, extent)[chosen]
+    for modifier in behind:
+        modifier.show_viewport = True
+    outcome.compared += count
+    outcome.undecided += int((~decided).sum())
+    return float(np.abs(shown[chosen] - expected)[decided].max(initial=0.0)) / extent
+
+
+def shape_of(
+    obj: bpy.types.Object, armature: bpy.types.Object, method: str, outcome: Outcome, route: str
+) -> np.ndarray:
+    """The final points, made anew by `method`; notes the route that was taken.
+
+    Raises routes.NotBySinewError.
+    """
     attach.use_one_method(obj, method)
     # Another pose and back, so that the shape has to be made.
     before = [bone.location.copy() for bone in armature.pose.bones]
@@ -426,13 +478,7 @@ def error_of(
     bpy.context.view_layer.update()
     shown = scenes.final_points(obj)
     outcome.taken[route] = routes.taken(obj, shapes)
-    if shown.shape != expected.shape:
-        return float("inf")
-    # A pose with scale makes the mesh larger, and its rounding with it.
-    extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(expected, axis=0))))
-    left_out = undecided(obj) | unstable(obj, extent)
-    outcome.left_out = int(left_out.sum())
-    return float(np.abs(shown - expected)[~left_out].max(initial=0.0)) / extent
+    return shown
 
 
 def shrink(seed: int, wanted: Sequence[str]) -> set[str]:
@@ -467,11 +513,12 @@ def summarise(outcomes: list[Outcome]) -> str:
     left_out = sum(o.left_out for o in outcomes)
     vertices = sum(o.vertices for o in outcomes)
     touched = sum(o.left_out > 0 for o in outcomes)
+    compared, undecided = sum(o.compared for o in outcomes), sum(o.undecided for o in outcomes)
     errors = ", ".join(f"{m} by {r} {o.errors[r, m]:.1e} (seed {o.seed})" for (r, m), o in worst.items())
     return (
         f"{len(outcomes)} rigs, {sum(o.failed for o in outcomes)} failed; worst error as a part of the "
         f"diagonal: {errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a "
-        "discontinuity\n" + "\n".join(routes_taken(outcomes))
+        f"discontinuity, with the reference {undecided} of {compared}\n" + "\n".join(routes_taken(outcomes))
     )
 
 

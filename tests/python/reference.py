@@ -29,12 +29,20 @@ def rotation_of_bone(posed_from_rest, rest_bone):
     right-handed, with Y kept and X as near as possible."""
     if is_rigid(posed_from_rest[:3, :3]):
         return nearest_rotation(posed_from_rest[:3, :3])
-    axes = posed_from_rest[:3, :3] @ rest_bone[:3, :3]
-    y = axes[:, 1] / np.linalg.norm(axes[:, 1])
-    assert y @ axes[:, 0] < 1.0, "beyond this shear Blender's rule picks another axis than the reference"
-    x = axes[:, 0] - y * (y @ axes[:, 0])
+    return axes_keeping_y(posed_from_rest[:3, :3] @ rest_bone[:3, :3]) @ rest_bone[:3, :3].T
+
+
+def axes_keeping_y(axes):
+    """Orthonormal axes for a posed bone's, 3x3, with Blender's choice of a second axis under shear."""
+    x, y, z = axes[:, 0], axes[:, 1] / np.linalg.norm(axes[:, 1]), axes[:, 2]
+    if y @ x < 1.0:
+        x = x - y * (y @ x)
+    elif x @ z < 1.0:
+        x = np.cross(y, z)
+    else:
+        x = np.cross(y, y[[1, 2, 0]])
     x /= np.linalg.norm(x)
-    return np.column_stack([x, y, np.cross(x, y)]) @ rest_bone[:3, :3].T
+    return np.column_stack([x, y, np.cross(x, y)])
 
 
 def quaternion(rotation):
