@@ -150,6 +150,7 @@ class Walker:
         active = bpy.context.view_layer.objects.active
         if active is not None and active.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
+            self.unpushed = True
 
     def push_undo(self) -> None:
         if self.unpushed:
