@@ -302,6 +302,8 @@ def add(w: Walker, r: random.Random) -> str | None:
         return None
     method, leave = r.choice((None, *METHODS[:2])), r.random() < 0.15
     w.object_mode()
+    # As Blender does before any operator.
+    bpy.context.view_layer.update()
     flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
     if len(flags) > 1 and method is None:
         method = "lbs"
