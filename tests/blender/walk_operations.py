@@ -1356,6 +1356,8 @@ def duplicate(w: Walker, r: random.Random) -> str | None:
     made.name = w.new_name("object")
     if not linked:
         made.data.name = w.new_name("mesh")
+    # Its first evaluation applies its keys, whenever that comes.
+    bpy.context.view_layer.update()
     return (
         f"duplicate {name} as {made.name}{', linked' if linked else ''}{', by a script' if by_script else ''}"
     )
