@@ -302,8 +302,8 @@ def add(w: Walker, r: random.Random) -> str | None:
         return None
     method, leave = r.choice((None, *METHODS[:2])), r.random() < 0.15
     w.object_mode()
-    # As Blender does before any operator.
-    bpy.context.view_layer.update()
+    # To add a driver, as Sinew does, can have Blender evaluate the object's own keys.
+    w.this_frame()
     flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
     if len(flags) > 1 and method is None:
         method = "lbs"
@@ -1356,8 +1356,6 @@ def duplicate(w: Walker, r: random.Random) -> str | None:
     made.name = w.new_name("object")
     if not linked:
         made.data.name = w.new_name("mesh")
-    # Its first evaluation applies its keys, whenever that comes.
-    bpy.context.view_layer.update()
     return (
         f"duplicate {name} as {made.name}{', linked' if linked else ''}{', by a script' if by_script else ''}"
     )
