@@ -35,6 +35,25 @@ def test_add_starts_with_the_method_of_the_modifier():
         assert properties.of(obj).method == method
 
 
+@pytest.mark.parametrize("evaluated", [False, True])
+def test_what_was_moved_without_a_key_stays(evaluated):
+    obj, _armature = scenes.make_arm()
+    for frame in (2, 9):
+        obj.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(3)
+    obj.location.x = 5.0
+    if evaluated:
+        bpy.context.view_layer.update()
+    scenes.add_sinew(obj)
+    bpy.context.view_layer.update()
+    assert obj.location.x == 5.0
+    obj.location.x = 6.0
+    obj.modifiers.new("Front", "CAST")
+    obj.modifiers.move(2, 0)
+    bpy.context.view_layer.update()
+    assert obj.location.x == 6.0
+
+
 def test_add_on_the_armature_takes_all_its_meshes():
     first, armature = scenes.make_arm(name="First")
     second = first.copy()

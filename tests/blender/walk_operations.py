@@ -302,8 +302,6 @@ def add(w: Walker, r: random.Random) -> str | None:
         return None
     method, leave = r.choice((None, *METHODS[:2])), r.random() < 0.15
     w.object_mode()
-    # To add a driver, as Sinew does, can have Blender evaluate the object's own keys.
-    w.this_frame()
     flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
     if len(flags) > 1 and method is None:
         method = "lbs"
