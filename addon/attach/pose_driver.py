@@ -77,8 +77,8 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
             return
         _take_off(obj, curve)
     curve = obj.driver_add(path)
-    # Whatever the variables are, the value is 0: so no frame changes the input. By an assignment Blender would
-    # also evaluate the object's keys, and take back what was moved without a key.
+    # Whatever the variables are, the value is 0: so no frame changes the input. By an assignment Blender
+    # would also evaluate the object's keys, and take back what was moved without a key.
     curve.modifiers.new("GENERATOR").coefficients.foreach_set((0.0, 0.0))
     driver = curve.driver
     driver.type = "SUM"
