@@ -28,17 +28,29 @@ def register() -> None:
     from .features.diagnose import feature as diagnose
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
+    from .features.suggest import feature as suggest
     from .ui import main_panel, operators, preferences
 
     # Panels appear in this order.
-    for owner in (preferences, properties, operators, main_panel, inbetween, bake, compare, heat, diagnose):
+    for owner in (
+        preferences,
+        properties,
+        operators,
+        main_panel,
+        suggest,
+        inbetween,
+        bake,
+        compare,
+        heat,
+        diagnose,
+    ):
         _register_classes(owner.CLASSES)
     properties.register()
     # Its handlers come first: poses before what they deform.
     inbetween.register()
     handlers.register()
     exporters.register()
-    for feature in (bake, compare, heat, diagnose):
+    for feature in (suggest, bake, compare, heat, diagnose):
         feature.register()
     handlers.adopt_open_file()
     atexit.unregister(_end)
@@ -54,11 +66,12 @@ def unregister() -> None:
         from .features.diagnose import feature as diagnose
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
+        from .features.suggest import feature as suggest
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
-        for feature in (diagnose, heat, compare, bake):
+        for feature in (diagnose, heat, compare, bake, suggest):
             feature.unregister()
         exporters.unregister()
         handlers.unregister()

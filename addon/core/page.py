@@ -16,6 +16,7 @@ from .diagnostics import Finding
 from .errors import SinewError
 from .heat import HeatScale, viridis
 from .plots import colour_of, line_plot
+from .suggestion import CRITERIA, Suggestion
 
 # Title, unit and entries of the summaries. A plot has a line for each method and entry.
 PLOTS = (
@@ -97,7 +98,19 @@ def _overview(comparison: Comparison) -> str:
         (f"{_key(number)}{escape(label)} {_faint(method)}", *_overview_cells(comparison, method))
         for number, (method, label) in enumerate(comparison.methods.items())
     ]
-    return f'<div class="wide"><table><tr>{head}</tr>{_table_rows(rows)}</table></div>'
+    best = "" if len(rows) < 2 else f"<p>{escape(_suggestion(comparison).text)}</p>"
+    return f'<div class="wide"><table><tr>{head}</tr>{_table_rows(rows)}</table></div>{best}'
+
+
+def _suggestion(comparison: Comparison) -> Suggestion:
+    suggestion = Suggestion(comparison.methods, comparison.frames, comparison.rest.diagonal)
+    for method in comparison.methods:
+        for criterion in CRITERIA:
+            if criterion.entry:
+                values = comparison.values(method, criterion.entry)
+                for frame, value in zip(comparison.frames, values, strict=True):
+                    suggestion.add(method, criterion.name, value, frame)
+    return suggestion
 
 
 def _overview_cells(comparison: Comparison, method: str) -> list[str]:

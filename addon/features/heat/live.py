@@ -103,6 +103,14 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
     return subject
 
 
+def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph) -> Measured:
+    """Of the frame that measure() was called for last, by another method; distances are to the shape that is
+    shown."""
+    worlds = [_world(part.obj, depsgraph) for part in subject.parts]
+    shape = _in_world([_Other.of(part, method).points() for part in subject.parts], worlds)
+    return subject.gauge.measure(shape, subject.measured.shape.points.T)
+
+
 def _is_current(part: Part, pair: tuple[bpy.types.Object, SkinnedObject]) -> bool:
     return part.skinned is pair[1] and part.bound is pair[1].bound
 

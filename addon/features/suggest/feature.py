@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender gets of it: a panel and its buttons. Nothing is stored in files."""
+
+from .suggest_panel import CLASSES as CLASSES
+
+
+def register() -> None:
+    pass
+
+
+def unregister() -> None:
+    from .suggest import suggestions
+
+    suggestions.clear()

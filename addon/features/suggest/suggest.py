@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Goes through frames, and measures what each method would make of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import bpy
+import numpy as np
+
+from ...attach import properties
+from ...core.errors import SinewError
+from ...core.metrics import Measured, Shape
+from ...core.suggestion import CRITERIA, Suggestion
+from ...deform import evaluate, session
+from ...ui import stepped
+from ..heat import live
+from ..heat.worst_frames import armatures_of
+from .crossings import crossing_triangles
+
+# Crossings take longer than all else together: they are counted at as many frames, evenly spread.
+CROSSING_FRAMES = 8
+
+# By the session_uid of the scene: found anew whenever somebody wants to know, and no part of the file.
+suggestions: dict[int, Suggestion] = {}
+
+
+def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str) -> Iterator[float]:
+    """Yields the share that is done; then suggestions[scene.session_uid] has the result. The objects' own
+    methods stay as they are.
+
+    Raises SinewError where an object can not be measured.
+    """
+    for obj in objects:
+        if not properties.of(obj).enabled or obj.mode == "EDIT":
+            raise SinewError(
+                f"{obj.name} is switched off or in edit mode: switch Sinew on in object mode first"
+            )
+    armatures = armatures_of(objects)
+    frames = stepped.frames_over(scene, armatures, over)
+    places = np.linspace(0, len(frames) - 1, min(len(frames), CROSSING_FRAMES)).round().astype(int)
+    counted = {frames[place] for place in places}
+    labels = {name: method.label for name, method in properties.METHODS.items()}
+    suggestion = Suggestion(labels, frames, 0.0)
+    done, of_all = 0, len(frames) * len(labels)
+    with stepped.kept_frame(scene, armatures):
+        for frame in frames:
+            evaluate.set_frame(scene, frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
+            if subject is None:
+                raise SinewError(
+                    f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes"
+                )
+            at_rest = _crossings(subject.gauge.rest) if frame in counted else None
+            suggestion.diagonal = subject.measured.rest.diagonal
+            for method in labels:
+                measured = live.measured_under(subject, method, depsgraph)
+                _add(suggestion, method, frame, measured)
+                if at_rest is not None:
+                    new = len(_crossings(measured.shape) - at_rest)
+                    suggestion.add(method, "crossings", new, frame)
+                done += 1
+                yield done / of_all
+    suggestions[scene.session_uid] = suggestion
+
+
+def _add(suggestion: Suggestion, method: str, frame: float, measured: Measured) -> None:
+    for criterion in CRITERIA:
+        if criterion.entry:
+            suggestion.add(method, criterion.name, measured.entry(criterion.entry), frame)
+
+
+def _crossings(shape: Shape) -> set[tuple[int, int]]:
+    return crossing_triangles(shape.points.T, shape.surface.triangles)

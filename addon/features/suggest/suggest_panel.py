@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar's table of all methods: what each is worst by, which is best, and a click to use it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...attach import attach, properties
+from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
+from ...deform import session
+from ...io import units
+from ...ui import operators, stepped
+from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.sidebar import Sidebar, draw_text
+from . import suggest
+
+
+class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
+    bl_idname = "sinew.suggest"
+    bl_label = "Suggest a Method"
+    bl_description = (
+        "Measure what every method would make of the frames, and say which is best at what. The method stays "
+        "as it is"
+    )
+    bl_options = {"REGISTER"}
+    saying = "Sinew measures every method"
+
+    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        return suggest.scan(context.scene, sinew_targets(context), self.over)
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        self.report({"INFO"}, suggest.suggestions[context.scene.session_uid].text)
+        return {"FINISHED"}
+
+
+class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.use_method"
+    bl_label = "Use Method"
+    bl_description = "Deform the selected meshes by this method"
+    bl_options = {"REGISTER", "UNDO"}
+
+    method: bpy.props.StringProperty(name="Method")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if self.method not in properties.METHODS:
+            self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
+            return {"CANCELLED"}
+        with session.changing(context):
+            for obj in sinew_targets(context):
+                attach.use_one_method(obj, self.method)
+        return {"FINISHED"}
+
+
+class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
+    bl_label = "Suggest"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(operators.sinew_targets(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_menu_enum("sinew.suggest", "over", text="Measure All Methods", icon="VIEWZOOM")
+        suggestion = suggest.suggestions.get(context.scene.session_uid)
+        if suggestion is None:
+            return
+        count = len(suggestion.frames)
+        draw_text(
+            layout, context, f"The worst of {count} frame{'s' if count > 1 else ''}; a dot marks the best"
+        )
+        used = {properties.of(obj).method for obj in operators.sinew_targets(context)}
+        _draw_table(layout, context.scene, suggestion, used)
+        for criterion in CRITERIA:
+            draw_text(layout, context, f"{criterion.label}: {criterion.text}")
+
+
+def _draw_table(
+    layout: bpy.types.UILayout, scene: bpy.types.Scene, suggestion: Suggestion, used: set[str]
+) -> None:
+    best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
+    row = layout.row(align=True)
+    methods = row.column(align=True)
+    methods.label(text="")
+    ranked = suggestion.rank()
+    for name in ranked:
+        button = methods.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
+        button.method = name
+    for criterion in CRITERIA:
+        column = row.column(align=True)
+        column.label(text=criterion.label)
+        for name in ranked:
+            worst = suggestion.worst.get((name, criterion.name))
+            icon = "RADIOBUT_ON" if name in best[criterion.name] else "NONE"
+            column.label(text=value_text(scene, criterion, worst), icon=icon)
+
+
+def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
+    if worst is None:
+        return "none"
+    if criterion.unit == "count":
+        return f"{worst.value:,.0f}"
+    return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")
+
+
+CLASSES = (SINEW_OT_suggest, SINEW_OT_use_method, SINEW_PT_suggest)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All methods measured over frames, which is best at what, and a click to use it."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.attach import properties
+from sinew_addon.core.suggestion import CRITERIA, Suggestion
+from sinew_addon.features.heat import live
+from sinew_addon.features.suggest import suggest, suggest_panel
+from sinew_addon.features.suggest.crossings import crossing_triangles
+
+
+@pytest.fixture(autouse=True)
+def nothing_known():
+    suggest.suggestions.clear()
+
+
+def found() -> Suggestion:
+    return suggest.suggestions[bpy.context.scene.session_uid]
+
+
+def test_numbers_are_those_of_each_method():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    assert bpy.ops.sinew.suggest() == {"FINISHED"}
+    suggestion = found()
+    assert set(suggestion.methods) == set(properties.METHODS)
+    assert suggestion.frames == list(range(1, 12))
+    assert properties.of(obj).method == "dq"
+    for (method, name), worst in suggestion.worst.items():
+        criterion = next(c for c in CRITERIA if c.name == name)
+        if not criterion.entry:
+            continue
+        properties.of(obj).method = method
+        bpy.context.scene.frame_set(int(worst.frame))
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        measured = live.measure(scenes.states_of(obj), "blender", depsgraph).measured
+        assert worst.value == pytest.approx(measured.entry(criterion.entry), rel=1e-5, abs=1e-7)
+    # A bent and twisted arm: linear blending loses most volume.
+    assert abs(suggestion.worst["lbs", "volume"].value) > 2 * abs(suggestion.worst["dq", "volume"].value)
+    assert "lbs" not in suggestion.best(next(c for c in CRITERIA if c.name == "volume"))
+
+
+def test_it_leaves_all_as_it_was():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(4)
+    scenes.bend(armature, 33.0)
+    bpy.context.view_layer.update()
+    before = scenes.final_points(obj)
+    bpy.ops.sinew.suggest(over="ACTION")
+    assert bpy.context.scene.frame_current == 4
+    np.testing.assert_allclose(scenes.final_points(obj), before, atol=1e-6)
+
+
+def test_stopped_it_leaves_all_as_it_was_and_knows_nothing():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(7)
+    steps = suggest.scan(bpy.context.scene, [obj], "SCENE")
+    shares = [next(steps) for _step in range(20)]
+    assert shares == sorted(shares)
+    steps.close()
+    assert bpy.context.scene.frame_current == 7
+    assert not suggest.suggestions
+
+
+def test_a_click_uses_a_method_and_undo_takes_it_back():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(9)
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.sinew.use_method(method="cor") == {"FINISHED"}
+    assert properties.of(obj).method == "cor"
+    bpy.ops.ed.undo_push(message="Use Method")
+    bpy.ops.ed.undo()
+    assert properties.of(bpy.data.objects["Arm"]).method == "dq"
+    with pytest.raises(RuntimeError, match="choose one of"):
+        bpy.ops.sinew.use_method(method="none")
+
+
+def test_what_is_off_is_named():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).enabled = False
+    with pytest.raises(RuntimeError, match="Arm is switched off"):
+        bpy.ops.sinew.suggest()
+
+
+def test_crossings_are_pairs_without_a_common_vertex():
+    points = np.array(
+        [(0, 0, 0), (2, 0, 0), (0, 2, 0), (0.5, 0.5, -1), (0.6, 0.5, 1), (0.5, 0.6, 1), (5, 0, 0), (5, 1, 0)],
+        np.float32,
+    )
+    triangles = np.array([(0, 1, 2), (3, 4, 5), (0, 1, 6), (5, 6, 7)])
+    assert crossing_triangles(points, triangles[[0, 1]]) == {(0, 1)}
+    # Neighbours meet in their vertices.
+    assert crossing_triangles(points, triangles[[0, 2]]) == set()
+    assert crossing_triangles(points, triangles[[0, 3]]) == set()
+
+
+def test_values_are_texts_of_their_units():
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.sinew.suggest()
+    scene, texts = bpy.context.scene, {}
+    for criterion in CRITERIA:
+        texts[criterion.name] = suggest_panel.value_text(
+            scene, criterion, found().worst["lbs", criterion.name]
+        )
+    assert texts["stretch"].endswith("%")
+    assert texts["volume"].startswith("-")
+    assert texts["crossings"].isdigit()
+    assert suggest_panel.value_text(scene, CRITERIA[0], None) == "none"

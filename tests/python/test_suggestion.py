@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which method is best at what."""
+
+import math
+
+import pytest
+from sinew_addon.core.suggestion import CRITERIA, Suggestion
+
+BY_NAME = {criterion.name: criterion for criterion in CRITERIA}
+
+
+def suggestion(**values):
+    """Of methods a, b and c over frames 1, 2, ...; values by criterion: those of each method."""
+    made = Suggestion({"a": "Method A", "b": "Method B", "c": "Method C"}, [1.0, 2.0], diagonal=2.0)
+    for criterion, of_methods in values.items():
+        for method, of_frames in zip("abc", of_methods, strict=False):
+            for frame, value in enumerate(of_frames, start=1):
+                made.add(method, criterion, value, float(frame))
+    return made
+
+
+def test_the_worst_frame_counts_and_its_sign_does_not():
+    made = suggestion(volume=[[-0.3, 0.1], [0.2, -0.1]])
+    assert (made.worst["a", "volume"].value, made.worst["a", "volume"].frame) == (-0.3, 1.0)
+    assert made.best(BY_NAME["volume"]) == ["b"]
+
+
+def test_equals_share_and_where_all_are_equal_nobody_is_best():
+    assert suggestion(stretch=[[0.100], [0.101], [0.2]]).best(BY_NAME["stretch"]) == ["a", "b"]
+    assert suggestion(stretch=[[0.1], [0.1], [0.1]]).best(BY_NAME["stretch"]) == []
+    # One that is far off makes no others equal.
+    assert suggestion(stretch=[[0.1], [0.15], [50.0]]).best(BY_NAME["stretch"]) == ["a"]
+
+
+@pytest.mark.parametrize(("difference", "best"), [(1e-4, []), (1e-3, ["a"])])
+def test_lengths_are_judged_as_parts_of_the_diagonal(difference, best):
+    made = suggestion(bulge=[[0.0], [difference], [difference]])
+    assert made.best(BY_NAME["bulge"]) == best
+
+
+def test_what_is_not_measured_is_nobodys():
+    made = suggestion(volume=[[math.nan], [math.nan], [math.nan]])
+    assert made.worst == {}
+    assert made.best(BY_NAME["volume"]) == made.best(BY_NAME["crossings"]) == []
+    assert made.text == "All methods are equally good here."
+
+
+def test_who_is_best_at_most_comes_first():
+    made = suggestion(
+        stretch=[[0.2], [0.1], [0.3]], flips=[[0.2], [0.1], [0.3]], volume=[[0.1], [0.2], [0.3]]
+    )
+    assert made.rank() == ["b", "a", "c"]
+    assert made.text == "Best at stretch: Method B; volume: Method A; flips: Method B."
