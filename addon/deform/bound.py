@@ -91,9 +91,12 @@ def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
 
 
 def have_bones_changed(
-    obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes
+    obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes | None
 ) -> bool:
-    """Whether one of the armatures has other bones than those read; of one in edit mode that is not asked."""
+    """Whether one of the armatures has other bones than those read; one in edit mode has not.
+
+    changes  None where they are not known, as what happened while Sinew was off
+    """
     changed = False
     for stage, replaced in zip(
         bound.skin_stack.skin_stages, properties.of(obj).replaced_modifiers, strict=False
@@ -101,7 +104,7 @@ def have_bones_changed(
         armature, known = replaced.armature, stage.binding.bones
         if armature is None or armature.data.is_editmode:
             continue
-        if armature.data.session_uid in changes.armatures or not known.complete:
+        if changes is None or armature.data.session_uid in changes.armatures or not known.complete:
             bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
             changed |= not bones.equals(known)
     return changed

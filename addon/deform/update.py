@@ -49,7 +49,9 @@ def update(
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
     # First of all, as groups are renamed along with bones.
-    bones_changed = skinned is not None and bound.have_bones_changed(obj, skinned.bound, depsgraph, changes)
+    bones_changed = skinned is not None and bound.have_bones_changed(
+        obj, skinned.bound, depsgraph, None if skinned.plan.state is State.OFF else changes
+    )
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
         # What is hidden, or in another scene, stays as it is.

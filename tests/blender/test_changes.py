@@ -126,6 +126,23 @@ def test_a_bone_renamed_and_another_made_in_one_edit():
     assert_follows(obj)
 
 
+@pytest.mark.usefixtures("by_each_route")
+def test_a_bone_made_while_sinew_is_off():
+    obj, armature = scenes.make_arm()
+    scenes.add_sinew(obj)
+    bpy.context.scene.frame_set(4)
+    properties.of(obj).enabled = False
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones["bone.0"].roll += 0.5
+    armature.data.edit_bones.new("extra").tail = (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    properties.of(obj).enabled = True
+    assert not properties.of(obj).error
+    assert_follows(obj)
+
+
 def test_bones_are_edited_on_the_rest_shape():
     obj, armature = scenes.make_arm()
     scenes.add_sinew(obj)
