@@ -206,6 +206,9 @@ class BlenderSide:
         # says that it is gone.
         is_shown = all(modifier.show_viewport for modifier in armature_modifiers(obj))
         for modifier in armature_modifiers(obj):
+            if not is_shown:
+                # By its own choice, not by Sinew's method.
+                modifier.use_deform_preserve_volume = modifier.show_expanded
             bpy.ops.object.modifier_apply(modifier=modifier.name)
         if is_shown:
             obj.pass_index = 0
