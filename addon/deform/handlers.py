@@ -151,6 +151,9 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             with contextlib.suppress(ReferenceError):
                 if obj.data.name_full in names & seen:
                     state.needs_recheck = True
+                elif obj.data.name_full in names and properties.of(obj).upstream_proxy is not None:
+                    # What stands in front is evaluated anew only now.
+                    state.needs_recheck = state.evaluation.changed_unannounced = True
                 elif obj.data.name_full in names:
                     new.meshes.add(obj.data.session_uid)
         if new.meshes:

@@ -114,6 +114,25 @@ def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
+@pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
+def test_an_edit_in_a_handler_behind_something_in_front_is_seen_with_the_next_frame(arm, neighbour, edit):
+    arm.modifiers.new("Front", "CAST")
+    arm.modifiers.move(len(arm.modifiers) - 1, 0)
+    bpy.context.view_layer.update()
+
+    def act() -> None:
+        take_off()
+        edit(arm)
+
+    take_off = neighbour("frame_change_post", act)
+    bpy.context.scene.frame_set(8)
+    bpy.context.scene.frame_set(9)
+    got = scenes.final_points(arm)
+    properties.of(arm).enabled = False
+    expected = scenes.modifier_shapes(arm, [9], True)[0]
+    assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+
+
 def pose_bone(obj: bpy.types.Object) -> None:
     scenes.bend(properties.of(obj).armature, 35.0)
 

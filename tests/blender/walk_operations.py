@@ -1717,8 +1717,9 @@ def neighbour(w: Walker, r: random.Random) -> str | None:
         w.before_evaluation()
         bpy.context.view_layer.update()
         bpy.context.scene.frame_set(number)
-        if what == "move" and when == "frame_change_post":
-            # After the update, what moves behind Sinew's handler is seen with the next event (README).
+        if what in ("move", "weights") and when == "frame_change_post":
+            # What another handler moves is seen with the next event after the update, and weights are where
+            # something stands in front (README).
             w.this_frame()
     if act in handlers:
         handlers.remove(act)
