@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stage `delta_mush` in float64 numpy: Blender's Corrective Smooth (Mancewicz, Derksen, Rijpkema, Wilson 2014),
-one vertex or corner at a time, with angles by Blender's polynomial."""
+"""The stage `delta_mush` in float64 numpy: Blender's Corrective Smooth (Mancewicz, Derksen, Rijpkema, Wilson
+2014), one vertex or corner at a time, with angles by Blender's polynomial."""
 
 import numpy as np
 
@@ -62,9 +62,7 @@ def frame(before, at, after):
 
 def delta_mush(
     points,
-    rest,
-    faces,
-    edges,
+    mesh,
     *,
     iterations=5,
     factor=0.5,
@@ -73,7 +71,8 @@ def delta_mush(
     weights=None,
     scale=1.0,
 ):
-    """faces: lists of vertices."""
+    """mesh: (rest points, faces as lists of vertices, edges)."""
+    rest, faces, edges = mesh
     factors = factor * (np.ones(len(rest)) if weights is None else np.array(weights, np.float64))
     if pin_boundary:
         factors[boundary_of(faces, edges)] = 0.0
