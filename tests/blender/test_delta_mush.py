@@ -26,8 +26,8 @@ def paint(obj: bpy.types.Object) -> None:
 
 
 def make_rough_arm() -> bpy.types.Object:
-    """With polygons of 3 to 12 corners, holes, edges of three faces, edges and a vertex without faces, and noise;
-    rigid weights, which crease it."""
+    """With polygons of 3 to 12 corners, holes, edges of three faces, edges and a vertex without faces, and
+    noise; rigid weights, which crease it."""
     obj, _armature = scenes.make_arm(weights="rigid")
     rng = np.random.default_rng(3)
     made = bmesh.new()
@@ -171,8 +171,8 @@ def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def test_vertices_made_in_front_rest_where_they_are_made():
-    """Where Blender refuses to smooth: it knows no original coordinates of theirs. So the modifier in front is applied
-    for it."""
+    """Where Blender refuses to smooth, as it knows no original coordinates of theirs: the modifier in front is
+    applied for it."""
     obj = make_rough_arm()
     obj.modifiers.new("Front", "SUBSURF").levels = 1
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
