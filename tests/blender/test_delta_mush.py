@@ -171,8 +171,8 @@ def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def test_vertices_made_in_front_rest_where_they_are_made():
-    """Where Blender refuses to smooth, as it knows no original coordinates of theirs: the modifier in front is
-    applied for it."""
+    """Blender refuses to smooth these, as it knows no original coordinates of theirs: the modifier in front
+    is applied for it."""
     obj = make_rough_arm()
     obj.modifiers.new("Front", "SUBSURF").levels = 1
     obj.modifiers.move(len(obj.modifiers) - 1, 0)
@@ -293,3 +293,120 @@ def test_saved_copied_and_removed(tmp_path):
     assert whole_file.differences(before, whole_file.of_open_file()) == []
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
+
+
+def taken_over(**settings: object) -> tuple[bpy.types.Object, np.ndarray]:
+    """A rough arm with a Corrective Smooth that was taken over, and the shapes before."""
+    obj = make_rough_arm()
+    add_corrective(obj, **settings)
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj)
+    assert bpy.ops.sinew.take_over_smooth(name=obj.name) == {"FINISHED"}
+    return obj, expected
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"iterations": 12, "factor": 0.9, "use_pin_boundary": True, "scale": 0.8},
+        {"vertex_group": GROUP, "invert_vertex_group": True, "smooth_type": "LENGTH_WEIGHTED"},
+        {"use_only_smooth": True},
+    ],
+)
+def test_a_corrective_smooth_is_taken_over(settings):
+    obj, expected = taken_over(**settings)
+    tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+    modifier = obj.modifiers["Smooth"]
+    assert (modifier.show_viewport, modifier.show_render) == (False, False)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= tolerance
+    # Off, it is Blender's again.
+    properties.of(obj).enabled = False
+    assert modifier.show_viewport
+    assert modifier.show_render
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+    properties.of(obj).enabled = True
+    assert not modifier.show_viewport
+    modifier.name = "Renamed"
+    attach.remove(obj)
+    assert modifier.show_viewport
+    assert modifier.show_render
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+
+
+def test_a_saved_file_has_corrective_smooth_on(tmp_path):
+    _obj, expected = taken_over(iterations=9)
+    path = tmp_path / "taken over.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    assert not bpy.data.objects["Arm"].modifiers["Smooth"].show_viewport
+    with bpy.data.libraries.load(str(path)) as (_source, target):
+        target.objects = ["Arm"]
+    saved = target.objects[0]
+    assert saved.modifiers["Smooth"].show_viewport
+    assert saved.modifiers["Smooth"].show_render
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Arm"]
+    assert not obj.modifiers["Smooth"].show_viewport
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    attach.remove(obj)
+    assert obj.modifiers["Smooth"].show_viewport
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+
+
+def test_nothing_of_what_was_taken_over_stays():
+    obj = make_rough_arm()
+    add_corrective(obj, iterations=9)
+    bpy.context.view_layer.update()
+    whole_file.of_open_file()
+    before = whole_file.of_open_file()
+    scenes.add_sinew(obj)
+    bpy.ops.sinew.take_over_smooth(name=obj.name)
+    attach.remove(obj)
+    bpy.context.view_layer.update()
+    assert whole_file.differences(before, whole_file.of_open_file()) == []
+
+
+def bound(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.rest_source = "BIND"
+
+
+def with_another_between(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    obj.modifiers.new("Cast", "CAST")
+    obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(modifier))
+
+
+def for_renders(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.show_viewport = False
+
+
+def keyed(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.keyframe_insert("scale", frame=1)
+
+
+def too_often(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.iterations = 1001
+
+
+def with_stage(obj: bpy.types.Object, _modifier: bpy.types.Modifier) -> None:
+    properties.of(obj).delta_mush.enabled = True
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (bound, "Rest Source"),
+        (with_another_between, "Cast between it"),
+        (for_renders, "in renders alone"),
+        (keyed, "animated"),
+        (too_often, "Iterations beyond"),
+        (with_stage, "on already"),
+    ],
+)
+def test_one_that_can_not_be_taken_over_exactly_says_why(change, reason):
+    obj = make_rough_arm()
+    modifier = add_corrective(obj)
+    scenes.add_sinew(obj)
+    change(obj, modifier)
+    flags = (modifier.show_viewport, modifier.show_render)
+    with pytest.raises(RuntimeError, match=reason):
+        bpy.ops.sinew.take_over_smooth(name=obj.name)
+    assert (modifier.show_viewport, modifier.show_render) == flags
