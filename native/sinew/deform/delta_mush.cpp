@@ -63,9 +63,13 @@ std::vector<double> squared_lengths(const MushMesh& mesh, std::span<const Vec3<f
     const auto point = [&](std::size_t i) { return Vec3<double>(rest_points[mesh.vertices[i]]); };
     for (const MushRun& run : mesh.runs) {
         const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
-        for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i, neighbours += run.valence) {
+        for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i) {
             for (std::size_t k = 0; k < run.valence; ++k) {
-                const Vec3<double> edge = point(static_cast<std::size_t>(neighbours[k])) - point(i);
+                const std::size_t neighbour =
+                    run.is_consecutive
+                        ? static_cast<std::size_t>(neighbours[k]) + (i - run.begin)
+                        : static_cast<std::size_t>(neighbours[(i - run.begin) * run.valence + k]);
+                const Vec3<double> edge = point(neighbour) - point(i);
                 squared[i] += glm::dot(edge, edge);
             }
             squared[i] /= run.valence;
@@ -128,7 +132,8 @@ struct DeltaMush::State {
 
     MushMesh mesh;
     std::size_t iterations = 0;
-    std::vector<float> factors;        // as MushFrame has them
+    std::vector<float> factors;        // as MushFrame has them, and room for a vector
+    bool is_uniform = true;            // as of MushFrame
     std::vector<MushDetails> details;  // of mesh.corners
 
     // Of one call at a time. Those beyond the vertices stay 0.
@@ -153,9 +158,12 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
         }
     }
 
+    amount.factors.resize(mesh.vertices.size() + kLanes);
+
     const std::scoped_lock lock(mutex);
     iterations = amount.iterations;
     factors = std::move(amount.factors);
+    is_uniform = own_weights.empty() && !with.pin_boundary && with.radius == 0.0f;
     details = std::move(own_details);
     rest_points = std::move(own_points);
     weights = std::move(own_weights);
@@ -167,7 +175,7 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
     // By the kernels that smooth each frame, so that the rest pose comes out as it was.
     const MushKernel kernel = mush_kernel();
     const std::size_t result = smooth(kernel, threads_for(0));
-    const MushFrame frame{&mesh, smoothed[result].data(), nullptr, nullptr, nullptr, 0.0f, nullptr};
+    const MushFrame frame{&mesh, smoothed[result].data(), nullptr, nullptr, false, nullptr, 0.0f, nullptr};
     kernel.take_details(frame, kept.data(), details.data(), 0, mesh.chunk_count());
 }
 
@@ -177,7 +185,7 @@ std::size_t DeltaMush::State::smooth(const MushKernel& kernel, std::size_t threa
         decltype(kernel.smooth) run;
         MushFrame frame;
     } work{by_length ? kernel.smooth_by_length : kernel.smooth,
-           {&mesh, nullptr, nullptr, factors.data(), nullptr, 0.0f, nullptr}};
+           {&mesh, nullptr, nullptr, factors.data(), is_uniform, nullptr, 0.0f, nullptr}};
     for (std::size_t i = 0; i < iterations; ++i) {
         work.frame.from = smoothed[i % 2].data();
         work.frame.to = smoothed[1 - i % 2].data();
@@ -221,7 +229,8 @@ void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
         const State& state;
         const MushKernel& kernel;
         MushFrame frame;
-    } work{state, kernel, {&mesh, nullptr, nullptr, nullptr, state.details.data(), scale, points.data()}};
+    } work{
+        state, kernel, {&mesh, nullptr, nullptr, nullptr, false, state.details.data(), scale, points.data()}};
     parallel_for(
         mesh.chunk_count(), threads,
         [&work](std::size_t begin, std::size_t end) {

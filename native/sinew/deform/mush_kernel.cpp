@@ -2,8 +2,8 @@
 // The stage `delta_mush` on whole chunks: see skinning/delta_mush.h for what it computes.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <array>
-#include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "sinew/deform/kernels.h"
 #include "sinew/deform/mush_mesh.h"
@@ -27,27 +27,50 @@ using Four = hn::CappedTag<float, 4>;
 HWY_INLINE const float* numbers_of(const Float4* points) { return reinterpret_cast<const float*>(points); }
 HWY_INLINE float* numbers_of(Float4* points) { return reinterpret_cast<float*>(points); }
 
-/// kValence  neighbours of each vertex; 0: `valence` of them
-template <std::size_t kValence>
-HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run, std::size_t valence) {
-    const Four d;
+/// One iteration of the numbers from `at` on.
+///
+/// neighbour(k)  the numbers of the k-th neighbour
+template <std::size_t kValence, class D, class Neighbour>
+HWY_INLINE void smooth_numbers(D d, const float* point, float* to, std::size_t valence, Vec<D> factor,
+                               const Neighbour& neighbour) {
     if constexpr (kValence > 0) valence = kValence;
-    const std::int32_t* neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    auto sum = hn::LoadU(d, neighbour(0));
+    for (std::size_t k = 1; k < valence; ++k) sum = hn::Add(sum, hn::LoadU(d, neighbour(k)));
+    const auto old = hn::LoadU(d, point);
+    const auto count = hn::Set(d, static_cast<float>(valence));
+    hn::StoreU(hn::MulAdd(factor, hn::NegMulAdd(count, old, sum), old), d, to);
+}
+
+/// kValence  neighbours of each vertex; 0: those of the run
+template <std::size_t kValence>
+HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
+    const Four four;
+    const Full full;
+    const std::size_t valence = run.valence;
+    const std::int32_t* const first = frame.mesh->neighbours.data() + run.first_neighbour;
     const float* const from = numbers_of(frame.from);
     float* const to = numbers_of(frame.to);
-    const float* const factors = frame.factors;
-    const auto count = hn::Set(d, static_cast<float>(valence));
-    const std::size_t end = run.end;
-    for (std::size_t i = run.begin; i < end; ++i, neighbours += valence) {
-        const auto factor = hn::Set(d, factors[i]);
-        for (std::size_t c = 0; c < 4; c += hn::Lanes(d)) {
-            auto sum = hn::Load(d, from + 4 * static_cast<std::size_t>(neighbours[0]) + c);
-            for (std::size_t k = 1; k < valence; ++k) {
-                sum = hn::Add(sum, hn::Load(d, from + 4 * static_cast<std::size_t>(neighbours[k]) + c));
-            }
-            const auto point = hn::Load(d, from + 4 * i + c);
-            hn::Store(hn::MulAdd(factor, hn::NegMulAdd(count, point, sum), point), d, to + 4 * i + c);
+    const std::size_t end = 4 * static_cast<std::size_t>(run.end);
+    std::size_t at = 4 * static_cast<std::size_t>(run.begin);
+    const std::size_t begin = at;
+    if (run.is_consecutive && frame.is_uniform) {
+        // The numbers of several vertices at once.
+        const auto factor = hn::Set(full, frame.factors[run.begin]);
+        for (; at + hn::Lanes(full) <= end; at += hn::Lanes(full)) {
+            smooth_numbers<kValence>(full, from + at, to + at, valence, factor, [&](std::size_t k) HWY_ATTR {
+                return from + 4 * static_cast<std::size_t>(first[k]) + (at - begin);
+            });
         }
+    }
+    const std::size_t step = run.is_consecutive ? 0 : valence;
+    for (; at < end; at += hn::Lanes(four)) {
+        const std::size_t vertex = (at - begin) / 4;
+        const std::int32_t* const neighbours = first + vertex * step;
+        const std::size_t number = run.is_consecutive ? at - begin : at % 4;
+        smooth_numbers<kValence>(four, from + at, to + at, valence, hn::Set(four, frame.factors[at / 4]),
+                                 [&](std::size_t k) HWY_ATTR {
+                                     return from + 4 * static_cast<std::size_t>(neighbours[k]) + number;
+                                 });
     }
 }
 
@@ -62,12 +85,12 @@ void smooth(const MushFrame& frame, std::size_t begin, std::size_t end) {
         const MushRun& run = mesh.runs[r];
         switch (run.valence) {
             case 0: copy_run(frame, run); break;
-            case 3: smooth_run<3>(frame, run, 3); break;
-            case 4: smooth_run<4>(frame, run, 4); break;
-            case 5: smooth_run<5>(frame, run, 5); break;
-            case 6: smooth_run<6>(frame, run, 6); break;
-            case 7: smooth_run<7>(frame, run, 7); break;
-            default: smooth_run<0>(frame, run, run.valence); break;
+            case 3: smooth_run<3>(frame, run); break;
+            case 4: smooth_run<4>(frame, run); break;
+            case 5: smooth_run<5>(frame, run); break;
+            case 6: smooth_run<6>(frame, run); break;
+            case 7: smooth_run<7>(frame, run); break;
+            default: smooth_run<0>(frame, run); break;
         }
     }
 }
@@ -81,14 +104,27 @@ HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t f
     return p;
 }
 
-/// first_numbers  of each lane's point
+/// By way of memory, which is faster than to gather each number.
+///
+/// index_of(lane)  of the point
+template <class D, class Index>
+HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of) {
+    alignas(64) Float4 collected[kLanes];
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+        collected[lane] = points[static_cast<std::size_t>(index_of(lane))];
+    }
+    return consecutive_points(d, collected, 0);
+}
+
+/// Points of a block from `lane` on.
 template <class D>
-HWY_INLINE Points<D> gathered_points(D d, const Float4* points, const std::int32_t* first_numbers) {
-    const hn::RebindToSigned<D> indices;
-    const auto at = hn::Load(indices, first_numbers);
-    const float* const numbers = numbers_of(points);
-    return {hn::GatherIndex(d, numbers, at), hn::GatherIndex(d, numbers + 1, at),
-            hn::GatherIndex(d, numbers + 2, at)};
+HWY_INLINE Points<D> points_at(D d, const Float4* points, const Lanes<std::int32_t>& indices,
+                               std::size_t lane, bool is_consecutive) {
+    if (is_consecutive) {
+        return consecutive_points(d, points, static_cast<std::size_t>(indices.lane[0]) + lane);
+    }
+    const std::int32_t* const of_lanes = indices.lane.data() + lane;
+    return collected_points(d, points, [of_lanes](std::size_t i) HWY_ATTR { return of_lanes[i]; });
 }
 
 template <class D>
@@ -107,11 +143,28 @@ HWY_INLINE Points<D> cross_of(const Points<D>& a, const Points<D>& b) {
             hn::NegMulAdd(a.y, b.x, hn::Mul(a.x, b.y))};
 }
 
+/// 1 / sqrt(x), x positive and finite; a root and a division of 16 lanes take longer than the rest of a corner.
+template <class D>
+HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+    // 12 digits, by two of Newton's steps all of them.
+    auto root = hn::ApproximateReciprocalSqrt(x);
+    const auto half = hn::Mul(x, hn::Set(d, 0.5f));
+    for (int step = 0; step < 2; ++step) {
+        root = hn::Mul(root, hn::NegMulAdd(hn::Mul(half, root), root, hn::Set(d, 1.5f)));
+    }
+    return root;
+#else
+    return hn::Div(hn::Set(d, 1.0f), hn::Sqrt(x));
+#endif
+}
+
 template <class D>
 HWY_INLINE Points<D> unit(D d, const Points<D>& v) {
     const auto squared = dot_of<D>(v, v);
     const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushStage::kShortest)));
-    const auto inverse = hn::IfThenElseZero(is_long, hn::Div(hn::Set(d, 1.0f), hn::Sqrt(squared)));
+    const auto is_finite = hn::Le(squared, hn::Set(d, std::numeric_limits<float>::max()));
+    const auto inverse = hn::IfThenElseZero(hn::And(is_long, is_finite), inverse_root(d, squared));
     return {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
 }
 
@@ -154,8 +207,8 @@ HWY_INLINE void for_each_corner(D d, const MushFrame& frame, const MushBlock& bl
                                 const Points<D>& current, const Call& call) {
     for (std::size_t k = block.first_corner; k < block.first_corner + block.corners; ++k) {
         const MushCorners& corners = frame.mesh->corners[k];
-        const Points<D> previous = gathered_points(d, frame.from, corners.previous.lane.data() + lane);
-        const Points<D> next = gathered_points(d, frame.from, corners.next.lane.data() + lane);
+        const Points<D> previous = points_at(d, frame.from, corners.previous, lane, block.is_consecutive);
+        const Points<D> next = points_at(d, frame.from, corners.next, lane, block.is_consecutive);
         call(k, corner_of(d, previous, current, next));
     }
 }
@@ -219,37 +272,55 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
     }
 }
 
+/// Vertices [begin, begin + count) of a run, at most as many as lanes.
+HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, const MushRun& run, std::size_t begin,
+                                       std::size_t count) {
+    const Full d;
+    using D = Full;
+    const std::int32_t* const first = frame.mesh->neighbours.data() + run.first_neighbour;
+    const std::size_t valence = run.valence;
+    const std::size_t from_run = begin - run.begin;
+    const Points<D> point = consecutive_points(d, frame.from, begin);
+    Points<D> sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    auto lengths = hn::Zero(d);
+    for (std::size_t k = 0; k < valence; ++k) {
+        const auto of_lane = [&](std::size_t lane) HWY_ATTR {
+            return first[(from_run + HWY_MIN(lane, count - 1)) * valence + k];
+        };
+        const Points<D> neighbour =
+            run.is_consecutive
+                ? consecutive_points(d, frame.from, static_cast<std::size_t>(first[k]) + from_run)
+                : collected_points(d, frame.from, of_lane);
+        const Points<D> edge = subtract<D>(neighbour, point);
+        const auto length = hn::Sqrt(dot_of<D>(edge, edge));
+        sum.x = hn::MulAdd(length, edge.x, sum.x);
+        sum.y = hn::MulAdd(length, edge.y, sum.y);
+        sum.z = hn::MulAdd(length, edge.z, sum.z);
+        lengths = hn::Add(lengths, length);
+    }
+    const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
+    const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
+    // Beyond the last vertex there is room for a vector.
+    const auto factors = hn::LoadU(d, frame.factors + begin);
+    const auto factor = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factors, lengths));
+    alignas(64) Float4 result[kLanes];
+    hn::StoreInterleaved4(hn::MulAdd(factor, sum.x, point.x), hn::MulAdd(factor, sum.y, point.y),
+                          hn::MulAdd(factor, sum.z, point.z), hn::Zero(d), d, numbers_of(result));
+    for (std::size_t lane = 0; lane < count; ++lane) frame.to[begin + lane] = result[lane];
+}
+
 /// An iteration by length.
 void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end) {
     const MushMesh& mesh = *frame.mesh;
+    const std::size_t lanes = hn::Lanes(Full());
     for (std::size_t r = mesh.first_runs[begin]; r < mesh.first_runs[end]; ++r) {
         const MushRun& run = mesh.runs[r];
         if (run.valence == 0) {
             copy_run(frame, run);
             continue;
         }
-        const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
-        const auto count = static_cast<float>(run.valence);
-        for (std::size_t i = run.begin; i < run.end; ++i, neighbours += run.valence) {
-            const float* const point = numbers_of(frame.from + i);
-            float sum[3] = {0.0f, 0.0f, 0.0f};
-            float lengths = 0.0f;
-            for (std::size_t k = 0; k < run.valence; ++k) {
-                const float* const neighbour = numbers_of(frame.from + neighbours[k]);
-                const float x = neighbour[0] - point[0];
-                const float y = neighbour[1] - point[1];
-                const float z = neighbour[2] - point[2];
-                const float length = std::sqrt(x * x + y * y + z * z);
-                sum[0] += length * x;
-                sum[1] += length * y;
-                sum[2] += length * z;
-                lengths += length;
-            }
-            const bool is_long = lengths * count > static_cast<float>(DeltaMushStage::kLeastLength);
-            const float factor = is_long ? frame.factors[i] / lengths : 0.0f;
-            float* const to = numbers_of(frame.to + i);
-            for (std::size_t c = 0; c < 3; ++c) to[c] = point[c] + factor * sum[c];
-            to[3] = 0.0f;
+        for (std::size_t i = run.begin; i < run.end; i += lanes) {
+            smooth_lanes_by_length(frame, run, i, HWY_MIN(lanes, run.end - i));
         }
     }
 }

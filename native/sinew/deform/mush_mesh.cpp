@@ -5,6 +5,7 @@
 #include <numeric>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "sinew/deform/check_bind_data.h"
 
@@ -12,6 +13,9 @@ namespace sinew {
 namespace {
 
 constexpr std::size_t kMaxEdgeEnds = 0x7FFFFFFE;
+
+// A run costs about as much as some vertices.
+constexpr std::size_t kFewestConsecutive = 8;
 
 std::size_t index(std::int32_t vertex) { return static_cast<std::size_t>(vertex); }
 
@@ -158,6 +162,7 @@ public:
 
     MushMesh make() {
         mark_boundary();
+        sort_neighbours();
         mesh_.first_runs.push_back(0);
         mesh_.first_blocks.push_back(0);
         for (std::size_t begin = 0; begin < mesh_.vertices.size(); begin += MushMesh::kChunk) {
@@ -186,40 +191,95 @@ private:
         }
     }
 
-    void add_runs(std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            if (i == begin || valence(i) != mesh_.runs.back().valence) {
-                mesh_.runs.push_back({static_cast<std::uint32_t>(i), 0,
-                                      static_cast<std::uint32_t>(valence(i)), mesh_.neighbours.size()});
-            }
-            mesh_.runs.back().end = static_cast<std::uint32_t>(i + 1);
+    /// Those of a vertex, in the order of the mesh.
+    [[nodiscard]] std::span<const std::int32_t> neighbours(std::size_t i) const {
+        return std::span(sorted_).subspan(first_sorted_[i], valence(i));
+    }
+
+    void sort_neighbours() {
+        for (std::size_t i = 0; i < mesh_.vertices.size(); ++i) {
+            first_sorted_.push_back(sorted_.size());
             for (const std::int32_t neighbour : neighbours_.of(mesh_.vertices[i])) {
-                mesh_.neighbours.push_back(place_[index(neighbour)]);
+                sorted_.push_back(place_[index(neighbour)]);
             }
+            std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
         }
+    }
+
+    /// How many vertices from `i` on have their neighbours one place behind those of the one before.
+    [[nodiscard]] std::size_t count_consecutive(std::size_t i, std::size_t end) const {
+        std::size_t after = i + 1;
+        while (after < end && std::ranges::equal(neighbours(after - 1), neighbours(after),
+                                                 [](std::int32_t a, std::int32_t b) { return a + 1 == b; })) {
+            ++after;
+        }
+        return after - i;
+    }
+
+    void add_runs(std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end;) {
+            const std::size_t count = count_consecutive(i, end);
+            const bool is_consecutive = count >= kFewestConsecutive;
+            if (i == begin || is_consecutive || mesh_.runs.back().is_consecutive ||
+                valence(i) != mesh_.runs.back().valence) {
+                mesh_.runs.push_back({static_cast<std::uint32_t>(i), 0,
+                                      static_cast<std::uint32_t>(valence(i)), is_consecutive,
+                                      mesh_.neighbours.size()});
+            }
+            for (std::size_t v = i; v < (is_consecutive ? i + 1 : i + count); ++v) {
+                const auto of_vertex = neighbours(v);
+                mesh_.neighbours.insert(mesh_.neighbours.end(), of_vertex.begin(), of_vertex.end());
+            }
+            i += count;
+            mesh_.runs.back().end = static_cast<std::uint32_t>(i);
+        }
+    }
+
+    /// The two other vertices of each of a vertex's corners, in an order that is alike for vertices side by side.
+    [[nodiscard]] std::vector<std::pair<std::int32_t, std::int32_t>> corner_ends(std::size_t i) const {
+        std::vector<std::pair<std::int32_t, std::int32_t>> ends;
+        for (const std::int32_t corner : corners(i)) {
+            ends.emplace_back(place_of(around_.previous[index(corner)]),
+                              place_of(around_.next[index(corner)]));
+        }
+        std::ranges::sort(ends);
+        return ends;
     }
 
     void add_blocks(std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end;) {
             std::size_t after = i + 1;
             while (after < end && after < i + kLanes && corners(after).size() == corners(i).size()) ++after;
-            mesh_.blocks.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(after - i),
-                                    static_cast<std::uint32_t>(corners(i).size()), mesh_.corners.size()});
-            for (std::size_t k = 0; k < corners(i).size(); ++k) {
-                MushCorners& made = mesh_.corners.emplace_back();
-                for (std::size_t lane = 0; lane < kLanes; ++lane) {
-                    // Lanes without a vertex repeat the last.
-                    const std::size_t corner = index(corners(std::min(i + lane, after - 1))[k]);
-                    made.previous.lane[lane] = first_number(around_.previous[corner]);
-                    made.next.lane[lane] = first_number(around_.next[corner]);
-                }
-            }
+            add_block(i, after);
             i = after;
         }
     }
 
-    [[nodiscard]] std::int32_t first_number(std::int32_t corner) const {
-        return 4 * place_[index(topology_.corner_vertices[index(corner)])];
+    void add_block(std::size_t begin, std::size_t end) {
+        const std::size_t corner_count = corners(begin).size();
+        const std::size_t first = mesh_.corners.size();
+        mesh_.corners.resize(first + corner_count);
+        bool is_consecutive = true;
+        for (std::size_t v = begin; v < end; ++v) {
+            const auto ends = corner_ends(v);
+            for (std::size_t k = 0; k < corner_count; ++k) {
+                MushCorners& corner = mesh_.corners[first + k];
+                // Lanes without a vertex repeat the last.
+                for (std::size_t lane = v - begin; lane < (v + 1 < end ? v - begin + 1 : kLanes); ++lane) {
+                    corner.previous.lane[lane] = ends[k].first;
+                    corner.next.lane[lane] = ends[k].second;
+                }
+                const auto step = static_cast<std::int32_t>(v - begin);
+                is_consecutive &= corner.previous.lane[0] + step == ends[k].first &&
+                                  corner.next.lane[0] + step == ends[k].second;
+            }
+        }
+        mesh_.blocks.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end - begin),
+                                static_cast<std::uint32_t>(corner_count), is_consecutive, first});
+    }
+
+    [[nodiscard]] std::int32_t place_of(std::int32_t corner) const {
+        return place_[index(topology_.corner_vertices[index(corner)])];
     }
 
     const MeshTopology& topology_;
@@ -227,7 +287,9 @@ private:
     ByVertex edge_ends_;  // indices into the edges' vertices
     ByVertex neighbours_;
     ByVertex corners_;
-    std::vector<std::int32_t> place_;  // of each vertex in the order of the mesh
+    std::vector<std::int32_t> place_;   // of each vertex in the order of the mesh
+    std::vector<std::int32_t> sorted_;  // the places of each vertex's neighbours, rising
+    std::vector<std::size_t> first_sorted_;
     MushMesh mesh_;
 };
 

@@ -16,7 +16,10 @@ struct MushRun {
     std::uint32_t begin;
     std::uint32_t end;
     std::uint32_t valence;
-    std::size_t first_neighbour;  // of MushMesh::neighbours: [end - begin][valence]
+    /// Each has its neighbours one place behind those of the vertex before, as on a grid.
+    bool is_consecutive;
+    std::size_t
+        first_neighbour;  // of MushMesh::neighbours: [end - begin][valence], or [valence] of the first
 };
 
 /// Up to kLanes vertices of as many corners that follow each other.
@@ -24,10 +27,11 @@ struct MushBlock {
     std::uint32_t first_vertex;
     std::uint32_t vertices;
     std::uint32_t corners;
+    bool is_consecutive;       // as of MushRun, in each corner
     std::size_t first_corner;  // of MushMesh::corners and of the details
 };
 
-/// The two other vertices of a corner of each vertex of a block, as indices of their first number among points of four.
+/// The two other vertices of a corner of each vertex of a block.
 struct MushCorners {
     Lanes<std::int32_t> previous;
     Lanes<std::int32_t> next;
@@ -67,6 +71,7 @@ struct MushFrame {
     const Float4* from;
     Float4* to;            // of smooth
     const float* factors;  // [vertices] of one iteration; by length, times 2; over the number of neighbours
+    bool is_uniform;       // they differ by the number of neighbours alone
     const MushDetails* details;
     float scale;
     Vec3<float>* points;  // of finish: the caller's
