@@ -12,6 +12,7 @@ import numpy as np
 from ..attach import properties, upstream_proxy
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
+from ..core.stage_mesh import Topology
 from ..io import mesh_io
 from .changes import Changes
 
@@ -22,6 +23,9 @@ class Source:
 
     points            float32 [vertices, 3], object space, without shape keys
     triangles         int32 [triangles, 3]
+    topology          faces and edges
+    own_points        float32 [vertices, 3], object space, the mesh's own, whatever stands in front; None
+                      where that gives it other vertices
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  of those when changes were looked at last
@@ -31,6 +35,8 @@ class Source:
     weights: GroupWeights
     points: np.ndarray
     triangles: np.ndarray
+    topology: Topology
+    own_points: np.ndarray | None
     shape_keys: ShapeKeys | None
     from_front: bool = False
     key_values: np.ndarray | None = None
@@ -68,12 +74,15 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
     if properties.of(obj).upstream_proxy is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
         points = mesh_io.read_points(mesh)
-        triangles = mesh_io.read_triangles(mesh)
-        return Source(names, mesh_io.read_group_weights(mesh), points, triangles, None, from_front=True)
+        triangles, topology = mesh_io.read_triangles(mesh), mesh_io.read_topology(mesh)
+        own_points = mesh_io.read_points(obj.data) if len(obj.data.vertices) == len(points) else None
+        weights = mesh_io.read_group_weights(mesh)
+        return Source(names, weights, points, triangles, topology, own_points, None, from_front=True)
     weights = mesh_io.read_group_weights(obj.data)
     points = mesh_io.read_points(obj.data)
-    triangles = mesh_io.read_triangles(obj.data)
-    return Source(names, weights, points, triangles, mesh_io.read_shape_keys(obj, weights))
+    triangles, topology = mesh_io.read_triangles(obj.data), mesh_io.read_topology(obj.data)
+    keys = mesh_io.read_shape_keys(obj, weights)
+    return Source(names, weights, points, triangles, topology, points, keys)
 
 
 def has_changed(

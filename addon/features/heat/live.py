@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, upstream_proxy
+from ...attach import attach, corrective_smooth, properties, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ...core.scale_rule import BLENDER_4
 from ...core.session import Binding, SkinStack, SkinStage, SkinStageFrame
 from ...core.spaces import is_same_space, transformed, transformed_axes
+from ...core.stages import StageValues
 from ...core.surface import Surface, joined
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
@@ -132,7 +133,9 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
             SkinStage(Binding(b.weighting, b.mix_weights, b.vertex_data), stage.mask, stage.multi)
             for stage, b in known
         ]
-        parts.append(Part(obj, skinned, skinned.bound, mesh_io.read_surface(mesh), SkinStack(stages)))
+        after = skinned.bound.skin_stack.stages_after
+        own_stack = SkinStack(stages, None if after is None else after.another())
+        parts.append(Part(obj, skinned, skinned.bound, mesh_io.read_surface(mesh), own_stack))
     if not parts:
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
@@ -184,6 +187,7 @@ class _Other:
     skin_stack: SkinStack
     rest_points: np.ndarray
     frames: list[SkinStageFrame | None]
+    stage_values: StageValues
 
     @classmethod
     def of(cls, part: Part, other: str) -> _Other:
@@ -195,11 +199,12 @@ class _Other:
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)
-        return cls(part.skin_stack, shown.rest_points, frames)
+        values = corrective_smooth.stage_values(part.obj) if methods else shown.stage_values
+        return cls(part.skin_stack, shown.rest_points, frames, values)
 
     def points(self) -> np.ndarray:
         """float32 [vertices, 3], object space."""
-        self.skin_stack.deform(self.rest_points, self.frames)
+        self.skin_stack.deform(self.rest_points, self.frames, values=self.stage_values)
         return self.skin_stack.points
 
 
