@@ -57,7 +57,7 @@ double value_of(const py::handle& value, const Parameter& parameter) {
 }
 
 std::string text_of(const py::handle& value) {
-    if (py::isinstance<py::str>(value) || PyNumber_Check(value.ptr()) != 0) {
+    if (py::isinstance<py::str>(value) || PyLong_Check(value.ptr()) || PyFloat_Check(value.ptr())) {
         std::string text = py::repr(value).cast<std::string>();
         constexpr std::size_t kMost = 60;
         return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
