@@ -21,8 +21,8 @@ def vertex_data(
 ) -> np.ndarray:
     """float32 [vertices, 10], as sinew.Binding takes it: C, R0, R1, then 1, or 0 where they are not used.
 
-    As in mmd_tools a vertex uses them where C differs from it and two bones move it, and R0 belongs to the bone
-    whose vertex group comes first. To the library it is that of the first influence.
+    As in mmd_tools a vertex uses them where C differs from it and two bones move it, and R0 belongs to the
+    bone whose vertex group comes first. To the library it is that of the first influence.
 
     points         float32 [vertices, 3] of the basis, object space
     keys           float32 [3, vertices, 3], the same space

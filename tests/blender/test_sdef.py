@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Models as mmd_tools stores them: spherical deform by the shape keys mmd_sdef_c, mmd_sdef_r0 and mmd_sdef_r1."""
+"""Spherical deform of models as mmd_tools stores them, by the shape keys of sdef.KEYS."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ import reference
 
 
 def make_model(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """An arm whose vertices of two bones are spherical but for every seventh. Of every third the groups are stored
-    against their order."""
+    """An arm whose vertices of two bones are spherical but for every seventh. Of every third the groups are
+    stored against their order."""
     obj, armature = scenes.make_arm(bones=bones)
     rng = np.random.default_rng(1)
     obj.shape_key_add(name="Basis")

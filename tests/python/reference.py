@@ -2,9 +2,9 @@
 """Skinning in float64 numpy and matrix form, from the papers: the oracle of the library.
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
-Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor) and
-Kavan, Zara 2005 (sbs) and mmd_tools' formula (sdef); slow, one vertex at a time, and does not use the formulas of the library where others
-exist. Quaternions are (w, x, y, z).
+Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor),
+Kavan, Zara 2005 (sbs) and mmd_tools' formula (sdef); slow, one vertex at a time, and does not use the
+formulas of the library where others exist. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -287,10 +287,8 @@ def deform(
     if rest_bones is None:
         rest_bones = np.tile(np.eye(4), (len(transforms), 1, 1))
     rest_bones = np.asarray(rest_bones, np.float64)
-    names = {
-        name.removeprefix(f"{method}."): name for name in parameters or {} if name.startswith(f"{method}.")
-    }
-    values = {short: parameters[name] for short, name in names.items()}
+    prefix = f"{method}."
+    values = {name[len(prefix) :]: v for name, v in (parameters or {}).items() if name.startswith(prefix)}
     rotations = np.array([rotation_of_bone(m, b) for m, b in zip(transforms, rest_bones, strict=True)])
     points = np.asarray(rest_points, np.float64).copy()
     margins = np.ones(len(points))
@@ -300,7 +298,7 @@ def deform(
         if share.sum() > 0.0:
             of = bones[span]
             more = [rest_bones[of, :3, 3]] if method in WITH_HEADS else []
-            if method in WITH_VERTEX_DATA and vertex_data is not None:
+            if method in WITH_VERTEX_DATA and vertex_data is not None and method in vertex_data:
                 more.append(vertex_data[method][vertex].astype(np.float64))
             points[vertex], margins[vertex] = METHODS[method](
                 points[vertex], transforms[of], rotations[of], share / share.sum(), *more, **values

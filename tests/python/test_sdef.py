@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Spherical deform against its formula in float64, and parameters of methods, of which it has one."""
 
+import re
+
 import numpy as np
 import pytest
 import sinew
@@ -83,15 +85,12 @@ def test_the_mixed_method_has_its_parameters_and_other_methods_none():
 )
 @pytest.mark.parametrize("method", ["sdef", "lbs"])
 def test_wrong_parameters_are_refused_with_a_sentence(method, parameters, message):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         pairs(5).deform(method, parameters=parameters)
-    assert str(error.value) == message
 
 
 def test_names_of_parameters_are_texts():
-    with pytest.raises(
-        TypeError, match=r"^parameters: expected names of parameters of methods, .*, got int$"
-    ):
+    with pytest.raises(TypeError, match=r"^parameters: expected names of parameters .*, got int$"):
         pairs(6).deform("sdef", parameters={1: "slerp"})
 
 
