@@ -206,7 +206,6 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    mix: bpy.props.PointerProperty(type=STAGE_GROUPS["mix"])
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )
@@ -270,6 +269,12 @@ class SinewSettings(bpy.types.PropertyGroup):
     def armatures(self) -> list[bpy.types.Object]:
         """All that deform the object, each once."""
         return list(dict.fromkeys(s.armature for s in self.replaced_modifiers if s.armature is not None))
+
+
+# One group of settings for each stage of the library's list, by its name.
+SinewSettings.__annotations__.update(
+    {name: bpy.props.PointerProperty(type=group) for name, group in STAGE_GROUPS.items()}
+)
 
 
 def of(obj: bpy.types.Object) -> SinewSettings:

@@ -6,9 +6,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..attach import properties
+from ..attach import properties, stage_settings
 from ..core.errors import SinewError
 from ..core.session import SkinStageFrame
+from ..core.stages import STAGES, StageValues
 from ..io import armature_io
 from .skinned_object import SkinnedObject
 
@@ -57,6 +58,21 @@ def read(
         mix = settings.mixed_method if own == method else ""
         frames.append(SkinStageFrame(own, pose, space, scale_rule, mix))
     return frames
+
+
+def stage_values(settings: properties.SinewSettings) -> StageValues:
+    """The parameters of the stages that are on and follow the blend.
+
+    settings  the object's, evaluated
+    Raises SinewError where a driver sets a choice that there is not.
+    """
+    on = [name for name in stage_settings.names_on(settings) if name in STAGES]
+    values = {name: stage_settings.values_of(settings, name) for name in on}
+    for name, of_stage in values.items():
+        for parameter, value in of_stage.items():
+            if value == "":
+                raise SinewError(f"{name}.{parameter}: its driver gives a number that stands for no choice")
+    return values
 
 
 def is_finite(frames: Frames) -> bool:

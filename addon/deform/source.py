@@ -12,6 +12,7 @@ import numpy as np
 from ..attach import properties, upstream_proxy
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
+from ..core.stage_mesh import Topology
 from ..io import mesh_io
 from .changes import Changes
 
@@ -22,6 +23,9 @@ class Source:
 
     points            float32 [vertices, 3], object space, without shape keys
     triangles         int32 [triangles, 3]
+    topology          faces and edges
+    own_points        float32 [vertices, 3], object space, the mesh's own, whatever stands in front; None
+                      where that gives it other vertices
     sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
@@ -32,6 +36,8 @@ class Source:
     weights: GroupWeights
     points: np.ndarray
     triangles: np.ndarray
+    topology: Topology
+    own_points: np.ndarray | None
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     from_front: bool = False
@@ -76,15 +82,19 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
     if properties.of(obj).upstream_proxy is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
         points = mesh_io.read_points(mesh)
-        triangles = mesh_io.read_triangles(mesh)
+        triangles, topology = mesh_io.read_triangles(mesh), mesh_io.read_topology(mesh)
+        own_points = mesh_io.read_points(obj.data) if len(obj.data.vertices) == len(points) else None
         weights = mesh_io.read_group_weights(mesh)
-        if sdef_keys is not None and sdef_keys.shape[1] != len(points):
+        if sdef_keys is not None and own_points is None:
             sdef_keys = None
-        return Source(names, weights, points, triangles, None, sdef_keys, from_front=True)
+        return Source(
+            names, weights, points, triangles, topology, own_points, None, sdef_keys, from_front=True
+        )
     weights = mesh_io.read_group_weights(obj.data)
     points = mesh_io.read_points(obj.data)
-    triangles = mesh_io.read_triangles(obj.data)
-    return Source(names, weights, points, triangles, mesh_io.read_shape_keys(obj, weights), sdef_keys)
+    triangles, topology = mesh_io.read_triangles(obj.data), mesh_io.read_topology(obj.data)
+    keys = mesh_io.read_shape_keys(obj, weights)
+    return Source(names, weights, points, triangles, topology, points, keys, sdef_keys)
 
 
 def has_changed(
