@@ -131,21 +131,7 @@ Binding::Packed::Packed(const BindData& data) {
 }
 
 BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
-    const UnpackedMesh unpacked = sinew::unpack(mesh, rows, vertex_count);
-    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}, {}};
-    bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
-    for (const auto& [bone, weight] : unpacked.influences) {
-        bound.influence_bones.push_back(bone);
-        bound.influence_weights.push_back(weight);
-    }
-    const std::size_t named =
-        mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
-    if (named < bone_count) {
-        // Named without weight, and dropped: of the last vertex, which takes it without weight.
-        bound.influence_bones.push_back(static_cast<std::int32_t>(bone_count) - 1);
-        bound.influence_weights.push_back(0.0f);
-        ++bound.influence_offsets.back();
-    }
+    BoundMesh bound = bound_mesh(mesh, rows, vertex_count, bone_count);
     for (std::size_t i = 0; i < kMethodCount; ++i) {
         if (vertex_rows[i].empty()) continue;
         bound.vertex_data.push_back(
