@@ -30,7 +30,7 @@ Affine<float> checked_space(const py::object& bones_from_model) {
 BulgeLimit make(const py::object& rest_points, const py::object& influence_offsets,
                 const py::object& influence_bones, const py::object& influence_weights,
                 const py::object& heads, const py::object& tails, const py::object& bones_from_model,
-                const py::object& weights) {
+                const py::object& weights, bool is_normalised) {
     const auto points = checked_points(rest_points, "rest_points");
     const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1,
                                                "int32 [vertices + 1]", kMaxVertices + 1);
@@ -51,6 +51,7 @@ BulgeLimit make(const py::object& rest_points, const py::object& influence_offse
     BulgeLimitData data{{as_points(points), as_span(offsets), as_span(bones), as_span(shares)},
                         segments,
                         checked_space(bones_from_model)};
+    data.mesh.is_normalised = is_normalised;
     py::array_t<float> mask;
     if (!weights.is_none()) {
         mask = checked<float>(weights, "weights", 1, "None or float32 [vertices]", kMaxVertices);
@@ -60,6 +61,14 @@ BulgeLimit make(const py::object& rest_points, const py::object& influence_offse
         data.weights = as_span(mask);
     }
     return BulgeLimit(data);
+}
+
+BulgeLimit make_from_weights(const py::object& rest_points, const py::object& influence_offsets,
+                             const py::object& influence_bones, const py::object& influence_weights,
+                             const py::object& heads, const py::object& tails,
+                             const py::object& bones_from_model, const py::object& weights) {
+    return make(rest_points, influence_offsets, influence_bones, influence_weights, heads, tails,
+                bones_from_model, weights, false);
 }
 
 void set_rest_points(BulgeLimit& limit, const py::object& rest_points, const py::object& bones_from_model) {
@@ -128,7 +137,7 @@ py::tuple state_of(const BulgeLimit& limit) {
 
 BulgeLimit of_state(const py::object& state) {
     const auto part = [&](std::size_t index) { return part_of(state, 8, index); };
-    return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6), part(7));
+    return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6), part(7), true);
 }
 
 }  // namespace
@@ -140,7 +149,7 @@ void bind_bulge_limit(py::module_& m) {
         "took "
         "them\n"
         "farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.")
-        .def(py::init(&make), py::arg("rest_points"), py::arg("influence_offsets"),
+        .def(py::init(&make_from_weights), py::arg("rest_points"), py::arg("influence_offsets"),
              py::arg("influence_bones"), py::arg("influence_weights"), py::arg("heads"), py::arg("tails"),
              py::kw_only(), py::arg("bones_from_model") = py::none(), py::arg("weights") = py::none(),
              "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"

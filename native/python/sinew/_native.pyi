@@ -102,8 +102,8 @@ def methods() -> tuple[Method, ...]:
     """Every skinning method, one Method each."""
 
 def stages() -> tuple[Stage, ...]:
-    """Every stage, one Stage each. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, `delta_mush` is
-    DeltaMush."""
+    """Every stage, one Stage each. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit,
+    `delta_mush` is DeltaMush."""
 
 def keep_thread_state() -> None:
     """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and

@@ -63,11 +63,14 @@ struct BulgeLimitStage {
         return share * along - from_head;
     }
 
-    /// How much longer a bone's motion makes what is perpendicular to its segment, at most: so far it may go away.
+    /// How much longer a bone's motion makes what is perpendicular to its segment, at most: so far it may go away. Of a point,
+    /// which has no such directions, the root mean square of all.
     template <class T>
     [[nodiscard]] static T stretch(const Mat3<T>& linear, const BoneSegment<T>& rest_segment) noexcept {
         const Vec3<T> along = rest_segment.tail - rest_segment.head;
-        if (glm::dot(along, along) == T(0)) return T(1);
+        const Vec3<T> columns(glm::dot(linear[0], linear[0]), glm::dot(linear[1], linear[1]),
+                              glm::dot(linear[2], linear[2]));
+        if (glm::dot(along, along) == T(0)) return std::sqrt((columns.x + columns.y + columns.z) / T(3));
         // Of the images of two perpendicular directions only what is perpendicular to that of the bone counts.
         const Vec3<T> axis = glm::normalize(along);
         const Vec3<T> other = std::abs(axis.x) < T(0.6) ? Vec3<T>(1, 0, 0) : Vec3<T>(0, 1, 0);
