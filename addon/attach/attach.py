@@ -11,7 +11,16 @@ import bpy
 
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths, is_visibility_animated
-from . import node_group, point_store, pose_driver, properties, setting_animation, stack, upstream_proxy
+from . import (
+    corrective_smooth,
+    node_group,
+    point_store,
+    pose_driver,
+    properties,
+    setting_animation,
+    stack,
+    upstream_proxy,
+)
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -176,6 +185,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
     if on:
         adopt_pointers(obj)
         _switch_off(obj)
+        corrective_smooth.switch(obj, on=False)
         keyed = stack.visibility_is_animated(obj)
         shown = [s for s in settings.replaced_modifiers if s.armature is not None]
         viewport, render = (
@@ -186,6 +196,7 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
         restore_builtin(obj)
         for modifier, replaced in replaced_modifiers(obj):
             _restore_visibility(modifier, replaced)
+        corrective_smooth.switch(obj, on=True)
         _show(nodes, False, False)
     properties.store(settings, "standing_in", on)
 

@@ -118,6 +118,16 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
     )
 
 
+class SinewReplacedSmooth(bpy.types.PropertyGroup):
+    """What Sinew keeps of the Corrective Smooth in whose place the stage delta_mush smooths, called `name`;
+    without a name there is none."""
+
+    uid: bpy.props.IntProperty(options={"HIDDEN"}, override=OVERRIDABLE)
+    # The modifier's own flags, given back on removal.
+    show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+    show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
+
+
 STAGE_GROUPS = stage_settings.groups(_method_changed)
 
 
@@ -176,6 +186,9 @@ class SinewSettings(bpy.types.PropertyGroup):
         description="As saved files have it: the Armature modifiers deform, by their nearest shape",
         options={"HIDDEN"},
         override=OVERRIDABLE,
+    )
+    replaced_smooth: bpy.props.PointerProperty(
+        type=SinewReplacedSmooth, options={"HIDDEN"}, override=OVERRIDABLE
     )
     parent_type: bpy.props.StringProperty(
         description="The object's parent type before Sinew made an Armature modifier of it",
@@ -333,7 +346,7 @@ def clear(obj: bpy.types.Object) -> None:
     obj.property_unset("sinew")
 
 
-CLASSES = (SinewReplacedModifier, *STAGE_GROUPS.values(), SinewSettings)
+CLASSES = (SinewReplacedModifier, SinewReplacedSmooth, *STAGE_GROUPS.values(), SinewSettings)
 
 # A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
 MESH_REQUEST = bpy.props.FloatProperty(

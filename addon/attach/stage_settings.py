@@ -84,6 +84,10 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
     if parameter.kind == "bool":
         return bpy.props.BoolProperty(default=parameter.default, **facts)
     number = bpy.props.IntProperty if parameter.kind == "int" else bpy.props.FloatProperty
+    if parameter.unit == "length":
+        facts["subtype"] = "DISTANCE"
+    elif parameter.unit == "factor" and (parameter.min, parameter.max) == (0.0, 1.0):
+        facts["subtype"] = "FACTOR"
     # Blender takes no infinite bound.
     bounds = {"min": parameter.min, "max": parameter.max}
     finite = {name: value for name, value in bounds.items() if abs(value) < float("inf")}

@@ -12,7 +12,7 @@ import numpy as np
 from ..attach import attach, properties, stack, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
-from ..core.session import NO_STAGES, SkinStageFrame
+from ..core.session import SkinStageFrame
 from ..core.stages import StageValues
 from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
@@ -35,7 +35,7 @@ class Shown:
 
     frames: list[SkinStageFrame | None] | None = None
     rest_points: np.ndarray | None = None
-    stage_values: StageValues = NO_STAGES
+    stage_values: StageValues = field(default_factory=dict)
     first_point: bytes | None = None
     number: int = 0
     milliseconds: float = 0.0

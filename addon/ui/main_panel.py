@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import bpy
+import sinew
 
-from ..attach import attach, properties
+from ..attach import attach, corrective_smooth, properties, stage_settings
 from ..deform import session, small_meshes
 from ..deform.plan import ObjectFacts, plan
 from . import operators
@@ -78,6 +79,10 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     _draw_mix(layout, context, obj)
     for sentence in [] if state is None else state.bound.lacks((settings.method, settings.mix.method)):
         draw_text(layout, context, sentence, icon="INFO")
+    for stage in stage_settings.STAGES.values():
+        if stage.name != "mix":
+            _draw_stage(layout, context, obj, stage)
+    _draw_take_over(layout, context, obj)
     layout.prop(settings, "scale_rule")
     if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
         layout.prop(settings, "leave_small")
@@ -91,6 +96,34 @@ def _draw_mix(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
     layout.prop_search(mix, "group", obj, "vertex_groups", text="By")
     if not mix.group:
         draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
+
+
+def _draw_stage(
+    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, stage: sinew.Stage
+) -> None:
+    """Its switch, and while it is on its parameters."""
+    group = getattr(properties.of(obj), stage.name)
+    switch, *others = stage.parameters
+    layout.prop(group, switch.id, text=stage.label)
+    if not stage_settings.is_on(group, stage):
+        return
+    column = layout.column(align=True)
+    for parameter in others:
+        if parameter.kind == "vertex_group":
+            column.prop_search(group, parameter.id, obj, "vertex_groups")
+        else:
+            column.prop(group, parameter.id)
+
+
+def _draw_take_over(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    modifier = corrective_smooth.candidate(obj)
+    if modifier is None or not properties.of(obj).enabled:
+        return
+    reason = corrective_smooth.why_not(obj, modifier)
+    if reason:
+        draw_text(layout, context, reason, icon="INFO")
+    else:
+        layout.operator("sinew.take_over_smooth", icon="MOD_SMOOTH").name = obj.name
 
 
 def _draw_facts(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import bpy
 
-from ..attach import attach, properties
+from ..attach import attach, corrective_smooth, properties
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..deform import session
@@ -142,4 +142,23 @@ class SINEW_OT_remove(OnSinewObjects, bpy.types.Operator):
         return result
 
 
-CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove)
+class SINEW_OT_take_over_smooth(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.take_over_smooth"
+    bl_label = "Take Over Corrective Smooth"
+    bl_description = (
+        "Have Delta Mush smooth in the place of the Corrective Smooth modifier, by its settings. It stays in "
+        "the stack, switched off, until Sinew is removed"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: bpy.props.StringProperty(
+        options={"HIDDEN", "SKIP_SAVE"}, description="Of the object; empty for all"
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = [obj for obj in sinew_targets(context) if self.name in ("", obj.name)]
+        with session.changing(context):
+            return _for_each(self, objects, corrective_smooth.take_over, "Took over Corrective Smooth of")
+
+
+CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove, SINEW_OT_take_over_smooth)

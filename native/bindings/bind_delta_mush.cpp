@@ -23,7 +23,8 @@ struct SettingArguments {
 };
 
 float checked_float(const py::object& value, const char* argument) {
-    // Those of numpy, too.
+    // Those of numpy, too; of an array with one number numpy would make one with a warning.
+    if (py::isinstance<py::array>(value)) fail(argument, "a number", describe(value));
     const double number = PyFloat_AsDouble(value.ptr());
     if (PyErr_Occurred() != nullptr) {
         PyErr_Clear();

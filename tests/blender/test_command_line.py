@@ -15,6 +15,7 @@ import program
 import pytest
 import scenes
 import sinew
+import test_delta_mush
 import test_mix
 from conftest import REPOSITORY
 from program import run_sinew
@@ -151,13 +152,36 @@ def test_parameters_are_set_by_name(tmp_path):
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_mix.FRAMES), expected) <= 1e-5
 
 
+def test_a_stage_is_set_by_name(tmp_path):
+    """As Corrective Smooth smooths, in points, copies and bakes."""
+    obj = test_delta_mush.make_rough_arm()
+    expected = test_delta_mush.by_corrective_smooth(
+        obj, iterations=20, smooth_type="LENGTH_WEIGHTED", vertex_group=test_delta_mush.GROUP
+    )
+    path, out = tmp_path / "arm.blend", tmp_path / "points.npz"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    values = ("=on", ".iterations=20", ".smooth_type=length_weighted", f".group={test_delta_mush.GROUP}")
+    stage = ["--method", "lbs", *(text for value in values for text in ("--set", f"delta_mush{value}"))]
+    frames = ",".join(map(str, test_delta_mush.FRAMES))
+    run_sinew("points", path, *stage, "--frames", frames, "--out", out)
+    with np.load(out) as points:
+        assert scenes.worst(points["Arm"], expected) <= 1e-5
+    job = tmp_path / "job.toml"
+    job.write_text(f'method = "lbs"\nset = {stage[3::2]}\nbake = ["shape-keys"]\nbake_frames = "{frames}"\n')
+    run_sinew("reskin", path, "--job", job, "--frames", "none", "--out", tmp_path / "out")
+    files.open_file(tmp_path / "out" / "arm.blend")
+    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_delta_mush.FRAMES), expected) <= 1e-5
+
+
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "status", "sentence"),
     [
         (("mix=dq", "mix.group=none such"), 1, "no mesh has a vertex group 'none such'"),
         (("mix=bulge",), 2, "mix: expected one of off, lbs"),
-        (("strength=1",), 2, "expected one of mix, mix.method, mix.group"),
+        (("delta_mush=dq",), 2, "delta_mush: expected on or off, got 'dq'"),
+        (("delta_mush.iterations=1001",), 2, "expected a whole number from 0 to 1000"),
+        (("strength=1",), 2, "expected one of mix, delta_mush, mix.method, mix.group"),
     ],
 )
 def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "scene.h"
+#include "sinew/deform/delta_mush.h"
 
 #ifdef __GLIBC__
 #include <dlfcn.h>
@@ -130,6 +131,26 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     }
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(in_frames, 0);
+}
+
+TEST(DeltaMush, allocates_nothing_once_it_is_bound) {
+    constexpr std::int32_t kSize = 150;
+    std::vector<Vec3<float>> points;
+    std::vector<std::int32_t> offsets{0};
+    std::vector<std::int32_t> corners;
+    std::vector<std::int32_t> edges;
+    for (std::int32_t v = 0; v < kSize * kSize; ++v) {
+        points.emplace_back(v / kSize, v % kSize, v % 3);
+        if (v >= kSize) edges.insert(edges.end(), {v - kSize, v});
+        if (v % kSize > 0) edges.insert(edges.end(), {v - 1, v});
+        if (v < kSize || v % kSize == 0) continue;
+        corners.insert(corners.end(), {v - kSize - 1, v - 1, v, v - kSize});
+        offsets.push_back(static_cast<std::int32_t>(corners.size()));
+    }
+    const DeltaMush mush({offsets, corners, edges}, points, {});
+    const int allocations_before = allocations;
+    for (const std::size_t threads : {1, 4, 0}) mush.apply(points, 1.0f, threads);
+    EXPECT_EQ(allocations, allocations_before);
 }
 
 TEST(Bindings, are_packed_once) {

@@ -6,6 +6,7 @@ SINEW_FUZZ_EXAMPLES (default 8000, within a minute) is for all cases together.
 """
 
 import os
+import pickle
 import re
 
 import numpy as np
@@ -383,6 +384,62 @@ def test_meshes(data):
         for (given, array), dtype in zip((pose, space, inverses), types, strict=True)
     )
     same(result, plain.deform(pose, None, 1, space, inverses, parameters))
+
+
+SHEETS = {
+    0: ([0], [], []),
+    2: ([0], [], [0, 1]),
+    4: ([0, 3, 6], [0, 1, 2, 0, 2, 3], [0, 1, 1, 2, 2, 0, 2, 3, 3, 0]),
+    5: ([0, 5], [0, 1, 2, 3, 4], [0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0, 2]),
+}
+
+
+@many(0.2)
+@given(st.data())
+def test_delta_mush(data):
+    vertices = data.draw(st.sampled_from(sorted(SHEETS)))
+    wild = wild_one(data.draw, 14)
+    offsets, corners, ends = SHEETS[vertices]
+    points, *faces = (
+        data.draw(strategy)[0]
+        for strategy in (
+            or_garbage(arrays((vertices, 3), wild[0]), wild[0]),
+            or_garbage(integers(offsets, wild[1]), wild[1]),
+            or_garbage(integers(corners, wild[2]), wild[2]),
+        )
+    )
+    edges = np.array(ends, np.int32).reshape(-1, 2)
+    edges = data.draw(GARBAGE) if wild[3] else edges
+    settings = {
+        "iterations": data.draw(names(st.integers(0, 30), wild[4])),
+        "radius": data.draw(names(st.floats(0, 2), wild[5])),
+        "factor": data.draw(names(st.floats(0, 1), wild[6])),
+        "smooth_type": data.draw(names(st.sampled_from(["simple", "length_weighted"]), wild[7])),
+        "pin_boundary": data.draw(names(st.booleans(), wild[8])),
+        "weights": data.draw(st.one_of(st.none(), or_garbage(arrays((vertices,), wild[9]), wild[9]))),
+    }
+    if settings["weights"] is not None:
+        settings["weights"] = settings["weights"][0]
+    known = {"rest_points", "face_offsets", "corner_vertices", "edges", *settings}
+    mush = attempt(
+        lambda *given: sinew.DeltaMush(*given[:4], **dict(zip(settings, given[4:], strict=True))),
+        [points, *faces, edges, *settings.values()],
+        known,
+    )
+    if mush is None:
+        return
+    repr(mush)
+    other = data.draw(or_garbage(arrays((vertices, 3), wild[10]), wild[10]))[0]
+    attempt(lambda *given: mush.bind(given[0], **settings) or True, [other], known)
+    posed = data.draw(or_garbage(arrays((vertices, 3), wild[11]), wild[11]))[0]
+    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[12]))
+    scale = data.draw(names(st.floats(-2, 2), wild[12]))
+    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[13]))
+    result = attempt(mush.apply, [posed, out, scale, threads], {"points", "out", "scale", "threads"})
+    if result is not None:
+        assert result.shape == (mush.vertex_count, 3)
+        copy = pickle.loads(pickle.dumps(mush))
+        same(result, copy.apply(posed, None, scale, 1))
 
 
 def positive(pair):

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, upstream_proxy
+from ...attach import attach, corrective_smooth, properties, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ...core.scale_rule import BLENDER_4
-from ...core.session import NO_STAGES, Binding, SkinStack, SkinStage, SkinStageFrame
+from ...core.session import Binding, SkinStack, SkinStage, SkinStageFrame
 from ...core.spaces import is_same_space, transformed, transformed_axes
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
@@ -191,8 +191,8 @@ class _Other:
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)
-        # The Armature modifiers have no stages.
-        return cls(part.skin_stack, shown.rest_points, frames, NO_STAGES if methods else shown.stage_values)
+        values = corrective_smooth.stage_values(part.obj) if methods else shown.stage_values
+        return cls(part.skin_stack, shown.rest_points, frames, values)
 
     def points(self) -> np.ndarray:
         """float32 [vertices, 3], object space."""

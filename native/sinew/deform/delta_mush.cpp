@@ -21,13 +21,6 @@ constexpr std::size_t kVerticesWorthAThread = 16384;
 // With a radius, the share of vertices whose edges may be too short for the number of iterations.
 constexpr double kShareOfShortest = 0.1;
 
-void check_range(const std::string& argument, double value, double least, double most) {
-    if (!(value >= least && value <= most)) {
-        fail(argument, "a number from " + std::to_string(least) + " to " + std::to_string(most),
-             std::to_string(value));
-    }
-}
-
 void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings,
            std::size_t vertices) {
     if (rest_points.size() != vertices) {
@@ -41,7 +34,9 @@ void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& se
     if (!(settings.radius >= 0.0f) || !std::isfinite(settings.radius)) {
         fail("radius", "0 or more", std::to_string(settings.radius));
     }
-    check_range("factor", static_cast<double>(settings.factor), 0.0, 1.0);
+    if (!(settings.factor >= 0.0f && settings.factor <= 1.0f)) {
+        fail("factor", "a number from 0 to 1", std::to_string(settings.factor));
+    }
     if (settings.weights.empty()) return;
     if (settings.weights.size() != vertices) {
         fail("weights", "none, or one for each of the " + std::to_string(vertices) + " vertices",

@@ -18,7 +18,7 @@ std::size_t index(std::int32_t vertex) { return static_cast<std::size_t>(vertex)
 void check_vertices(const std::string& argument, std::span<const std::int32_t> vertices, std::size_t count) {
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         if (vertices[i] < 0 || index(vertices[i]) >= count) {
-            fail(argument, "vertices from 0 to " + std::to_string(count) + " without the last",
+            fail(argument, count == 0 ? "none" : "vertices from 0 to " + std::to_string(count - 1),
                  std::to_string(vertices[i]) + " at index " + std::to_string(i));
         }
     }
@@ -37,9 +37,12 @@ void check(const MeshTopology& topology, std::size_t vertex_count) {
              offsets.empty() ? "none"
                              : std::to_string(offsets.front()) + " to " + std::to_string(offsets.back()));
     }
-    if (topology.edges.size() % 2 != 0 || topology.edges.size() > kMaxEdgeEnds) {
-        fail("edges", "two vertices each, at most " + std::to_string(kMaxEdgeEnds) + " of all",
-             std::to_string(topology.edges.size()) + " vertices");
+    if (topology.edges.size() % 2 != 0) {
+        fail("edges", "two vertices each", std::to_string(topology.edges.size()) + " vertices");
+    }
+    if (topology.edges.size() > kMaxEdgeEnds) {
+        fail("edges", "at most " + std::to_string(kMaxEdgeEnds / 2),
+             std::to_string(topology.edges.size() / 2));
     }
     check_vertices("corner_vertices", topology.corner_vertices, vertex_count);
     check_vertices("edges", topology.edges, vertex_count);

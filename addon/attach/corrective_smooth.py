@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Corrective Smooth right behind the Armature modifiers, in whose place the stage delta_mush can smooth: it
+then stays in the stack, switched off while Sinew deforms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+
+from ..core.errors import SinewError
+from ..io.animation_paths import animated_paths
+from . import properties, stack, stage_settings, upstream_proxy
+
+# By the parameters of the stage.
+NAMES = {
+    "iterations": "iterations",
+    "factor": "factor",
+    "pin_boundary": "use_pin_boundary",
+    "group": "vertex_group",
+    "invert_group": "invert_vertex_group",
+}
+
+
+def candidate(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
+    """The first one behind the Armature modifiers that is on."""
+    run = stack.armature_modifiers(obj)
+    if not run:
+        return None
+    modifiers = list(obj.modifiers)
+    behind = modifiers[modifiers.index(run[-1]) + 1 :]
+    found = (m for m in behind if m.type == "CORRECTIVE_SMOOTH" and stack.is_on(m))
+    return next(found, None)
+
+
+def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> str:
+    """One sentence where the stage would not have exactly the modifier's shape, else empty."""
+    between = _between(obj, modifier)
+    path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+    beyond = _beyond_bounds(modifier)
+    reasons = (
+        (modifier.rest_source != "ORCO", "its Rest Source is not Original Coords, but a shape of its own"),
+        (bool(between), f"{', '.join(between)} between it and the Armature modifier"),
+        (modifier.show_viewport != modifier.show_render, "it is on in the viewport or in renders alone"),
+        (any(each.startswith(path) for each in animated_paths(obj)), "its settings are animated"),
+        (bool(beyond), f"{', '.join(beyond)} beyond what Delta Mush takes"),
+        (_has_other_vertices(obj), "modifiers in front make other vertices, which it does not smooth"),
+        ("delta_mush" in stage_settings.names_on(properties.of(obj)), "Delta Mush is on already"),
+    )
+    reason = next((reason for holds, reason in reasons if holds), "")
+    return f"{modifier.name} stays Blender's: {reason}" if reason else ""
+
+
+def _between(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
+    """The names of those that are on in front of it, behind the Armature modifiers."""
+    modifiers, own = list(obj.modifiers), stack.sinew_modifier(obj)
+    first = modifiers.index(stack.armature_modifiers(obj)[-1]) + 1
+    return [m.name for m in modifiers[first : modifiers.index(modifier)] if stack.is_on(m) and m != own]
+
+
+def _beyond_bounds(modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
+    values = _values(modifier)
+    bounded = [
+        each for each in stage_settings.STAGES["delta_mush"].parameters if each.kind in ("int", "float")
+    ]
+    return [each.label for each in bounded if not each.min <= values[each.id] <= each.max]
+
+
+def _has_other_vertices(obj: bpy.types.Object) -> bool:
+    """Whether modifiers in front change how many there are."""
+    if properties.of(obj).upstream_proxy is None:
+        return False
+    mesh = upstream_proxy.evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get())
+    return mesh is not None and len(mesh.vertices) != len(obj.data.vertices)
+
+
+def take_over(obj: bpy.types.Object) -> None:
+    """The stage smooths as the modifier did, which is off from the next session.refresh() on.
+
+    Raises SinewError, and changes nothing, where that would not be the same shape.
+    """
+    modifier = candidate(obj)
+    if modifier is None:
+        raise SinewError(f"{obj.name}: no Corrective Smooth behind its Armature modifier is on")
+    reason = why_not(obj, modifier)
+    if reason:
+        raise SinewError(f"{obj.name}: {reason}")
+    settings = properties.of(obj)
+    replaced = settings.replaced_smooth
+    for name, value in (
+        ("name", modifier.name),
+        ("uid", modifier.persistent_uid),
+        ("show_viewport", modifier.show_viewport),
+        ("show_render", modifier.show_render),
+    ):
+        properties.store(replaced, name, value)
+    for name, value in _values(modifier).items():
+        setattr(settings.delta_mush, name, value)
+    settings.delta_mush.enabled = True
+
+
+def _values(modifier: bpy.types.CorrectiveSmoothModifier) -> dict[str, Any]:
+    """The parameters of the stage that smooth as the modifier does."""
+    values = {name: getattr(modifier, of_modifier) for name, of_modifier in NAMES.items()}
+    return values | {
+        "radius": 0.0,
+        "smooth_type": modifier.smooth_type.lower(),
+        "scale": 0.0 if modifier.use_only_smooth else modifier.scale,
+    }
+
+
+def stage_values(obj: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
+    """What the modifiers of the object without Sinew smooth by, as core.stages.StageValues."""
+    modifier = replaced_modifier(obj)
+    return {} if modifier is None else {"delta_mush": _values(modifier)}
+
+
+def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
+    """The one that was taken over, however it was moved and renamed; else one of its name."""
+    replaced = properties.of(obj).replaced_smooth
+    smooths = [modifier for modifier in obj.modifiers if modifier.type == "CORRECTIVE_SMOOTH"]
+    if not replaced.name:
+        return None
+    same = (m for m in smooths if m.persistent_uid == replaced.uid)
+    return next(same, None) or next((m for m in smooths if m.name == replaced.name), None)
+
+
+def switch(obj: bpy.types.Object, on: bool) -> None:
+    """The one that was taken over as it was, or off."""
+    modifier, replaced = replaced_modifier(obj), properties.of(obj).replaced_smooth
+    if modifier is None:
+        return
+    wanted = (replaced.show_viewport, replaced.show_render) if on else (False, False)
+    for name, value in zip(("show_viewport", "show_render"), wanted, strict=True):
+        # Setting what is set has Blender evaluate the object, too.
+        if getattr(modifier, name) != value:
+            setattr(modifier, name, value)

@@ -1,0 +1,412 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stage delta_mush: Blender's Corrective Smooth behind the Armature modifier is its oracle."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+import scenes
+import whole_file
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import safe_mode, session, small_meshes
+from sinew_addon.deform.plan import State
+
+FRAMES = [1, 6, 11]
+GROUP = "smooth here"
+
+
+def paint(obj: bpy.types.Object) -> None:
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex in obj.data.vertices:
+        share = float(np.clip(vertex.co.x - 0.4 + vertex.co.y, 0.0, 1.0))
+        if share > 0.0:
+            group.add([vertex.index], share, "REPLACE")
+
+
+def make_rough_arm() -> bpy.types.Object:
+    """With polygons of 3 to 12 corners, holes, edges of three faces, edges and a vertex without faces, and
+    noise; rigid weights, which crease it."""
+    obj, _armature = scenes.make_arm(weights="rigid")
+    rng = np.random.default_rng(3)
+    made = bmesh.new()
+    made.from_mesh(obj.data)
+    made.faces.ensure_lookup_table()
+    sides = [face for face in made.faces if len(face.verts) == 4]
+    chosen = rng.permutation(len(sides))
+    bmesh.ops.triangulate(made, faces=[sides[i] for i in chosen[:60]])
+    bmesh.ops.delete(made, geom=[sides[i] for i in chosen[60:66]], context="FACES_ONLY")
+    faces = [sides[i] for i in chosen[66:100]]
+    edges = {edge for face in faces for edge in face.edges if all(f in faces for f in edge.link_faces)}
+    bmesh.ops.dissolve_edges(made, edges=list(edges), use_verts=False)
+    made.edges.ensure_lookup_table()
+    layer = made.verts.layers.deform.active
+    for number, (a, b) in enumerate([edge.verts[:] for edge in list(made.edges)[5::60]]):
+        c = made.verts.new((a.co + b.co) / 2.0 * 1.1 + 0.1 * (a.co - b.co).cross((1.0, 0.3, 0.2)))
+        c[layer][0] = 1.0
+        if number % 2:
+            made.faces.new((a, b, c))
+        else:
+            made.edges.new((b, c))
+    made.verts.new((0.5, 0.5, 0.5))[layer][1] = 1.0
+    for vertex in made.verts:
+        vertex.co += type(vertex.co)(rng.normal(0.0, 0.008, 3))
+    made.to_mesh(obj.data)
+    made.free()
+    obj.data.update()
+    paint(obj)
+    return obj
+
+
+def add_corrective(obj: bpy.types.Object, **settings: object) -> bpy.types.CorrectiveSmoothModifier:
+    modifier = obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH")
+    for name, value in settings.items():
+        setattr(modifier, name, value)
+    return modifier
+
+
+def by_corrective_smooth(
+    obj: bpy.types.Object, frames: list[float] = FRAMES, **settings: object
+) -> np.ndarray:
+    """What Blender makes of it; afterwards the object is as it was."""
+    modifier = add_corrective(obj, **settings)
+    expected = scenes.shapes(obj, frames)
+    obj.modifiers.remove(modifier)
+    return expected
+
+
+def mush(obj: bpy.types.Object, method: str = "lbs", **values: object) -> None:
+    scenes.add_sinew(obj, method)
+    stage = properties.of(obj).delta_mush
+    for name, value in values.items():
+        setattr(stage, name, value)
+    stage.enabled = True
+
+
+# By what Corrective Smooth has, and what the stage has.
+NAMES = {"vertex_group": "group", "invert_vertex_group": "invert_group", "use_pin_boundary": "pin_boundary"}
+
+CASES = [
+    {},
+    {"iterations": 30},
+    {"iterations": 12, "factor": 0.9, "use_pin_boundary": True},
+    {"smooth_type": "LENGTH_WEIGHTED"},
+    {"smooth_type": "LENGTH_WEIGHTED", "iterations": 20, "factor": 0.3, "scale": 1.7},
+    {"vertex_group": GROUP, "iterations": 10},
+    {"vertex_group": GROUP, "invert_vertex_group": True, "smooth_type": "LENGTH_WEIGHTED"},
+    {"scale": 0.0, "iterations": 7},
+    {"scale": -1.5, "use_pin_boundary": True, "vertex_group": GROUP},
+    {"iterations": 0},
+]
+
+
+def as_stage(settings: dict) -> dict:
+    return {
+        NAMES.get(name, name): value.lower() if name == "smooth_type" else value
+        for name, value in settings.items()
+    }
+
+
+@pytest.mark.parametrize(
+    "settings", CASES, ids=lambda s: "-".join(f"{k}={v}" for k, v in s.items()) or "default"
+)
+@pytest.mark.parametrize("method", ["lbs", "dq"])
+def test_it_is_corrective_smooth_behind_the_armature_modifier(method, settings):
+    obj = make_rough_arm()
+    obj.modifiers["Armature"].use_deform_preserve_volume = method == "dq"
+    plain = scenes.shapes(obj, FRAMES)
+    expected = by_corrective_smooth(obj, **settings)
+    if settings.get("iterations") != 0:
+        assert scenes.worst(plain, expected) > 1e-3
+    mush(obj, method, **as_stage(settings))
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
+
+
+def with_keys(obj: bpy.types.Object) -> None:
+    scenes.key_shape(obj)
+
+
+def with_lattice_in_front(obj: bpy.types.Object) -> None:
+    """Deforms, and leaves the vertices as many as they are."""
+    obj.modifiers.new("Front", "SIMPLE_DEFORM").angle = 0.7
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def with_two_armatures(obj: bpy.types.Object) -> None:
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object, second.vertex_group = obj.modifiers["Armature"].object, GROUP
+    second.use_multi_modifier = second.use_deform_preserve_volume = True
+
+
+@pytest.mark.parametrize("set_up", [with_keys, with_lattice_in_front, with_two_armatures])
+@pytest.mark.parametrize("is_safe", [False, True])
+def test_on_both_routes_with_keys_and_modifiers_in_front(monkeypatch, set_up, is_safe):
+    obj = make_rough_arm()
+    set_up(obj)
+    expected = by_corrective_smooth(obj)
+    monkeypatch.setattr(safe_mode, "is_on", lambda: is_safe)
+    mush(obj, None)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert session.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
+
+
+def applied_in_front(obj: bpy.types.Object) -> bpy.types.Object:
+    """A copy whose own mesh is what the first modifier makes of it."""
+    front = obj.copy()
+    bpy.context.scene.collection.objects.link(front)
+    for modifier in list(front.modifiers)[1:]:
+        front.modifiers.remove(modifier)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    mesh = bpy.data.meshes.new_from_object(
+        front.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
+    )
+    bpy.data.objects.remove(front)
+    copy = obj.copy()
+    copy.data = mesh
+    copy.modifiers.remove(copy.modifiers[0])
+    bpy.context.scene.collection.objects.link(copy)
+    return copy
+
+
+def test_vertices_made_in_front_rest_where_they_are_made():
+    """Blender refuses to smooth these, as it knows no original coordinates of theirs: the modifier in front
+    is applied for it."""
+    obj = make_rough_arm()
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    expected = by_corrective_smooth(applied_in_front(obj))
+    mush(obj)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_keys_change_it_from_frame_to_frame():
+    obj = make_rough_arm()
+    plain = scenes.shapes(obj, [10])[0]
+    expected = {
+        3: by_corrective_smooth(obj, [3], iterations=5, factor=0.2)[0],
+        8: by_corrective_smooth(obj, [8], iterations=20, factor=0.8, scale=0.5)[0],
+    }
+    mush(obj, iterations=5, factor=0.2)
+    stage = properties.of(obj).delta_mush
+    for name in ("iterations", "factor", "scale", "enabled"):
+        stage.keyframe_insert(name, frame=3)
+    stage.iterations, stage.factor, stage.scale = 20, 0.8, 0.5
+    for name in ("iterations", "factor", "scale", "enabled"):
+        stage.keyframe_insert(name, frame=8)
+    stage.enabled = False
+    stage.keyframe_insert("enabled", frame=10)
+    for frame in (8, 3, 8):
+        got = scenes.shapes(obj, [frame])[0]
+        assert scenes.worst(got, expected[frame]) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert scenes.worst(scenes.shapes(obj, [10])[0], plain) < 1e-5
+
+
+def test_settings_paint_and_edits_are_seen():
+    obj = make_rough_arm()
+    bpy.context.scene.frame_set(11)
+    mush(obj, group=GROUP)
+
+    def expected(**settings: object) -> np.ndarray:
+        properties.of(obj).enabled = False
+        shape = by_corrective_smooth(obj, [11], vertex_group=GROUP, **settings)[0]
+        properties.of(obj).enabled = True
+        return shape
+
+    def same(shape: np.ndarray) -> bool:
+        return scenes.worst(scenes.final_points(obj), shape) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+    assert same(expected())
+    obj.vertex_groups[GROUP].add(range(100), 1.0, "REPLACE")
+    assert same(expected())
+    properties.of(obj).delta_mush.iterations = 9
+    assert same(expected(iterations=9))
+    obj.data.vertices[50].co.x += 0.05
+    obj.data.update()
+    assert same(expected(iterations=9))
+    made = bmesh.new()
+    made.from_mesh(obj.data)
+    made.edges.ensure_lookup_table()
+    bmesh.ops.delete(made, geom=[f for f in made.faces if len(f.verts) == 3][:10], context="FACES_ONLY")
+    made.to_mesh(obj.data)
+    made.free()
+    assert same(expected(iterations=9))
+    properties.of(obj).delta_mush.group = "none such"
+    assert any("none such" in text for text in session.state_of(obj).bound.facts.warnings)
+
+
+def test_a_small_mesh_is_not_left_to_blender(monkeypatch):
+    obj = make_rough_arm()
+    expected = by_corrective_smooth(obj)
+    monkeypatch.setattr(small_meshes, "is_used", True)
+    scenes.add_sinew(obj, "lbs")
+    assert session.state_of(obj).plan.state is State.BUILT_IN
+    properties.of(obj).delta_mush.enabled = True
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
+
+
+def narrowest(obj: bpy.types.Object, rings: int, sides: int) -> float:
+    """The least radius of the tube's rings at frame 11, over that at rest."""
+    points = scenes.shapes(obj, [11])[0][: rings * sides].reshape(rings, sides, 3)
+    middle = points[rings // 4 : -rings // 4]
+    return (
+        float(np.linalg.norm(middle - middle.mean(axis=1, keepdims=True), axis=2).mean(axis=1).min()) / 0.25
+    )
+
+
+def test_a_radius_gives_the_same_shape_at_two_densities():
+    found, by_iterations = [], []
+    for density in (1, 2):
+        rings, sides = 40 * density + 1, 16 * density
+        obj, armature = scenes.make_arm(sides=sides, rings=rings, name=f"Arm {density}")
+        armature.animation_data_clear()
+        armature.pose.bones[1].rotation_mode = "XYZ"
+        armature.pose.bones[1].rotation_euler.y = np.radians(170.0)
+        mush(obj, radius=0.15)
+        found.append(narrowest(obj, rings, sides))
+        stage = properties.of(obj).delta_mush
+        stage.radius, stage.iterations = 0.0, 20
+        by_iterations.append(narrowest(obj, rings, sides))
+    assert abs(found[0] - found[1]) < 0.01
+    assert abs(by_iterations[0] - by_iterations[1]) > 0.05
+
+
+def test_saved_copied_and_removed(tmp_path):
+    obj = make_rough_arm()
+    bpy.context.view_layer.update()
+    whole_file.of_open_file()  # looking at an attribute may change how 5.2 stores it
+    before = whole_file.of_open_file()
+    mush(obj, iterations=8, group=GROUP)
+    expected = scenes.shapes(obj, FRAMES)
+    path = tmp_path / "mushed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    assert scenes.worst(scenes.shapes(copy, FRAMES), expected) < 1e-6
+    attach.remove(copy)
+    bpy.data.objects.remove(copy)
+    bpy.context.scene.frame_set(1)
+    attach.remove(obj)
+    bpy.context.view_layer.update()
+    assert whole_file.differences(before, whole_file.of_open_file()) == []
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
+
+
+def taken_over(**settings: object) -> tuple[bpy.types.Object, np.ndarray]:
+    """A rough arm with a Corrective Smooth that was taken over, and the shapes before."""
+    obj = make_rough_arm()
+    add_corrective(obj, **settings)
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj)
+    assert bpy.ops.sinew.take_over_smooth(name=obj.name) == {"FINISHED"}
+    return obj, expected
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"iterations": 12, "factor": 0.9, "use_pin_boundary": True, "scale": 0.8},
+        {"vertex_group": GROUP, "invert_vertex_group": True, "smooth_type": "LENGTH_WEIGHTED"},
+        {"use_only_smooth": True},
+    ],
+)
+def test_a_corrective_smooth_is_taken_over(settings):
+    obj, expected = taken_over(**settings)
+    tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+    modifier = obj.modifiers["Smooth"]
+    assert (modifier.show_viewport, modifier.show_render) == (False, False)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= tolerance
+    # Off, it is Blender's again.
+    properties.of(obj).enabled = False
+    assert modifier.show_viewport
+    assert modifier.show_render
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+    properties.of(obj).enabled = True
+    assert not modifier.show_viewport
+    modifier.name = "Renamed"
+    attach.remove(obj)
+    assert modifier.show_viewport
+    assert modifier.show_render
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+
+
+def test_a_saved_file_has_corrective_smooth_on(tmp_path):
+    _obj, expected = taken_over(iterations=9)
+    path = tmp_path / "taken over.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    assert not bpy.data.objects["Arm"].modifiers["Smooth"].show_viewport
+    with bpy.data.libraries.load(str(path)) as (_source, target):
+        target.objects = ["Arm"]
+    saved = target.objects[0]
+    assert saved.modifiers["Smooth"].show_viewport
+    assert saved.modifiers["Smooth"].show_render
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Arm"]
+    assert not obj.modifiers["Smooth"].show_viewport
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    attach.remove(obj)
+    assert obj.modifiers["Smooth"].show_viewport
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+
+
+def test_nothing_of_what_was_taken_over_stays():
+    obj = make_rough_arm()
+    add_corrective(obj, iterations=9)
+    bpy.context.view_layer.update()
+    whole_file.of_open_file()
+    before = whole_file.of_open_file()
+    scenes.add_sinew(obj)
+    bpy.ops.sinew.take_over_smooth(name=obj.name)
+    attach.remove(obj)
+    bpy.context.view_layer.update()
+    assert whole_file.differences(before, whole_file.of_open_file()) == []
+
+
+def bound(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.rest_source = "BIND"
+
+
+def with_another_between(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    obj.modifiers.new("Cast", "CAST")
+    obj.modifiers.move(len(obj.modifiers) - 1, list(obj.modifiers).index(modifier))
+
+
+def for_renders(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.show_viewport = False
+
+
+def keyed(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.keyframe_insert("scale", frame=1)
+
+
+def too_often(_obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    modifier.iterations = 1001
+
+
+def with_stage(obj: bpy.types.Object, _modifier: bpy.types.Modifier) -> None:
+    properties.of(obj).delta_mush.enabled = True
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (bound, "Rest Source"),
+        (with_another_between, "Cast between it"),
+        (for_renders, "in renders alone"),
+        (keyed, "animated"),
+        (too_often, "Iterations beyond"),
+        (with_stage, "on already"),
+    ],
+)
+def test_one_that_can_not_be_taken_over_exactly_says_why(change, reason):
+    obj = make_rough_arm()
+    modifier = add_corrective(obj)
+    scenes.add_sinew(obj)
+    change(obj, modifier)
+    flags = (modifier.show_viewport, modifier.show_render)
+    with pytest.raises(RuntimeError, match=reason):
+        bpy.ops.sinew.take_over_smooth(name=obj.name)
+    assert (modifier.show_viewport, modifier.show_render) == flags

@@ -1,0 +1,414 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The stage `delta_mush` on whole meshes, beside its definition in double.
+#include "sinew/deform/delta_mush.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "scene.h"
+#include "sinew/deform/simd.h"
+#include "sinew/skinning/delta_mush.h"
+
+namespace sinew {
+namespace {
+
+using test::distance;
+using test::Random;
+using test::same_bits;
+
+struct Mesh {
+    std::vector<Vec3<float>> rest_points;
+    std::vector<std::int32_t> offsets{0};
+    std::vector<std::int32_t> corners;
+    std::vector<std::int32_t> edges;
+
+    void add_face(std::initializer_list<std::int32_t> vertices) {
+        corners.insert(corners.end(), vertices);
+        offsets.push_back(static_cast<std::int32_t>(corners.size()));
+    }
+
+    void add_edges_of_faces() {
+        std::set<std::pair<std::int32_t, std::int32_t>> made;
+        for (std::size_t face = 0; face + 1 < offsets.size(); ++face) {
+            for (auto i = offsets[face]; i < offsets[face + 1]; ++i) {
+                const auto after = i + 1 < offsets[face + 1] ? i + 1 : offsets[face];
+                made.insert(std::minmax(corners[static_cast<std::size_t>(i)],
+                                        corners[static_cast<std::size_t>(after)]));
+            }
+        }
+        for (const auto& [a, b] : made) edges.insert(edges.end(), {a, b});
+    }
+
+    [[nodiscard]] MeshTopology topology() const { return {offsets, corners, edges}; }
+};
+
+/// A sheet of triangles, quads and hexagons, with holes, edges of three faces, edges and vertices without faces.
+Mesh random_mesh(std::uint32_t seed, std::int32_t size) {
+    Random random(seed);
+    Mesh mesh;
+    const auto vertex = [&](std::int32_t x, std::int32_t y) { return x * size + y; };
+    for (std::int32_t x = 0; x < size; ++x) {
+        for (std::int32_t y = 0; y < size; ++y) {
+            mesh.rest_points.push_back(
+                Vec3<float>((Vec3<double>(x, y, 0.0) + random.vector(0.25)) / static_cast<double>(size)));
+        }
+    }
+    for (std::int32_t x = 0; x + 1 < size; ++x) {
+        for (std::int32_t y = 0; y + 1 < size; ++y) {
+            const auto a = vertex(x, y), b = vertex(x + 1, y), c = vertex(x + 1, y + 1), d = vertex(x, y + 1);
+            switch (random.index(8)) {
+                case 0: break;
+                case 1:
+                    mesh.add_face({a, b, c});
+                    mesh.add_face({a, c, d});
+                    break;
+                case 2:
+                    if (y + 2 < size) {
+                        mesh.add_face({a, b, c, vertex(x + 1, y + 2), vertex(x, y + 2), d});
+                        ++y;
+                    }
+                    break;
+                case 3:
+                    mesh.add_face({a, b, c, d});
+                    mesh.rest_points.push_back(mesh.rest_points[static_cast<std::size_t>(a)] +
+                                               Vec3<float>(0.01f, 0.0f, 0.05f));
+                    mesh.add_face({a, b, static_cast<std::int32_t>(mesh.rest_points.size()) - 1});
+                    break;
+                default: mesh.add_face({a, b, c, d}); break;
+            }
+        }
+    }
+    mesh.add_edges_of_faces();
+    for (std::int32_t i = 0; i < size; ++i) {
+        mesh.rest_points.push_back(Vec3<float>(random.vector(1.0)));
+        const auto last = static_cast<std::int32_t>(mesh.rest_points.size()) - 1;
+        if (i % 3 > 0) mesh.edges.insert(mesh.edges.end(), {last, random.index(last)});
+    }
+    return mesh;
+}
+
+std::vector<Vec3<float>> bent(const Mesh& mesh, std::uint32_t seed) {
+    Random random(seed);
+    std::vector<Vec3<float>> points;
+    for (const Vec3<float>& p : mesh.rest_points) {
+        const auto noise = Vec3<float>(random.vector(0.003));
+        points.push_back(Vec3<float>(p.x, std::cos(2.0f * p.y) + p.z, std::sin(2.0f * p.y) + 0.2f * p.x) +
+                         noise);
+    }
+    return points;
+}
+
+std::vector<float> weights_of(const Mesh& mesh, std::uint32_t seed) {
+    Random random(seed);
+    std::vector<float> weights;
+    for (std::size_t i = 0; i < mesh.rest_points.size(); ++i) {
+        weights.push_back(static_cast<float>(random.uniform(-0.3, 1.3)));
+    }
+    return weights;
+}
+
+/// By the definition, in double.
+class Reference {
+public:
+    Reference(const Mesh& mesh, const DeltaMushSettings& settings) : mesh_(mesh), settings_(settings) {
+        neighbours_.resize(mesh.rest_points.size());
+        for (std::size_t i = 0; i < mesh.edges.size(); ++i) {
+            neighbours_[static_cast<std::size_t>(mesh.edges[i])].push_back(
+                static_cast<std::size_t>(mesh.edges[i ^ 1]));
+        }
+        factors_.assign(mesh.rest_points.size(), static_cast<double>(settings.factor));
+        for (std::size_t i = 0; i < settings.weights.size(); ++i) {
+            factors_[i] *= std::clamp(static_cast<double>(settings.weights[i]), 0.0, 1.0);
+        }
+        if (settings.pin_boundary) pin();
+    }
+
+    /// weights  becomes the sum of the angles of each vertex's corners
+    [[nodiscard]] std::vector<Vec3<double>> apply(std::span<const Vec3<float>> points, double scale,
+                                                  std::vector<double>& weights) const {
+        const auto rest = smoothed(mesh_.rest_points);
+        auto result = smoothed(points);
+        std::vector<Vec3<double>> details(result.size(), Vec3<double>(0.0));
+        weights.assign(result.size(), 0.0);
+        for_each_corner([&](std::size_t before, std::size_t at, std::size_t after) {
+            const auto at_rest = DeltaMushStage::corner(rest[before], rest[at], rest[after]);
+            const auto posed = DeltaMushStage::corner(result[before], result[at], result[after]);
+            const Vec3<double> taken = Vec3<double>(mesh_.rest_points[at]) - rest[at];
+            details[at] += posed.weight * (posed.axes * (glm::transpose(at_rest.axes) * taken));
+            weights[at] += posed.weight;
+        });
+        for (std::size_t v = 0; v < result.size(); ++v) {
+            if (weights[v] > 0.0) result[v] += scale / weights[v] * details[v];
+        }
+        return result;
+    }
+
+private:
+    template <class Call>
+    void for_each_corner(const Call& call) const {
+        for (std::size_t face = 0; face + 1 < mesh_.offsets.size(); ++face) {
+            const auto begin = static_cast<std::size_t>(mesh_.offsets[face]);
+            const auto count = static_cast<std::size_t>(mesh_.offsets[face + 1]) - begin;
+            const auto at = [&](std::size_t i) {
+                return static_cast<std::size_t>(mesh_.corners[begin + i % count]);
+            };
+            for (std::size_t i = 0; i < count; ++i) call(at(i + count - 1), at(i), at(i + 1));
+        }
+    }
+
+    void pin() {
+        for (std::size_t edge = 0; edge < mesh_.edges.size(); edge += 2) {
+            const auto a = static_cast<std::size_t>(mesh_.edges[edge]);
+            const auto b = static_cast<std::size_t>(mesh_.edges[edge + 1]);
+            int faces = 0;
+            for_each_corner([&](std::size_t, std::size_t at, std::size_t after) {
+                faces += std::minmax(at, after) == std::minmax(a, b);
+            });
+            if (faces == 1) factors_[a] = factors_[b] = 0.0;
+        }
+    }
+
+    [[nodiscard]] std::vector<Vec3<double>> smoothed(std::span<const Vec3<float>> from) const {
+        std::vector<Vec3<double>> points(from.begin(), from.end());
+        for (std::size_t i = 0; i < settings_.iterations; ++i) {
+            const auto before = points;
+            for (std::size_t v = 0; v < points.size(); ++v) {
+                std::vector<Vec3<double>> around;
+                for (const std::size_t neighbour : neighbours_[v]) around.push_back(before[neighbour]);
+                const std::span<const Vec3<double>> neighbours(around);
+                points[v] = settings_.type == SmoothType::simple
+                                ? DeltaMushStage::smoothed(before[v], neighbours, factors_[v])
+                                : DeltaMushStage::smoothed_by_length(before[v], neighbours, factors_[v]);
+            }
+        }
+        return points;
+    }
+
+    const Mesh& mesh_;
+    const DeltaMushSettings& settings_;
+    std::vector<std::vector<std::size_t>> neighbours_;
+    std::vector<double> factors_;
+};
+
+std::vector<Vec3<float>> mushed(const DeltaMush& mush, std::vector<Vec3<float>> points, float scale = 1.0f,
+                                std::size_t threads = 0) {
+    mush.apply(points, scale, threads);
+    return points;
+}
+
+bool same(const std::vector<Vec3<float>>& a, const std::vector<Vec3<float>>& b) {
+    return std::ranges::equal(a, b, same_bits<float>);
+}
+
+class Mushes : public testing::TestWithParam<std::string_view> {
+protected:
+    void SetUp() override { use_simd_target(GetParam()); }
+    void TearDown() override { use_simd_target(simd_targets().front()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, Mushes, testing::ValuesIn(simd_targets()),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST_P(Mushes, agree_with_the_definition_in_double) {
+    const Mesh mesh = random_mesh(1, 20);
+    const auto points = bent(mesh, 2);
+    const auto weights = weights_of(mesh, 3);
+    for (const auto type : {SmoothType::simple, SmoothType::length_weighted}) {
+        for (const std::size_t iterations : {0, 1, 5, 30}) {
+            for (const bool masked : {false, true}) {
+                DeltaMushSettings settings{iterations, 0.0f, masked ? 0.9f : 0.5f, type, masked, {}};
+                if (masked) settings.weights = weights;
+                const float scale = masked ? 0.7f : 1.0f;
+                std::vector<double> angles;
+                const auto expected =
+                    Reference(mesh, settings).apply(points, static_cast<double>(scale), angles);
+                const auto result =
+                    mushed(DeltaMush(mesh.topology(), mesh.rest_points, settings), points, scale);
+                std::size_t compared = 0;
+                for (std::size_t v = 0; v < result.size(); ++v) {
+                    // Of corners that are almost straight half of the angle's digits are rounding.
+                    if (angles[v] > 0.0 && angles[v] < 0.3) continue;
+                    ++compared;
+                    ASSERT_LT(distance(Vec3<double>(result[v]), expected[v]), 1e-5) << v << " " << iterations;
+                }
+                EXPECT_GT(compared, result.size() * 9 / 10);
+            }
+        }
+    }
+}
+
+TEST_P(Mushes, keep_faces_at_rest) {
+    Mesh mesh = random_mesh(4, 30);
+    const auto result =
+        mushed(DeltaMush(mesh.topology(), mesh.rest_points, {.iterations = 10}), mesh.rest_points);
+    std::vector<bool> has_face(result.size());
+    for (const std::int32_t vertex : mesh.corners) has_face[static_cast<std::size_t>(vertex)] = true;
+    for (std::size_t v = 0; v < result.size(); ++v) {
+        if (has_face[v]) {
+            ASSERT_LT(distance(result[v], mesh.rest_points[v]), 1e-6f) << v;
+        }
+    }
+}
+
+TEST_P(Mushes, threads_change_no_bit) {
+    const Mesh mesh = random_mesh(5, 150);
+    const auto points = bent(mesh, 6);
+    for (const auto type : {SmoothType::simple, SmoothType::length_weighted}) {
+        const DeltaMush mush(mesh.topology(), mesh.rest_points, {.iterations = 7, .type = type});
+        const auto expected = mushed(mush, points, 1.0f, 1);
+        for (const std::size_t threads : {2, 3, 8}) {
+            EXPECT_TRUE(same(mushed(mush, points, 1.0f, threads), expected)) << threads;
+        }
+    }
+}
+
+TEST_P(Mushes, bound_again_are_as_made_so) {
+    const Mesh mesh = random_mesh(7, 25);
+    const auto points = bent(mesh, 8);
+    const auto weights = weights_of(mesh, 9);
+    DeltaMushSettings other{8, 0.0f, 0.8f, SmoothType::length_weighted, true, weights};
+    auto moved = mesh.rest_points;
+    for (Vec3<float>& point : moved) point = 2.0f * point;
+    DeltaMush mush(mesh.topology(), mesh.rest_points, {.radius = 0.2f});
+    const auto before = mushed(mush, points);
+    mush.bind(moved, other);
+    EXPECT_FALSE(same(mushed(mush, points), before));
+    EXPECT_TRUE(same(mushed(mush, points), mushed(DeltaMush(mesh.topology(), moved, other), points)));
+    mush.bind(mesh.rest_points, {.radius = 0.2f});
+    EXPECT_TRUE(same(mushed(mush, points), before));
+    // What is refused changes nothing.
+    EXPECT_THROW(mush.bind(moved, {.factor = 2.0f}), std::invalid_argument);
+    EXPECT_TRUE(same(mushed(mush, points), before));
+    const DeltaMush::Parts parts = mush.parts();
+    EXPECT_TRUE(same(mushed(DeltaMush(parts.topology, parts.rest_points, parts.settings), points), before));
+}
+
+/// A flat square of `size` by `size` vertices and side 1.
+Mesh sheet(std::int32_t size) {
+    Mesh mesh;
+    for (std::int32_t x = 0; x < size; ++x) {
+        for (std::int32_t y = 0; y < size; ++y) {
+            mesh.rest_points.push_back(Vec3<float>(x, y, 0) / static_cast<float>(size - 1));
+            const std::int32_t v = x * size + y;
+            if (x > 0 && y > 0) mesh.add_face({v - size - 1, v - 1, v, v - size});
+        }
+    }
+    mesh.add_edges_of_faces();
+    return mesh;
+}
+
+// A step across a sheet becomes the integral of a Gaussian: at its width from the step, erf(1 / sqrt(2)) = 0.683.
+TEST(Radius, is_the_width_of_a_Gaussian_however_dense_the_mesh_is) {
+    for (const auto type : {SmoothType::simple, SmoothType::length_weighted}) {
+        for (const std::int32_t size : {41, 101}) {
+            const Mesh mesh = sheet(size);
+            const DeltaMush mush(mesh.topology(), mesh.rest_points, {.radius = 0.1f, .type = type});
+            // Small, so that it leaves the lengths of edges as they are; the details are those of a flat sheet: none.
+            auto points = mesh.rest_points;
+            for (Vec3<float>& point : points) point.z = point.x < 0.501f ? -1e-3f : 1e-3f;
+            mush.apply(points, 0.0f);
+            const auto at = [&](float x) {
+                const auto column = static_cast<std::size_t>(std::lround(x * static_cast<float>(size - 1)));
+                return 1e3f *
+                       points[column * static_cast<std::size_t>(size) + static_cast<std::size_t>(size / 2)].z;
+            };
+            // The step is half an edge from a vertex on either side.
+            EXPECT_NEAR(at(0.6f) - at(0.4f), 2.0f * 0.683f, 0.03f) << size;
+            EXPECT_NEAR(at(0.7f) - at(0.3f), 2.0f * 0.954f, 0.03f) << size;
+        }
+    }
+}
+
+TEST(Radius, says_how_often_it_smooths) {
+    const Mesh mesh = sheet(41);
+    const auto iterations = [&](float radius, float factor) {
+        return DeltaMush(mesh.topology(), mesh.rest_points, {.radius = radius, .factor = factor})
+            .iterations();
+    };
+    // 2 radius^2 / (h^2 factor), h = 1 / 40
+    EXPECT_EQ(iterations(0.0999f, 0.5f), 64u);
+    EXPECT_EQ(iterations(0.0999f, 1.0f), 32u);
+    EXPECT_EQ(iterations(0.001f, 0.5f), 1u);
+    EXPECT_EQ(iterations(100.0f, 0.5f), 1000u);
+    EXPECT_EQ(iterations(0.1f, 0.0f), 0u);
+}
+
+TEST(DeltaMush, takes_meshes_without_faces_and_without_vertices) {
+    std::vector<Vec3<float>> none;
+    DeltaMush({std::vector<std::int32_t>{0}, {}, {}}, none, {}).apply(none);
+    std::vector<Vec3<float>> points{{0, 0, 0}, {1, 0, 0}, {5, 5, 5}};
+    const std::vector<std::int32_t> offsets{0}, edges{0, 1};
+    const DeltaMush mush({offsets, {}, edges}, points, {.iterations = 1});
+    // Smoothed, without details.
+    const std::vector<Vec3<float>> expected{{0.5f, 0, 0}, {0.5f, 0, 0}, {5, 5, 5}};
+    EXPECT_EQ(mushed(mush, points), expected);
+    std::vector<Vec3<float>> fewer(2, Vec3<float>(7.0f));
+    EXPECT_EQ(mushed(mush, fewer), fewer);
+}
+
+// Faces that have no size, and spikes.
+TEST(DeltaMush, has_no_NaN_where_faces_are_degenerate) {
+    const std::vector<std::int32_t> offsets{0, 3, 6, 10}, corners{0, 1, 2, 2, 1, 0, 0, 1, 0, 2},
+        edges{0, 1, 1, 2, 2, 0};
+    for (const Vec3<float>& third : {Vec3<float>(0, 0, 0), Vec3<float>(2, 0, 0), Vec3<float>(1e-30f, 0, 0)}) {
+        const std::vector<Vec3<float>> points{{0, 0, 0}, {1, 0, 0}, third};
+        for (const auto type : {SmoothType::simple, SmoothType::length_weighted}) {
+            const DeltaMush mush({offsets, corners, edges}, points, {.type = type});
+            for (const Vec3<float>& point : mushed(mush, points)) {
+                EXPECT_TRUE(std::isfinite(point.x + point.y + point.z));
+            }
+        }
+    }
+}
+
+std::string refusal(const auto& make) {
+    try {
+        make();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "nothing thrown";
+}
+
+TEST(DeltaMush, says_what_it_refuses) {
+    const Mesh mesh = sheet(3);
+    const auto with = [&](const DeltaMushSettings& settings) {
+        return refusal([&] { const DeltaMush mush(mesh.topology(), mesh.rest_points, settings); });
+    };
+    EXPECT_EQ(with({}), "nothing thrown");
+    EXPECT_EQ(with({.iterations = 1001}), "iterations: expected at most 1000, got 1001");
+    EXPECT_EQ(with({.radius = -1.0f}), "radius: expected 0 or more, got -1.000000");
+    EXPECT_EQ(with({.factor = 1.5f}), "factor: expected a number from 0 to 1, got 1.500000");
+    const std::array<float, 2> two{};
+    EXPECT_EQ(with({.weights = two}), "weights: expected none, or one for each of the 9 vertices, got 2");
+    std::array<float, 9> weights{};
+    weights[4] = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_EQ(with({.weights = weights}), "weights: expected weights from 0 to 1, got NaN at vertex 4");
+
+    const auto of = [&](const auto& change) {
+        Mesh changed = mesh;
+        change(changed);
+        return refusal([&] { const DeltaMush mush(changed.topology(), changed.rest_points, {}); });
+    };
+    EXPECT_EQ(of([](Mesh& m) { m.offsets.back() = 15; }),
+              "face_offsets: expected to rise from 0 to the 16 corner_vertices, got 0 to 15");
+    EXPECT_EQ(of([](Mesh& m) { m.offsets.clear(); }),
+              "face_offsets: expected to rise from 0 to the 16 corner_vertices, got none");
+    EXPECT_EQ(of([](Mesh& m) { m.corners[3] = 9; }),
+              "corner_vertices: expected vertices from 0 to 8, got 9 at index 3");
+    EXPECT_EQ(of([](Mesh& m) { m.edges[2] = -1; }),
+              "edges: expected vertices from 0 to 8, got -1 at index 2");
+    EXPECT_EQ(of([](Mesh& m) { m.edges.pop_back(); }), "edges: expected two vertices each, got 23 vertices");
+    EXPECT_EQ(of([](Mesh& m) { m.edges.resize(22); }),
+              "edges: expected every edge of each face, got none from vertex 7 to 8");
+    EXPECT_EQ(of([](Mesh& m) { m.rest_points[1].y = std::numeric_limits<float>::infinity(); }),
+              "rest_points: expected finite values, got NaN or infinity at vertex 1");
+}
+
+}  // namespace
+}  // namespace sinew

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""sinew.DeltaMush beside float64 numpy, as numpy people use it."""
+
+import pickle
+
+import numpy as np
+import pytest
+import sinew
+from delta_mush_reference import delta_mush
+
+
+def mesh_of(seed, size=12):
+    """(rest points, faces as lists of vertices, edges): triangles, quads, a hexagon, a hole, loose edges."""
+    rng = np.random.default_rng(seed)
+    x, y = np.mgrid[:size, :size]
+    points = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3) / size
+    points = points + rng.normal(0, 0.01, points.shape)
+    quads = [
+        [v, v + size, v + size + 1, v + 1] for v in range(size * (size - 1)) if v % size < size - 1 and v % 17
+    ]
+    faces = []
+    for number, (a, b, c, d) in enumerate(quads):
+        faces += [[a, b, c], [a, c, d]] if number % 3 == 0 else [[a, b, c, d]]
+    # A face of three edges, one of which has two faces already, and a hexagon of others.
+    faces += [[30, 31, size * size], list(range(3 * size, 3 * size + 6))]
+    points = np.concatenate([points, points[30:34] + rng.normal(0, 0.05, (4, 3))])
+    edges = {frozenset((face[i - 1], face[i])) for face in faces for i in range(len(face))}
+    edges |= {frozenset((5, size * size + 1)), frozenset((size * size + 1, size * size + 2))}
+    return points.astype(np.float32), faces, np.array(sorted(map(sorted, edges)), np.int32)
+
+
+def arrays_of(mesh):
+    points, faces, edges = mesh
+    offsets = np.cumsum([0, *map(len, faces)]).astype(np.int32)
+    return points, offsets, np.concatenate(faces).astype(np.int32), edges
+
+
+def bent(points, seed=5):
+    rng = np.random.default_rng(seed)
+    x, y, z = points.T
+    return np.stack([x, np.cos(2 * y) + z, np.sin(2 * y) + 0.3 * x], axis=-1).astype(np.float32) + rng.normal(
+        0, 0.005, points.shape
+    ).astype(np.float32)
+
+
+CASES = [
+    {},
+    {"iterations": 0},
+    {"iterations": 30},
+    {"iterations": 8, "factor": 1.0},
+    {"smooth_type": "length_weighted"},
+    {"smooth_type": "length_weighted", "iterations": 20, "factor": 0.2},
+    {"pin_boundary": True},
+    {"weights": np.linspace(0, 1, 148)},
+    {"weights": np.linspace(0, 1, 148), "pin_boundary": True, "smooth_type": "length_weighted"},
+]
+
+
+@pytest.mark.parametrize("settings", CASES, ids=lambda s: "-".join(s) or "default")
+@pytest.mark.parametrize("scale", [1.0, -0.5, 0.0])
+def test_agrees_with_the_reference(settings, scale):
+    mesh = mesh_of(1)
+    points = bent(mesh[0])
+    expected = delta_mush(points, mesh, scale=scale, **settings)
+    got = sinew.DeltaMush(*arrays_of(mesh), **settings).apply(points, scale=scale)
+    assert got.dtype == np.float32
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-5)
+    if settings.get("iterations") != 0:
+        assert np.abs(got - points).max() > 1e-3
+
+
+def test_writes_in_place_and_on_any_number_of_threads():
+    mesh = mesh_of(2, size=140)
+    mush = sinew.DeltaMush(*arrays_of(mesh), iterations=6)
+    points = bent(mesh[0])
+    expected = mush.apply(points, threads=1)
+    for threads in (None, 0, 2, np.int8(3), 10**30):
+        np.testing.assert_array_equal(mush.apply(points, threads=threads), expected)
+    out = points.copy()
+    assert mush.apply(out, out=out) is out
+    np.testing.assert_array_equal(out, expected)
+    np.testing.assert_array_equal(mush.apply(points.astype(np.float64).tolist()), expected)
+
+
+def test_bound_again_it_is_as_made_so():
+    mesh = mesh_of(3)
+    points = bent(mesh[0])
+    mush = sinew.DeltaMush(*arrays_of(mesh), iterations=9, weights=np.full(148, 0.5))
+    rest = 2 * mesh[0]
+    for settings in ({}, {"radius": 0.2}, {"smooth_type": "length_weighted", "factor": 0.3}):
+        mush.bind(rest, **settings)
+        made = sinew.DeltaMush(rest, *arrays_of(mesh)[1:], **settings)
+        np.testing.assert_array_equal(mush.apply(points), made.apply(points))
+        assert mush.iterations == made.iterations
+
+
+@pytest.mark.parametrize("settings", [*CASES, {"radius": 0.3}], ids=lambda s: "-".join(s) or "default")
+def test_can_be_pickled(settings):
+    mesh = mesh_of(4)
+    points = bent(mesh[0])
+    mush = sinew.DeltaMush(*arrays_of(mesh), **settings)
+    copy = pickle.loads(pickle.dumps(mush))
+    np.testing.assert_array_equal(copy.apply(points, scale=0.7), mush.apply(points, scale=0.7))
+    assert repr(copy) == repr(mush) == f"<sinew.DeltaMush: 148 vertices, {mush.iterations} iterations>"
+    assert mush.vertex_count == 148
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"iterations": -1}, "iterations: expected an integer from 0 to 1000, got -1"),
+        ({"iterations": 10**30}, "iterations: expected an integer from 0 to 1000, got one far beyond"),
+        ({"iterations": 2.0}, "iterations: expected an integer from 0 to 1000, got float"),
+        ({"radius": -1}, "radius: expected 0 or more"),
+        ({"radius": float("nan")}, "radius: expected 0 or more"),
+        ({"factor": "x"}, "factor: expected a number, got str"),
+        ({"factor": 1.1}, "factor: expected a number from 0 to 1"),
+        ({"smooth_type": "other"}, "smooth_type: expected one of simple length_weighted, got 'other'"),
+        ({"pin_boundary": 2}, "pin_boundary: expected True or False, got int"),
+        ({"weights": [1.0]}, "weights: expected none, or one for each of the 148 vertices, got 1"),
+    ],
+)
+def test_says_what_it_refuses(settings, message):
+    mesh = mesh_of(6)
+    with pytest.raises(ValueError, match=message):
+        sinew.DeltaMush(*arrays_of(mesh), **settings)
+    mush = sinew.DeltaMush(*arrays_of(mesh), iterations=3)
+    before = mush.apply(bent(mesh[0]))
+    with pytest.raises(ValueError, match=message):
+        mush.bind(2 * mesh[0], **settings)
+    np.testing.assert_array_equal(mush.apply(bent(mesh[0])), before)
+
+
+def test_says_which_mesh_it_refuses():
+    points, offsets, corners, edges = arrays_of(mesh_of(7))
+    for arguments, message in (
+        ((points, offsets[:-1], corners, edges), "face_offsets: expected to rise"),
+        ((points[:100], offsets, corners, edges), "corner_vertices: expected vertices from 0 to 99"),
+        ((points, offsets, corners, edges[1:]), "edges: expected every edge of each face"),
+        ((points, offsets, corners, edges.ravel()), r"edges: expected int32 \[edges, 2\]"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            sinew.DeltaMush(*arguments)
+    mush = sinew.DeltaMush(points, offsets, corners, edges)
+    with pytest.raises(ValueError, match=r"points: expected float32 \[148, 3\]"):
+        mush.apply(points[:-1])
+    with pytest.raises(ValueError, match="out: expected writable"):
+        mush.apply(points, out=np.zeros((148, 3)))
