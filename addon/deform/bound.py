@@ -152,7 +152,8 @@ def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> d
 
 def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
     weightings = [stage.binding.weighting for stage in stages]
-    return StageMesh(read_now.topology, read_now.own_points, weightings)
+    masks = [stage.mask for stage in stages]
+    return StageMesh(read_now.topology, read_now.own_points, weightings, masks)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:
