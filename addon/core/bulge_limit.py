@@ -61,7 +61,11 @@ class BulgeLimit:
 
     def _bind(self, link: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> sinew.BulgeLimit:
         weighting = self._mesh.weightings[link]
-        is_same = rest_points is self._rest_points and np.array_equal(bones_from_model, self._space)
+        is_same = (
+            rest_points is self._rest_points
+            and self._space is not None
+            and np.array_equal(bones_from_model, self._space)
+        )
         space = bones_from_model.astype(np.float32)
         if self._native is None or link != self._link or (weighting.depends_on_points and not is_same):
             self._native = self._make(weighting, link, rest_points, bones_from_model)
