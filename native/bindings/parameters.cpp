@@ -36,7 +36,8 @@ double value_of(const py::handle& value, const Parameter& parameter) {
         }
         return none;
     }
-    // Numbers of numpy, too, but no texts.
+    // Numbers of numpy, too, but no texts and no arrays of one number.
+    if (py::isinstance<py::array>(value) && py::reinterpret_borrow<py::array>(value).ndim() > 0) return none;
     const bool is_whole = PyIndex_Check(value.ptr()) != 0;
     const bool is_bool = py::isinstance<py::bool_>(value);
     if (!is_whole && !is_bool && PyNumber_Check(value.ptr()) == 0) return none;
