@@ -7,6 +7,7 @@
 #include <string>
 
 #include "scenes.h"
+#include "sinew/deform/bulge_limit.h"
 #include "sinew/deform/simd.h"
 #include "sinew/deform/thread_pool.h"
 #include "sinew/skinning/methods.h"
@@ -42,6 +43,23 @@ void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape,
     const Deformer& deformer = bound(shape).deformer(method);
     for (auto _ : state) {
         deformer.deform(scene.pose, {{}, threads}, scene.points);
+        benchmark::ClobberMemory();
+    }
+}
+
+/// The stage bulge_limit after dq, so weak that the points stay as they are, and it writes them.
+void bulge_limit(benchmark::State& state, const Shape& shape) {
+    Scene& scene = scene_of(shape);
+    std::vector<BoneSegment<float>> segments;
+    for (std::size_t bone = 0; bone < shape.bones; ++bone) {
+        const auto z = static_cast<float>(bone);
+        segments.push_back({{0, 0, z}, {0, 0, z + 1}});
+    }
+    const BulgeLimit limit({scene.data(), segments});
+    bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
+    for (Vec3<float>& point : scene.points) point *= 1.01f;
+    for (auto _ : state) {
+        limit.apply(scene.points, scene.pose, {BulgeForm::continuous, 1e-12f, 1});
         benchmark::ClobberMemory();
     }
 }
@@ -120,6 +138,7 @@ void register_all() {
             });
             if (vertices != 100'000) continue;
             add("bind/dq" + scene, [=](benchmark::State& s) { bind(s, shape); });
+            add("stage/bulge_limit" + scene, [=](benchmark::State& s) { bulge_limit(s, shape); });
             add("rest/dq" + scene, [=](benchmark::State& s) { new_rest_points(s, shape); });
         }
     }

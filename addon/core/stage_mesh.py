@@ -39,11 +39,14 @@ class StageMesh:
     rest_points  float32 [vertices, 3], object space: the mesh's own, without shape keys and modifiers; None
                  where modifiers in front give it other vertices: then each frame's rest points are taken
     weightings   of the Armature modifiers
+    link_masks   float32 [vertices], the share of the deformation that each vertex takes from each of them,
+                 None for all of it; empty: none has a mask
     """
 
     topology: Topology
     rest_points: np.ndarray | None
     weightings: Sequence[Weighting]
+    link_masks: Sequence[np.ndarray | None] = ()
 
     def equals(self, other: StageMesh) -> bool:
         """Of the same Armature modifiers."""

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import sinew
 
+from .bulge_limit import BulgeLimit
 from .delta_mush import DeltaMush
 from .stage_mesh import StageMesh
 
@@ -31,7 +32,10 @@ class Stage(Protocol):
         """
 
 
-STAGES: dict[str, Callable[[StageMesh, np.ndarray | None], Stage]] = {"delta_mush": DeltaMush}
+STAGES: dict[str, Callable[[StageMesh, np.ndarray | None], Stage]] = {
+    "bulge_limit": BulgeLimit,
+    "delta_mush": DeltaMush,
+}
 """Those that follow the blend; the library's list has their order."""
 
 ORDER = [stage.name for stage in sinew.stages() if stage.name in STAGES]

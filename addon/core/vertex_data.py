@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import sinew
@@ -22,24 +22,34 @@ class VertexData:
     weighting  of the bones that move the mesh
     points     float32 [vertices, 3], object space
     triangles  int32 [triangles, 3]
+    given      what is not made here but read from the mesh, by the name of the method
     """
 
-    def __init__(self, weighting: Weighting, points: np.ndarray, triangles: np.ndarray) -> None:
+    def __init__(
+        self,
+        weighting: Weighting,
+        points: np.ndarray,
+        triangles: np.ndarray,
+        given: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
         self.weighting = weighting
         self.points = points
         self.triangles = triangles
+        self._given = dict(given or {})
         self._made: dict[str, np.ndarray] = {}
         self._lock = threading.Lock()
 
     @property
     def is_used(self) -> bool:
-        return bool(self._made)
+        return bool(self._made or self._given)
 
     def of(self, method: str, bones_from_model: np.ndarray) -> np.ndarray | None:
         """float32 [vertices, Method.vertex_floats], object space; None for a method that keeps nothing.
 
         bones_from_model  float64 [4, 4], where weights depend on where vertices are: the first call decides
         """
+        if method in self._given:
+            return self._given[method]
         provider = PROVIDERS.get(method)
         if provider is None:
             return None

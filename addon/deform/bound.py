@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -10,7 +11,8 @@ import numpy as np
 
 from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions
-from ..core.rig import Bones, RigFacts
+from ..core import sdef
+from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
 from ..core.stage_mesh import StageMesh
 from ..core.stages import StagesAfter
@@ -44,6 +46,11 @@ class Bound:
         """Whether modifiers, bones or weights differ from the other's: more than the rest points."""
         return other is None or self.skin_stack is not other.skin_stack
 
+    def lacks(self, methods: Iterable[str]) -> list[str]:
+        """A sentence for each of the methods that does without something which the mesh lacks."""
+        lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
+        return [sdef.MISSING] if lacks_keys else []
+
     @property
     def binding(self) -> Binding:
         """Of the first Armature modifier."""
@@ -62,8 +69,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
-                weighting = stage.binding.weighting
-                stage.binding.replace_vertex_data(VertexData(weighting, read_now.points, read_now.triangles))
+                stage.binding.replace_vertex_data(_vertex_data(stage.binding.weighting, read_now))
         if np.array_equal(read_now.points, old.source.points):
             # The same array tells that nothing moved.
             read_now.points = old.source.points
@@ -74,8 +80,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     stages = []
     for option, its_bones in zip(options, bones, strict=True):
         weighting = option.weighting(obj, read_now.weights, its_bones)
-        vertex_data = VertexData(weighting, read_now.points, read_now.triangles)
-        binding = Binding(weighting, masks.get("mix"), vertex_data)
+        binding = Binding(weighting, masks.get("mix"), _vertex_data(weighting, read_now))
         stages.append(SkinStage(binding, option.mask_weights(obj, read_now.weights), option.multi))
     weighting = stages[0].binding.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
@@ -126,6 +131,16 @@ def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> 
     )
 
 
+def _vertex_data(weighting: Weighting, read_now: Source) -> VertexData:
+    given = {}
+    if read_now.sdef_keys is not None:
+        basis, *keys = read_now.sdef_keys
+        groups = sdef.group_of_bone(weighting.bones.names, read_now.group_names)
+        influences = weighting.entries.influences()
+        given[sdef.METHOD] = sdef.vertex_data(basis, np.array(keys), influences, groups)
+    return VertexData(weighting, read_now.points, read_now.triangles, given)
+
+
 def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:
     """float32 [vertices], 0 to 1, by the stage's name. None of a group that the object lacks, nor of a mesh
     without weights, as Blender's modifiers have it."""
@@ -140,7 +155,8 @@ def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> d
 
 def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
     weightings = [stage.binding.weighting for stage in stages]
-    return StageMesh(read_now.topology, read_now.own_points, weightings)
+    masks = [stage.mask for stage in stages]
+    return StageMesh(read_now.topology, read_now.own_points, weightings, masks)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:

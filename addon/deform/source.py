@@ -26,6 +26,7 @@ class Source:
     topology          faces and edges
     own_points        float32 [vertices, 3], object space, the mesh's own, whatever stands in front; None
                       where that gives it other vertices
+    sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  of those when changes were looked at last
@@ -38,6 +39,7 @@ class Source:
     topology: Topology
     own_points: np.ndarray | None
     shape_keys: ShapeKeys | None
+    sdef_keys: np.ndarray | None = None
     from_front: bool = False
     key_values: np.ndarray | None = None
     known_key_values: np.ndarray | None = None
@@ -50,14 +52,19 @@ class Source:
         if (keys is None) != (known is None) or not self.equals_but_for_points(other):
             return False
         has_same_keys = keys is None or keys.equals(known)
-        return has_same_keys and np.array_equal(self.points, other.points)
+        return has_same_keys and self.has_same_surface(other)
 
     def equals_but_for_points(self, other: Source) -> bool:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
     def has_same_surface(self, other: Source) -> bool:
-        """Whether points and triangles, which methods keep numbers of vertices from, are the same."""
-        return np.array_equal(self.points, other.points) and np.array_equal(self.triangles, other.triangles)
+        """Whether all that methods keep numbers of vertices from, but for weights, is the same."""
+        return (
+            np.array_equal(self.points, other.points)
+            and np.array_equal(self.triangles, other.triangles)
+            and (self.sdef_keys is None) == (other.sdef_keys is None)
+            and (self.sdef_keys is None or np.array_equal(self.sdef_keys, other.sdef_keys))
+        )
 
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
@@ -71,18 +78,23 @@ def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool
 def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
     """Requires is_ready."""
     names = [group.name for group in obj.vertex_groups]
+    sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if properties.of(obj).upstream_proxy is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
         points = mesh_io.read_points(mesh)
         triangles, topology = mesh_io.read_triangles(mesh), mesh_io.read_topology(mesh)
         own_points = mesh_io.read_points(obj.data) if len(obj.data.vertices) == len(points) else None
         weights = mesh_io.read_group_weights(mesh)
-        return Source(names, weights, points, triangles, topology, own_points, None, from_front=True)
+        if sdef_keys is not None and own_points is None:
+            sdef_keys = None
+        return Source(
+            names, weights, points, triangles, topology, own_points, None, sdef_keys, from_front=True
+        )
     weights = mesh_io.read_group_weights(obj.data)
     points = mesh_io.read_points(obj.data)
     triangles, topology = mesh_io.read_triangles(obj.data), mesh_io.read_topology(obj.data)
     keys = mesh_io.read_shape_keys(obj, weights)
-    return Source(names, weights, points, triangles, topology, points, keys)
+    return Source(names, weights, points, triangles, topology, points, keys, sdef_keys)
 
 
 def has_changed(

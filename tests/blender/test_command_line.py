@@ -15,11 +15,12 @@ import program
 import pytest
 import scenes
 import sinew
+import test_bulge_limit
 import test_delta_mush
 import test_mix
 from conftest import REPOSITORY
 from program import run_sinew
-from sinew_addon.attach import properties
+from sinew_addon.attach import attach, properties
 from sinew_addon.cli import make_parser
 from sinew_addon.io import files
 
@@ -173,15 +174,35 @@ def test_a_stage_is_set_by_name(tmp_path):
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], test_delta_mush.FRAMES), expected) <= 1e-5
 
 
+def test_limit_bulge_is_set_by_name(tmp_path):
+    """As the reference has it, in points, job files, copies and bakes."""
+    obj, before = test_bulge_limit.bent_arm()
+    expected = test_bulge_limit.expected_points(obj, before, strength=0.5, form="kim_han")
+    attach.remove(obj)
+    path, out = tmp_path / "arm.blend", tmp_path / "points.npz"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    values = ["bulge_limit=on", "bulge_limit.strength=0.5", "bulge_limit.form=kim_han"]
+    options = [text for value in values for text in ("--set", value)]
+    run_sinew("points", path, "--method", "dq", *options, "--frames", "11", "--out", out)
+    with np.load(out) as points:
+        assert scenes.worst(points["Arm"][0], expected) <= 3e-5
+    job = tmp_path / "job.toml"
+    job.write_text(f'method = "dq"\nset = {values}\nbake = ["shape-keys"]\nbake_frames = "11"\n')
+    run_sinew("reskin", path, "--job", job, "--frames", "none", "--out", tmp_path / "out")
+    files.open_file(tmp_path / "out" / "arm.blend")
+    assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], [11])[0], expected) <= 3e-5
+
+
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("given", "status", "sentence"),
     [
+        (("bulge_limit.form=hard",), 2, "bulge_limit.form: expected one of continuous, kim_han, got 'hard'"),
         (("mix=dq", "mix.group=none such"), 1, "no mesh has a vertex group 'none such'"),
         (("mix=bulge",), 2, "mix: expected one of off, lbs"),
         (("delta_mush=dq",), 2, "delta_mush: expected on or off, got 'dq'"),
         (("delta_mush.iterations=1001",), 2, "expected a whole number from 0 to 1000"),
-        (("strength=1",), 2, "expected one of mix, delta_mush, mix.method, mix.group"),
+        (("strength=1",), 2, "expected one of mix, bulge_limit, delta_mush, sdef.interpolation, mix.method"),
     ],
 )
 def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):

@@ -335,7 +335,7 @@ def test_meshes(data):
     bones = data.draw(st.integers(1, 4))
     influences = vertices * each
     offsets = [each * vertex for vertex in range(vertices + 1)]
-    wild = wild_one(data.draw, 14)
+    wild = wild_one(data.draw, 15)
     nothing = st.just((None, None))
     mesh = [
         data.draw(strategy)
@@ -367,8 +367,12 @@ def test_meshes(data):
     inverses = data.draw(
         st.one_of(nothing, or_garbage(arrays((binding.bone_count, 4, 4), wild[13]), wild[13]))
     )
-    known = {"bone_transforms", "out", "threads", "bones_from_model", "rest_inverses"}
-    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0]], known)
+    parameters = data.draw(names(st.sampled_from([None, {}, {"sdef.interpolation": "slerp"}]), wild[14]))
+    if wild[14] and data.draw(st.booleans()):
+        keys = st.sampled_from(["sdef.interpolation", "sdef", "", "dq.interpolation", b"sdef", 3, None, (1,)])
+        parameters = {data.draw(keys): data.draw(GARBAGE)}
+    known = {"bone_transforms", "out", "threads", "bones_from_model", "rest_inverses", "parameters"}
+    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], parameters], known)
     if result is None:
         return
     assert result.shape == (binding.vertex_count, 3)
@@ -380,7 +384,7 @@ def test_meshes(data):
         given if array is None else np.array(array, dtype, order="C")
         for (given, array), dtype in zip((pose, space, inverses), types, strict=True)
     )
-    same(result, plain.deform(pose, None, 1, space, inverses))
+    same(result, plain.deform(pose, None, 1, space, inverses, parameters))
 
 
 SHEETS = {
@@ -437,6 +441,54 @@ def test_delta_mush(data):
         assert result.shape == (mush.vertex_count, 3)
         copy = pickle.loads(pickle.dumps(mush))
         same(result, copy.apply(posed, None, scale, 1))
+
+
+@many(0.1)
+@given(st.data())
+def test_bulge_limits(data):
+    vertices, bones = data.draw(st.sampled_from([0, 1, 2, 20])), data.draw(st.integers(1, 4))
+    each = data.draw(st.integers(0, 4))
+    wild = wild_one(data.draw, 14)
+    offsets = [each * vertex for vertex in range(vertices + 1)]
+    nothing = st.just((None, None))
+    given_data = [
+        data.draw(strategy)[0]
+        for strategy in (
+            or_garbage(arrays((vertices, 3), wild[0]), wild[0]),
+            or_garbage(integers(offsets, wild[1]), wild[1]),
+            or_garbage(integers([i % bones for i in range(vertices * each)], wild[2]), wild[2]),
+            or_garbage(arrays((vertices * each,), wild[3]).map(positive), wild[3]),
+            or_garbage(arrays((bones, 3), wild[4]), wild[4]),
+            or_garbage(arrays((bones, 3), wild[5]), wild[5]),
+            st.one_of(nothing, or_garbage(arrays((4, 4), wild[6]), wild[6])),
+            st.one_of(nothing, or_garbage(arrays((vertices,), wild[7]), wild[7])),
+        )
+    ]
+    known = {*MESH, "heads", "tails", "segments", "bones_from_model", "weights"}
+    limit = attempt(
+        lambda *given: sinew.BulgeLimit(*given[:6], bones_from_model=given[6], weights=given[7]),
+        given_data,
+        known,
+    )
+    if limit is None:
+        return
+    repr(limit)
+    other = data.draw(or_garbage(arrays((vertices, 3), wild[8]), wild[8]))[0]
+    attempt(lambda *given: limit.set_rest_points(*given) or True, [other], {"rest_points"})
+    posed = data.draw(or_garbage(arrays((vertices, 3), wild[9]), wild[9]))[0]
+    pose = data.draw(or_garbage(arrays((limit.bone_count, 4, 4), wild[10]), wild[10]))[0]
+    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[11]))
+    strength = data.draw(names(st.floats(0, 1), wild[12]))
+    form = data.draw(names(st.sampled_from(["continuous", "kim_han"]), wild[13]))
+    result = attempt(
+        lambda *given: limit.apply(*given[:3], strength=given[3], form=given[4]),
+        [posed, pose, out, strength, form],
+        {"points", "bone_transforms", "out", "strength", "form"},
+    )
+    if result is not None:
+        assert result.shape == (limit.vertex_count, 3)
+        copy = pickle.loads(pickle.dumps(limit))
+        same(result, copy.apply(posed, pose, strength=strength, form=form, threads=1))
 
 
 def positive(pair):

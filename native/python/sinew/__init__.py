@@ -8,6 +8,7 @@ sinew.interpolate, sinew.spline.
 from . import affine, dual_quat, interpolate, quat_vec, spline
 from ._native import (
     Binding,
+    BulgeLimit,
     Deformer,
     DeltaMush,
     Method,
@@ -23,6 +24,7 @@ from ._native import (
 
 __all__ = [
     "Binding",
+    "BulgeLimit",
     "Deformer",
     "DeltaMush",
     "Method",

@@ -102,7 +102,8 @@ def methods() -> tuple[Method, ...]:
     """Every skinning method, one Method each."""
 
 def stages() -> tuple[Stage, ...]:
-    """Every stage, one Stage each. `mix` is an argument of Deformer, `delta_mush` is DeltaMush."""
+    """Every stage, one Stage each. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit,
+    `delta_mush` is DeltaMush."""
 
 def keep_thread_state() -> None:
     """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and
@@ -280,6 +281,7 @@ class Deformer:
         threads: int | np.integer[Any] | None = None,
         bones_from_model: ArrayLike | None = None,
         rest_inverses: ArrayLike | None = None,
+        parameters: Mapping[str, float | bool | str] | None = None,
     ) -> NDArray[np.float32]:
         """The deformed points, float32 [vertices, 3], model space.
 
@@ -293,9 +295,73 @@ class Deformer:
             transforms, where the blending happens; the result is taken back. None: the same space.
         rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the posed
             bones, and each is multiplied by the inverse of its rest, in double.
+        parameters: a dict of values of parameters of methods by their full names, METHOD.PARAMETER, as the
+            Parameter says; one that is not here has its default. Those of methods that the deformer does
+            not use change nothing.
 
         A vertex without influences stays. The GIL is released for large meshes. Raises ValueError that
         names the argument, what was wanted and what came.
+        """
+
+@final
+class BulgeLimit:
+    """The stage `bulge_limit` of one mesh: takes deformed points back towards their bones where blending took
+    them farther away than they are at rest (Kim, Han 2014, and a continuous form). Can be pickled.
+    """
+
+    def __init__(
+        self,
+        rest_points: ArrayLike,
+        influence_offsets: ArrayLike,
+        influence_bones: ArrayLike,
+        influence_weights: ArrayLike,
+        heads: ArrayLike,
+        tails: ArrayLike,
+        *,
+        bones_from_model: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+    ) -> None:
+        """rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.
+        heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
+        bones_from_model: float32 [4, 4] or [3, 4], takes model space to that space. None: the same.
+        weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.
+
+        All input is copied. Raises ValueError that names the argument, what was wanted and what came.
+        """
+    @property
+    def vertex_count(self) -> int:
+        """Vertices of the mesh."""
+    @property
+    def bone_count(self) -> int:
+        """One more than the highest bone that an influence names."""
+    def set_rest_points(self, rest_points: ArrayLike, bones_from_model: ArrayLike | None = None) -> None:
+        """Other rest points, float32 [vertices, 3], or another space of the bones: distances at rest are
+        measured again, in about the time of apply()."""
+    def apply(
+        self,
+        points: ArrayLike,
+        bone_transforms: ArrayLike,
+        out: NDArray[np.float32] | None = None,
+        *,
+        strength: float = 1.0,
+        form: str = "continuous",
+        threads: int | np.integer[Any] | None = None,
+    ) -> NDArray[np.float32]:
+        """The limited points, float32 [vertices, 3], model space.
+
+        points: float32 [vertices, 3], deformed, model space.
+        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as of Deformer.deform().
+        out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never converted.
+            May be `points`.
+        strength: how much of the bulge is taken away, 0 to 1.
+        form: "continuous": distances to all bones of a vertex, by weight; "kim_han": to the heaviest alone,
+            which tears the surface where that changes.
+        threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The result
+            is the same bit for bit.
+
+        A vertex of fewer than two bones stays, as do all in the rest pose, to the bit. A bone that is scaled
+        allows as much more as it stretches what is perpendicular to it, at most. The GIL is released for
+        large meshes. Raises ValueError that names the argument, what was wanted and what came.
         """
 
 @final

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sinew/deform/deformer.h"
+#include "sinew/deform/packed_mesh.h"
 #include "sinew/skinning/influence.h"
 
 namespace sinew {
@@ -27,6 +28,13 @@ struct NormalisedInfluences {
     std::vector<std::uint32_t> offsets{0};  // [vertices + 1]
     std::vector<Influence<float>> influences;
 };
+
+/// What `mesh` was packed of, as far as points, weights and the highest bone are concerned.
+///
+/// rows        of `mesh`, or with other rest points
+/// bone_count  one more than the highest bone that was named; a bone named without weight is named so again
+[[nodiscard]] BoundMesh bound_mesh(const PackedMesh& mesh, std::span<const Lanes<float>> rows,
+                                   std::size_t vertex_count, std::size_t bone_count);
 
 /// data  checked
 [[nodiscard]] NormalisedInfluences normalised_influences(const BindData& data);

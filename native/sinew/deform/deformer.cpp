@@ -62,6 +62,18 @@ std::size_t checked_vertex_data(const VertexData& data, std::size_t vertex_count
     return index;
 }
 
+/// Of one method in one frame; one more than needed, as there may be none.
+using ParameterValues = std::array<double, kMaxMethodParameters + 1>;
+
+ParameterValues valid_values(const MethodInfo& method, std::span<const double> given) noexcept {
+    ParameterValues values{};
+    for (std::size_t i = 0; i < method.parameters.size(); ++i) {
+        const Parameter& parameter = method.parameters[i];
+        values[i] = i < given.size() ? valid_value(parameter, given[i]) : parameter.initial;
+    }
+    return values;
+}
+
 MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, std::size_t vertex_count) {
     if (weights.size() != vertex_count) {
         fail("mix", "a weight for each of the " + std::to_string(vertex_count) + " vertices",
@@ -119,21 +131,7 @@ Binding::Packed::Packed(const BindData& data) {
 }
 
 BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
-    const UnpackedMesh unpacked = sinew::unpack(mesh, rows, vertex_count);
-    BoundMesh bound{unpacked.rest_points, {}, {}, {}, {}, {}};
-    bound.influence_offsets.assign(unpacked.offsets.begin(), unpacked.offsets.end());
-    for (const auto& [bone, weight] : unpacked.influences) {
-        bound.influence_bones.push_back(bone);
-        bound.influence_weights.push_back(weight);
-    }
-    const std::size_t named =
-        mesh.used_bones.empty() ? 0 : static_cast<std::size_t>(mesh.used_bones.back()) + 1;
-    if (named < bone_count) {
-        // Named without weight, and dropped: of the last vertex, which takes it without weight.
-        bound.influence_bones.push_back(static_cast<std::int32_t>(bone_count) - 1);
-        bound.influence_weights.push_back(0.0f);
-        ++bound.influence_offsets.back();
-    }
+    BoundMesh bound = bound_mesh(mesh, rows, vertex_count, bone_count);
     for (std::size_t i = 0; i < kMethodCount; ++i) {
         if (vertex_rows[i].empty()) continue;
         bound.vertex_data.push_back(
@@ -256,6 +254,9 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         write_displacement(transform, bones_from_model.data());
         write_displacement(inverse(transform), model_from_bones.data());
     }
+    const std::array<ParameterValues, 2> parameters{
+        valid_values(kMethods[state_->methods[0]], options.parameters),
+        valid_values(kMethods[state_->methods[1]], options.mix_parameters)};
     struct Work {
         const State& state;
         std::array<Frame, 2> frames;
@@ -279,6 +280,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                           &palette,
                           changes_space ? bones_from_model.data() : nullptr,
                           changes_space ? model_from_bones.data() : nullptr,
+                          parameters[k].data(),
                           points.data()};
     }
     const std::size_t threads = options.threads > 0

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -14,12 +15,13 @@
 #include "sinew/skinning/log.h"
 #include "sinew/skinning/qv.h"
 #include "sinew/skinning/sbs.h"
+#include "sinew/skinning/sdef.h"
 
 namespace sinew {
 
 /// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
 /// line and panel are made from it.
-using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sbs, Log, IterativeDq>;
+using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sdef, Sbs, Log, IterativeDq>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
@@ -32,6 +34,12 @@ constexpr void for_each_method(const Call& call) {
 /// The facts of each method.
 inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
     std::apply([](const auto&... methods) { return std::array{methods.info...}; }, Methods{});
+
+/// The most parameters that a method has.
+inline constexpr std::size_t kMaxMethodParameters =
+    std::ranges::max(kMethods, {}, [](const MethodInfo& method) {
+        return method.parameters.size();
+    }).parameters.size();
 
 /// The index of `method` in the list, or kMethodCount.
 [[nodiscard]] constexpr std::size_t index_of(const MethodInfo& method) noexcept {

@@ -3,12 +3,13 @@
 
 #include <array>
 
+#include "sinew/skinning/bulge_limit.h"
 #include "sinew/skinning/delta_mush.h"
 #include "sinew/skinning/mix.h"
 
 namespace sinew {
 
 /// THE list of stages: what may follow a method, in the order in which they do.
-inline constexpr std::array kStages{Mix::info, DeltaMushStage::info};
+inline constexpr std::array kStages{Mix::info, BulgeLimitStage::info, DeltaMushStage::info};
 
 }  // namespace sinew

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The stage `bulge_limit` on lanes: see skinning/bulge_limit.h for what it computes.
+// This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include "sinew/deform/bulge_kernel.h"
+
+#include <array>
+
+#include "sinew/deform/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sinew/deform/bulge_kernel.cpp"
+#include "hwy/foreach_target.h"
+//
+#include "hwy/highway.h"
+#include "sinew/deform/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+template <class D>
+HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
+    const Block& block = from.blocks[b];
+    const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
+    constexpr std::size_t kMax = hn::MaxLanes(D());
+    if constexpr (kMax == 1) {
+        const Vec3<float>& point = from.points[*vertices];
+        return {hn::Set(d, point.x), hn::Set(d, point.y), hn::Set(d, point.z)};
+    } else {
+        Points<D> points;
+        if (block.consecutive) {
+            hn::LoadInterleaved3(d, &from.points[block.output + lane].x, points.x, points.y, points.z);
+            return points;
+        }
+        alignas(64) float numbers[3][kMax];
+        for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+            const Vec3<float>& point = from.points[vertices[i]];
+            numbers[0][i] = point.x;
+            numbers[1][i] = point.y;
+            numbers[2][i] = point.z;
+        }
+        return {hn::Load(d, numbers[0]), hn::Load(d, numbers[1]), hn::Load(d, numbers[2])};
+    }
+}
+
+/// From `p` to the nearest point of the bone's segment.
+template <class D>
+HWY_INLINE Points<D> to_segment(D d, const BulgeBone& bone, const Points<D>& p) {
+    const float* const head = bone.head.value.data();
+    const float* const along = bone.along.value.data();
+    const float* const per_length = bone.per_length.value.data();
+    const Points<D> u{hn::Sub(p.x, hn::Set(d, head[0])), hn::Sub(p.y, hn::Set(d, head[1])),
+                      hn::Sub(p.z, hn::Set(d, head[2]))};
+    const Vec<D> share =
+        hn::MulAdd(u.x, hn::Set(d, per_length[0]),
+                   hn::MulAdd(u.y, hn::Set(d, per_length[1]), hn::Mul(u.z, hn::Set(d, per_length[2]))));
+    const Vec<D> t = hn::Min(hn::Max(share, hn::Zero(d)), hn::Set(d, 1.0f));
+    return {hn::MulSub(t, hn::Set(d, along[0]), u.x), hn::MulSub(t, hn::Set(d, along[1]), u.y),
+            hn::MulSub(t, hn::Set(d, along[2]), u.z)};
+}
+
+template <class D>
+HWY_INLINE Vec<D> squared_length(const Points<D>& v) {
+    return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z)));
+}
+
+/// The bones and weights of the lanes: bone_of(k), and weight_of(k) of one.
+template <BulgeForm kForm, class D, class BoneOf, class WeightOf>
+HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::size_t lane, std::size_t count,
+                             const BoneOf& bone_of, const WeightOf& weight_of, const Points<D>& point,
+                             bool& changes) {
+    Points<D> p = point;
+    if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
+    Points<D> to_bones{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    Vec<D> stretched = hn::Zero(d);
+    Vec<D> most = hn::Zero(d);
+    for (std::size_t k = 0; k < count; ++k) {
+        const BulgeBone& bone = bone_of(k);
+        const Vec<D> weight = weight_of(k);
+        const Points<D> to = to_segment(d, bone, p);
+        const Vec<D> stretch = hn::Set(d, bone.head.value[3]);
+        if constexpr (kForm == BulgeForm::continuous) {
+            to_bones = add_scaled<D>(to_bones, weight, to);
+            stretched = hn::MulAdd(weight, stretch, stretched);
+        } else {
+            const auto heavier = hn::Gt(weight, most);
+            most = hn::Max(weight, most);
+            to_bones = {hn::IfThenElse(heavier, to.x, to_bones.x), hn::IfThenElse(heavier, to.y, to_bones.y),
+                        hn::IfThenElse(heavier, to.z, to_bones.z)};
+            stretched = hn::IfThenElse(heavier, stretch, stretched);
+        }
+    }
+    const float* const distances = frame.distances[b].of[static_cast<std::size_t>(kForm)].lane.data() + lane;
+    const Vec<D> allowed = hn::Mul(hn::Load(d, distances), stretched);
+    const Vec<D> squared = squared_length(to_bones);
+    const auto bulges = hn::Gt(squared, hn::Mul(allowed, allowed));
+    changes = !hn::AllFalse(d, bulges);
+    if (!changes) return point;
+    Vec<D> amount = hn::Set(d, frame.strength);
+    if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
+    const Vec<D> less = hn::Sub(hn::Set(d, 1.0f), hn::Div(allowed, hn::Sqrt(squared)));
+    const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
+    if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
+    const float* const rows = frame.model_from_bones->value.data();
+    // A vector, which has no translation.
+    const auto rotated = [&](const float* row, Vec<D> of) HWY_ATTR {
+        return hn::MulAdd(
+            hn::Set(d, row[0]), to_bones.x,
+            hn::MulAdd(hn::Set(d, row[1]), to_bones.y, hn::MulAdd(hn::Set(d, row[2]), to_bones.z, of)));
+    };
+    return add_scaled<D>(
+        point, share,
+        {rotated(rows, to_bones.x), rotated(rows + 4, to_bones.y), rotated(rows + 8, to_bones.z)});
+}
+
+/// Blocks [begin, end), which have the same bones: two or more.
+///
+/// kCount  their influences, or 0 for any number
+template <BulgeForm kForm, std::size_t kCount>
+void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t begin, std::size_t end) {
+    const Full d;
+    const Block& first = pointers.blocks[begin];
+    const std::int32_t* const bones = frame.mesh->bones.data() + first.first_bone;
+    const std::size_t count = kCount > 0 ? kCount : first.influences;
+    for (std::size_t b = begin; b < end; ++b) {
+        const float* const rows = pointers.rows[pointers.blocks[b].first_row].lane.data();
+        const float* const first_weights = frame.mesh->first_weights[b].lane.data();
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            bool changes = false;
+            const Points<Full> points = limited<kForm>(
+                d, frame, b, lane, count,
+                [&](std::size_t k) -> const BulgeBone& {
+                    return frame.bones[static_cast<std::size_t>(bones[k])];
+                },
+                [&](std::size_t k) HWY_ATTR {
+                    return hn::Load(d, (k == 0 ? first_weights : rows + kLanes * (2 + k)) + lane);
+                },
+                load_deformed(d, pointers, b, lane), changes);
+            if (changes) store_points(d, pointers, b, lane, points);
+        }
+    }
+}
+
+/// A block whose vertices have bones of their own, one by one.
+template <BulgeForm kForm>
+void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t b) {
+    const One d;
+    const Block& block = pointers.blocks[b];
+    if (block.influences < 2) return;
+    const float* const rows = pointers.rows[block.first_row].lane.data();
+    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const float* const weights = rows + 3 * kLanes + lane;
+        if (!(weights[kLanes] > 0.0f)) continue;
+        const std::int32_t* const bones =
+            frame.mesh->bones.data() + block.first_bone + block.influences * lane;
+        bool changes = false;
+        const Points<One> points = limited<kForm>(
+            d, frame, b, lane, block.influences,
+            [&](std::size_t k) -> const BulgeBone& {
+                return frame.bones[static_cast<std::size_t>(bones[k])];
+            },
+            [&](std::size_t k) HWY_ATTR { return hn::Load(d, weights + kLanes * k); },
+            load_deformed(d, pointers, b, lane), changes);
+        if (changes) store_points(d, pointers, b, lane, points);
+    }
+}
+
+std::size_t end_of_same_bones(const PackedMesh& mesh, std::size_t b, std::size_t end) {
+    const Block* const blocks = mesh.blocks.data();
+    std::size_t after = b + 1;
+    while (after < end && !blocks[after].mixed && blocks[after].first_bone == blocks[b].first_bone &&
+           blocks[after].influences == blocks[b].influences) {
+        ++after;
+    }
+    return after;
+}
+
+MeshPointers pointers_of(const BulgeFrame& frame) {
+    const PackedMesh& mesh = *frame.mesh;
+    return {mesh.blocks.data(),   mesh.rows.data(), nullptr,
+            mesh.vertices.data(), mesh.runs.data(), frame.points};
+}
+
+template <BulgeForm kForm>
+void limit_blocks(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
+    const MeshPointers pointers = pointers_of(frame);
+    for (std::size_t b = begin; b < end;) {
+        const Block& block = pointers.blocks[b];
+        if (block.mixed) {
+            limit_mixed<kForm>(frame, pointers, b++);
+            continue;
+        }
+        const std::size_t after = end_of_same_bones(*frame.mesh, b, end);
+        switch (block.influences) {
+            case 0:
+            case 1: break;
+            case 2: limit_set<kForm, 2>(frame, pointers, b, after); break;
+            case 3: limit_set<kForm, 3>(frame, pointers, b, after); break;
+            case 4: limit_set<kForm, 4>(frame, pointers, b, after); break;
+            default: limit_set<kForm, 0>(frame, pointers, b, after);
+        }
+        b = after;
+    }
+}
+
+void limit(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
+    frame.form == BulgeForm::continuous ? limit_blocks<BulgeForm::continuous>(frame, begin, end)
+                                        : limit_blocks<BulgeForm::kim_han>(frame, begin, end);
+}
+
+void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    constexpr auto kAllowance = static_cast<float>(BulgeLimitStage::kAllowance);
+    for (std::size_t b = begin; b < end; ++b) {
+        const Block& block = pointers.blocks[b];
+        const float* const rows = pointers.rows[block.first_row].lane.data();
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const std::int32_t* const bones =
+                frame.mesh->bones.data() + block.first_bone + (block.mixed ? block.influences * lane : 0);
+            Points<One> p = load_deformed(d, pointers, b, lane);
+            if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
+            float mean = 0.0f;
+            float of_heaviest = 0.0f;
+            float most = 0.0f;
+            for (std::size_t k = 0; k < block.influences; ++k) {
+                const float weight = block.mixed ? rows[kLanes * (3 + k) + lane]
+                                     : k == 0    ? frame.mesh->first_weights[b].lane[lane]
+                                                 : rows[kLanes * (2 + k) + lane];
+                const auto to = to_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
+                const float distance = hn::GetLane(hn::Sqrt(squared_length(to)));
+                mean += weight * distance;
+                if (weight > most) of_heaviest = distance;
+                most = weight > most ? weight : most;
+            }
+            frame.distances[b].of[0].lane[lane] = kAllowance * mean;
+            frame.distances[b].of[1].lane[lane] = kAllowance * of_heaviest;
+        }
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace sinew {
+namespace {
+
+using OfBlocks = void(const BulgeFrame& frame, std::size_t begin, std::size_t end);
+constexpr std::array<OfBlocks*, kTargetCount> kLimit SINEW_TARGETS_OF(limit);
+constexpr std::array<OfBlocks*, kTargetCount> kMeasure SINEW_TARGETS_OF(measure);
+
+}  // namespace
+
+BulgeKernel bulge_kernel() noexcept {
+    const std::size_t target = target_in_use();
+    return {kLimit[target], kMeasure[target]};
+}
+
+BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcept {
+    const Vec3<double>& head = segment.head;
+    const Vec3<double> along = segment.tail - head;
+    const double squared = glm::dot(along, along);
+    const Vec3<double> per_length = squared > 0.0 ? along / squared : Vec3<double>(0.0);
+    return {float4(head.x, head.y, head.z, stretch), float4(along.x, along.y, along.z, 0.0),
+            float4(per_length.x, per_length.y, per_length.z, 0.0)};
+}
+
+}  // namespace sinew
+
+#endif

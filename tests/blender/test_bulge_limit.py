@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stage bulge_limit: the oracle is the float64 reference, on the shape before it and Blender's poses."""
+
+from __future__ import annotations
+
+import sys
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+from conftest import REPOSITORY
+from sinew_addon.attach import attach, properties
+from sinew_addon.core.bulge_limit import segments
+from sinew_addon.deform import session
+from sinew_addon.io import files
+from test_methods_against_reference import weights_of
+
+sys.path.append(str(REPOSITORY / "tests" / "python"))
+import bulge_limit_reference
+
+
+def limit(obj: bpy.types.Object, **values: object) -> None:
+    stage = properties.of(obj).bulge_limit
+    for name, value in values.items():
+        setattr(stage, name, value)
+    stage.enabled = True
+
+
+def expected_points(
+    obj: bpy.types.Object,
+    before: np.ndarray,
+    rest: np.ndarray | None = None,
+    mask: np.ndarray | None = None,
+    **options: object,
+) -> np.ndarray:
+    """The limit by float64 in this frame.
+
+    before  float32 [vertices, 3], the shape without the stage, object space
+    rest    the same of the rest shape; None: the mesh's points
+    """
+    armature = attach.armature_of(obj)
+    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
+    heads = np.array([bone.head_local[:] for bone in armature.data.bones])
+    tails = np.array([bone.tail_local[:] for bone in armature.data.bones])
+    to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
+
+    def moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+    rest = scenes.rest_points(obj) if rest is None else rest
+    of = (moved(to_armature, before), moved(to_armature, rest), *weights_of(obj), heads, tails, motions)
+    return moved(np.linalg.inv(to_armature), bulge_limit_reference.limit(*of, mask=mask, **options))
+
+
+def assert_limited(obj: bpy.types.Object, before: np.ndarray, **options: object) -> None:
+    found, expected = scenes.final_points(obj), expected_points(obj, before, **options)
+    assert np.abs(expected - before).max() > 0.005
+    assert scenes.worst(found, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.fixture(params=routes.ROUTES)
+def route(request):
+    routes.force(request.param)
+    yield request.param
+    routes.release()
+
+
+def bent_arm(method: str = "dq") -> tuple[bpy.types.Object, np.ndarray]:
+    """At frame 11, and its shape there without the stage."""
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, method)
+    bpy.context.scene.frame_set(11)
+    return obj, scenes.final_points(obj)
+
+
+@pytest.mark.parametrize("method", ["dq", "cor"])
+@pytest.mark.parametrize("form", ["continuous", "kim_han"])
+def test_a_bent_arm_has_the_shape_of_the_reference(form, method, route):
+    obj, before = bent_arm(method)
+    limit(obj, form=form, strength=0.75)
+    assert_limited(obj, before, form=form, strength=0.75)
+    bpy.context.scene.frame_set(1)
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) < 1e-7
+    bpy.context.scene.frame_set(11)
+    assert_limited(obj, before, form=form, strength=0.75)
+    assert routes.taken(obj, 0) == route
+
+
+def test_a_vertex_group_says_where(route):
+    obj, _before = bent_arm()
+    group = obj.vertex_groups.new(name="where")
+    for vertex in obj.data.vertices:
+        if vertex.co.y > 0.0:
+            group.add([vertex.index], 0.8, "REPLACE")
+    bpy.context.scene.frame_set(10)
+    before = scenes.final_points(obj)
+    limit(obj, group="where")
+    found = scenes.final_points(obj)
+    obj.vertex_groups.remove(group)
+    mask = np.where(scenes.rest_points(obj)[:, 1] > 0.0, 0.8, 0.0)
+    expected = expected_points(obj, before, mask=mask)
+    assert scenes.worst(found, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    np.testing.assert_array_equal(found[mask == 0.0], before[mask == 0.0])
+    assert np.abs(found - before).max() > 0.005
+
+
+def test_a_mesh_that_lies_elsewhere_and_moves(route):
+    obj, armature = scenes.make_arm(bones=3)
+    obj.location, obj.rotation_euler = (0.4, -1.0, 0.3), (0.2, 0.5, 0.1)
+    armature.location = (1.0, 2.0, -0.5)
+    for frame, height in ((8, 0.3), (11, 0.6)):
+        obj.location.z = height
+        obj.keyframe_insert("location", frame=frame)
+    scenes.add_sinew(obj, "dq")
+    before = dict(zip((8, 11), scenes.shapes(obj, [8, 11]), strict=True))
+    limit(obj)
+    for frame in (11, 8):
+        bpy.context.scene.frame_set(frame)
+        assert_limited(obj, before[frame])
+
+
+def test_shape_keys_may_bulge(route):
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.key_shape(obj)
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    before = scenes.final_points(obj)
+    limit(obj)
+    # The key lifts all vertices by 0.2.
+    assert_limited(obj, before, rest=scenes.rest_points(obj) + np.float32([0.0, 0.0, 0.2]))
+
+
+def test_keys_of_its_strength_are_followed():
+    obj, before = bent_arm()
+    limit(obj)
+    stage = properties.of(obj).bulge_limit
+    for frame, strength in ((9, 0.0), (11, 1.0)):
+        stage.strength = strength
+        stage.keyframe_insert("strength", frame=frame)
+    bpy.context.scene.frame_set(9)
+    stage.enabled = False
+    at_9 = scenes.final_points(obj)
+    stage.enabled = True
+    np.testing.assert_array_equal(scenes.final_points(obj), at_9)
+    bpy.context.scene.frame_set(11)
+    assert_limited(obj, before)
+
+
+def test_a_masked_modifier_leaves_its_vertices_alone():
+    obj, _armature = scenes.make_arm(bones=3)
+    group = obj.vertex_groups.new(name="mask")
+    group.add([v.index for v in obj.data.vertices if v.co.x > 1.5], 1.0, "REPLACE")
+    obj.modifiers["Armature"].vertex_group = "mask"
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    before = scenes.final_points(obj)
+    limit(obj)
+    found, still = scenes.final_points(obj), scenes.rest_points(obj)[:, 0] <= 1.5
+    np.testing.assert_array_equal(found[still], scenes.rest_points(obj)[still])
+    assert np.abs(found - before).max() > 0.005
+
+
+def test_bendy_bones_are_limited_along_their_curve():
+    obj, armature = scenes.make_arm(bones=2)
+    armature.data.bones[0].bbone_segments = 4
+    scenes.add_sinew(obj, "lbs")
+    armature.pose.bones[0].bbone_curveoutx = 0.4
+    bpy.context.scene.frame_set(11)
+    before = scenes.final_points(obj)
+    bones = session.state_of(obj).bound.binding.bones
+    heads, tails = segments(bones)
+    first = bones.first_joints[0]
+    along = np.linspace(0.0, 1.0, 5)
+    np.testing.assert_allclose(heads[first : first + 5, 0], [0.0, *along[:-1]], atol=1e-6)
+    np.testing.assert_allclose(tails[first : first + 5, 0], [*along[1:], 1.0], atol=1e-6)
+    limit(obj)
+    # Linear blending loses volume: nothing is far from its bones but where the curve ends.
+    found = scenes.final_points(obj)
+    assert np.isfinite(found).all()
+    assert np.abs(found - before).max() < 0.1
+    bpy.context.scene.frame_set(1)
+    armature.pose.bones[0].bbone_curveoutx = 0.0
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), scenes.rest_points(obj)) < 1e-5
+
+
+def elbow_bulge(obj: bpy.types.Object, points: np.ndarray) -> float:
+    """How much farther from the nearest posed bone of the arms than from the nearest at rest the vertices of
+    two bones are at most; radii of the elbow."""
+    armature = attach.armature_of(obj)
+    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
+    worst = 0.0
+    offsets, bones, weights = weights_of(obj)
+    names = [bone.name for bone in armature.data.bones]
+    rest = scenes.rest_points(obj) @ to_armature[:3, :3].T + to_armature[:3, 3]
+    posed = points @ to_armature[:3, :3].T + to_armature[:3, 3]
+    for upper, lower in elbows(armature):
+        pair = [names.index(upper), names.index(lower)]
+        chosen = [
+            v
+            for v in range(len(rest))
+            if {
+                b
+                for b, w in zip(
+                    bones[offsets[v] : offsets[v + 1]], weights[offsets[v] : offsets[v + 1]], strict=True
+                )
+                if w > 0.05
+            }
+            == set(pair)
+        ]
+        apart = []
+        for ends, at in (
+            ([(b.head_local, b.tail_local) for b in (armature.data.bones[i] for i in pair)], rest),
+            ([(b.head, b.tail) for b in (evaluated.pose.bones[names[i]] for i in pair)], posed),
+        ):
+            lines = [(np.array(head), np.array(tail)) for head, tail in ends]
+            apart.append(
+                [
+                    min(np.linalg.norm(at[v] - bulge_limit_reference.nearest(*line, at[v])) for line in lines)
+                    for v in chosen
+                ]
+            )
+        worst = max(worst, max(apart[1]) / max(apart[0]))
+    return float(worst)
+
+
+def elbows(armature: bpy.types.Object) -> list[tuple[str, str]]:
+    """Upper and lower arms by their names."""
+    lower = [b for b in armature.data.bones if "forearm" in b.name.lower() or "lowerarm" in b.name.lower()]
+    return [(bone.parent.name, bone.name) for bone in lower if bone.parent is not None]
+
+
+def test_no_elbow_of_a_real_rig_bulges(real_rig):
+    files.open_file(real_rig("human.blend"))
+    (obj,) = attach.deformed_meshes(list(bpy.context.scene.objects))
+    scenes.add_sinew(obj, "cor")
+    bpy.context.scene.frame_set(16)
+    assert elbows(attach.armature_of(obj))
+    before = elbow_bulge(obj, scenes.final_points(obj))
+    limit(obj)
+    after = elbow_bulge(obj, scenes.final_points(obj))
+    print(f"elbows of {real_rig('human.blend').name}: {before:.3f} without, {after:.3f} with the limit")
+    assert after <= 1.03

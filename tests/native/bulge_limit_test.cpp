@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/deform/bulge_limit.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "scene.h"
+#include "sinew/deform/simd.h"
+
+namespace sinew {
+namespace {
+
+using test::deformed;
+using test::distance;
+using test::is_finite;
+using test::kTolerance;
+using test::Random;
+using test::random_scene;
+using test::Scene;
+
+/// Many vertices with the same bones, then some of one to eight.
+Scene scene_of_sets(std::uint32_t seed) {
+    Random random(seed);
+    Scene scene = random_scene(seed, 0, 1.0);
+    for (int i = 0; i < 600; ++i) {
+        const auto count = static_cast<std::size_t>(1 + i % 6);
+        auto influences = random.influences<float>(count, 12);
+        for (std::size_t k = 0; k < count; ++k)
+            influences[k].bone = static_cast<std::int32_t>((i % 6 + k) % 12);
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+    }
+    for (int i = 0; i < 100; ++i) {
+        const auto count = static_cast<std::size_t>(1 + random.index(8));
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), random.influences<float>(count, 12));
+    }
+    return scene;
+}
+
+std::vector<BoneSegment<float>> segments_of(const Scene& scene) {
+    Random random(99);
+    std::vector<BoneSegment<float>> segments;
+    for (const Affine<float>& bone : scene.rest_bones) {
+        segments.push_back({bone.translation, bone.translation + Vec3<float>(random.vector(0.5))});
+    }
+    return segments;
+}
+
+std::vector<Vec3<float>> bulging(const Scene& scene) {
+    std::vector<Vec3<float>> points = deformed(Deformer(scene.data(), Dq::info), scene);
+    for (Vec3<float>& point : points) point *= 1.3f;
+    return points;
+}
+
+/// By the definition in double.
+std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<BoneSegment<float>>& segments,
+                                        const std::vector<Vec3<float>>& points, BulgeForm form,
+                                        double strength) {
+    std::vector<BoneSegment<double>> rest_segments;
+    std::vector<BulgeLimitStage::Bone<double>> bones;
+    for (std::size_t bone = 0; bone < segments.size(); ++bone) {
+        const BoneSegment<double> rest{Vec3<double>(segments[bone].head), Vec3<double>(segments[bone].tail)};
+        const auto motion = cast<double>(scene.posed_from_rest[bone]);
+        rest_segments.push_back(rest);
+        bones.push_back({{transform_point(motion, rest.head), transform_point(motion, rest.tail)},
+                         BulgeLimitStage::stretch(motion.linear, rest)});
+    }
+    std::vector<Vec3<double>> result;
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        const auto begin = static_cast<std::size_t>(scene.offsets[vertex]);
+        const auto end = static_cast<std::size_t>(scene.offsets[vertex + 1]);
+        double sum = 0.0;
+        for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(scene.weights[i]);
+        std::vector<Influence<double>> influences;
+        for (std::size_t i = begin; i < end; ++i) {
+            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i]) / sum});
+        }
+        const double apart = BulgeLimitStage::rest_distance<double>(form, rest_segments, influences,
+                                                                    Vec3<double>(scene.rest_points[vertex]));
+        result.push_back(BulgeLimitStage::deform_vertex<double>(form, bones, influences, apart, strength,
+                                                                Vec3<double>(points[vertex])));
+    }
+    return result;
+}
+
+class LimitBulge : public testing::TestWithParam<std::string_view> {
+protected:
+    LimitBulge() { use_simd_target(GetParam()); }
+    ~LimitBulge() override { use_simd_target(simd_targets().front()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, LimitBulge, testing::ValuesIn(simd_targets()),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST_P(LimitBulge, kernel_agrees_with_the_definition) {
+    for (const std::uint32_t seed : {1u, 2u, 3u}) {
+        const Scene scene = scene_of_sets(seed);
+        const auto segments = segments_of(scene);
+        const BulgeLimit limit({scene.data(), segments});
+        for (const BulgeForm form : {BulgeForm::continuous, BulgeForm::kim_han}) {
+            const auto before = bulging(scene);
+            auto points = before;
+            limit.apply(points, scene.posed_from_rest, {form, 0.75f});
+            const auto expected = by_definition(scene, segments, before, form, 0.75);
+            std::size_t changed = 0;
+            for (std::size_t i = 0; i < points.size(); ++i) {
+                ASSERT_LT(distance(Vec3<double>(points[i]), expected[i]), 20.0 * kTolerance) << i;
+                changed += points[i] != before[i] ? 1 : 0;
+            }
+            EXPECT_GT(changed, points.size() / 5);
+        }
+    }
+}
+
+TEST_P(LimitBulge, threads_change_no_bit_and_the_rest_pose_stays) {
+    const Scene scene = scene_of_sets(4);
+    const auto segments = segments_of(scene);
+    const BulgeLimit limit({scene.data(), segments});
+    for (const BulgeForm form : {BulgeForm::continuous, BulgeForm::kim_han}) {
+        auto one = bulging(scene);
+        auto many = one;
+        limit.apply(one, scene.posed_from_rest, {form, 1.0f, 1});
+        limit.apply(many, scene.posed_from_rest, {form, 1.0f, 5});
+        EXPECT_TRUE(one == many);
+        auto rest = scene.rest_points;
+        // Without a pose all bones stay at rest.
+        limit.apply(rest, {}, {form});
+        EXPECT_TRUE(rest == scene.rest_points);
+    }
+}
+
+TEST(BulgeLimit, what_it_was_made_of_makes_it_anew) {
+    const Scene scene = scene_of_sets(5);
+    const auto segments = segments_of(scene);
+    std::vector<float> weights(scene.rest_points.size(), 0.5f);
+    weights[3] = 7.0f;
+    const BulgeLimit limit({scene.data(), segments, {}, weights});
+    const BulgeLimit::Parts parts = limit.parts();
+    const BulgeLimit again({parts.mesh.data(), parts.segments, parts.bones_from_model, parts.weights});
+    EXPECT_EQ(again.bone_count(), limit.bone_count());
+    auto points = bulging(scene);
+    auto others = points;
+    limit.apply(points, scene.posed_from_rest);
+    again.apply(others, scene.posed_from_rest);
+    EXPECT_TRUE(points == others);
+}
+
+TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
+    const Scene scene = scene_of_sets(6);
+    const auto segments = segments_of(scene);
+    const BulgeLimit limit({scene.data(), segments});
+    const auto before = bulging(scene);
+    const auto by = [&](float strength) {
+        auto points = before;
+        limit.apply(points, scene.posed_from_rest, {BulgeForm::continuous, strength});
+        return points;
+    };
+    EXPECT_TRUE(by(-1.0f) == before);
+    EXPECT_TRUE(by(5.0f) == by(1.0f));
+    EXPECT_TRUE(by(std::numeric_limits<float>::quiet_NaN()) == by(1.0f));
+    std::vector<Vec3<float>> few(3, Vec3<float>(9.0f));
+    limit.apply(few, scene.posed_from_rest);
+    EXPECT_TRUE(few == std::vector<Vec3<float>>(3, Vec3<float>(9.0f)));
+}
+
+TEST(BulgeLimit, wrong_data_is_refused) {
+    const Scene scene = scene_of_sets(7);
+    auto segments = segments_of(scene);
+    const auto refused = [&](const BulgeLimitData& data) -> std::string {
+        try {
+            const BulgeLimit limit(data);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_EQ(refused({scene.data(), std::span(segments).first(2)}),
+              "segments: expected at least 12 bones, got 2");
+    segments[1].tail.y = std::numeric_limits<float>::infinity();
+    EXPECT_EQ(refused({scene.data(), segments}),
+              "segments: expected finite values, got NaN or infinity at bone 1");
+    segments = segments_of(scene);
+    EXPECT_EQ(refused({scene.data(), segments, {Mat3<float>(0.0f), Vec3<float>(0.0f)}}),
+              "bones_from_model: expected an invertible transform, got one of determinant 0");
+    const std::vector<float> weights(3);
+    EXPECT_EQ(refused({scene.data(), segments, {}, weights}),
+              "weights: expected none, or one for each of the 700 vertices, got 3");
+}
+
+}  // namespace
+}  // namespace sinew

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Limit Bulge against its formula in float64, and what it does to a bent tube."""
+
+import pickle
+
+import bulge_limit_reference
+import numpy as np
+import pytest
+import sinew
+from rigs import about, random_motion, random_rig, transform, translation
+from test_deformer import TOLERANCE
+
+FORMS = ("continuous", "kim_han")
+every_form = pytest.mark.parametrize("form", FORMS)
+
+
+def bones_of(rig, seed=1):
+    """Heads and tails in the rig's size; the last bone is a point."""
+    rng = np.random.default_rng(seed)
+    heads = rng.uniform(-1.0, 1.0, (len(rig.transforms), 3)).astype(np.float32)
+    tails = heads + rng.uniform(-0.5, 0.5, heads.shape).astype(np.float32)
+    tails[-1] = heads[-1]
+    return heads, tails
+
+
+@every_form
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+@pytest.mark.parametrize("most", [2, 12])
+def test_agrees_with_the_reference(form, scaled, most):
+    rig = random_rig(1, vertices=400, most_influences=most, scaled=scaled)
+    heads, tails = bones_of(rig)
+    points = rig.deform("dq") * np.float32(1.3)
+    mask = np.linspace(-0.5, 1.5, len(points)).astype(np.float32)
+    limit = sinew.BulgeLimit(*rig.mesh, heads, tails, weights=mask)
+    got = limit.apply(points, rig.transforms, form=form, strength=0.8)
+    expected = bulge_limit_reference.limit(points, *rig.mesh, heads, tails, rig.transforms, 0.8, form, mask)
+    assert (np.abs(expected - points).max(axis=1) > 0.01).mean() > 0.1
+    np.testing.assert_allclose(got, expected, atol=10 * TOLERANCE)
+
+
+@every_form
+def test_bones_may_have_another_space(form):
+    rig = random_rig(2, vertices=200, most_influences=4)
+    heads, tails = bones_of(rig)
+    bones_from_model = random_motion(np.random.default_rng(3), 2.0) @ np.diag([2.0, 2.0, 2.0, 1.0])
+    back = np.linalg.inv(bones_from_model)
+    points = rig.deform("dq") * np.float32(1.3)
+    rest, moved = (
+        transform(back, p.astype(np.float64)).astype(np.float32) for p in (rig.rest_points, points)
+    )
+    here = sinew.BulgeLimit(*rig.mesh, heads, tails).apply(points, rig.transforms, form=form)
+    limit = sinew.BulgeLimit(rest, *rig.mesh[1:], heads, tails, bones_from_model=bones_from_model)
+    there = limit.apply(moved, rig.transforms, form=form)
+    np.testing.assert_allclose(transform(bones_from_model, there), here, atol=20 * TOLERANCE)
+    again = sinew.BulgeLimit(*rig.mesh, heads, tails)
+    again.set_rest_points(rest, bones_from_model)
+    np.testing.assert_array_equal(again.apply(moved, rig.transforms, form=form), there)
+
+
+@every_form
+def test_other_rest_points_are_as_if_bound_to_them(form):
+    rig = random_rig(4)
+    heads, tails = bones_of(rig)
+    points = rig.deform("dq") * np.float32(1.3)
+    other = rig.rest_points * np.float32(0.5)
+    limit = sinew.BulgeLimit(*rig.mesh, heads, tails)
+    limit.set_rest_points(other)
+    expected = sinew.BulgeLimit(other, *rig.mesh[1:], heads, tails).apply(points, rig.transforms, form=form)
+    np.testing.assert_array_equal(limit.apply(points, rig.transforms, form=form), expected)
+
+
+@every_form
+def test_rest_poses_and_rigid_motions_change_nothing(form):
+    rig = random_rig(5)
+    limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig))
+    identity = np.tile(np.eye(4, dtype=np.float32), (len(rig.transforms), 1, 1))
+    np.testing.assert_array_equal(limit.apply(rig.rest_points, identity, form=form), rig.rest_points)
+    motion = random_motion(np.random.default_rng(6)).astype(np.float32)
+    moved = transform(motion, rig.rest_points).astype(np.float32)
+    alike = np.tile(motion, (len(rig.transforms), 1, 1))
+    np.testing.assert_allclose(limit.apply(moved, alike, form=form), moved, atol=TOLERANCE)
+
+
+@every_form
+def test_vertices_of_one_bone_and_scaled_bones_keep_their_place(form):
+    single = random_rig(7, most_influences=1, scaled=True)
+    limit = sinew.BulgeLimit(*single.mesh, *bones_of(single))
+    points = single.deform("lbs")
+    np.testing.assert_array_equal(limit.apply(points, single.transforms, form=form), points)
+    # All bones scaled alike: the limit grows with them.
+    rig = random_rig(8)
+    larger = np.tile(np.diag([2.0, 2.0, 2.0, 1.0]).astype(np.float32), (len(rig.transforms), 1, 1))
+    points = 2.0 * rig.rest_points
+    limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig))
+    np.testing.assert_allclose(limit.apply(points, larger, form=form), points, atol=TOLERANCE)
+
+
+def test_strength_and_weights_say_how_much():
+    rig = random_rig(9)
+    ends = bones_of(rig)
+    points = rig.deform("dq") * np.float32(1.3)
+    limit = sinew.BulgeLimit(*rig.mesh, *ends)
+    full = limit.apply(points, rig.transforms)
+    np.testing.assert_array_equal(limit.apply(points, rig.transforms, strength=0.0), points)
+    half = limit.apply(points, rig.transforms, strength=0.5)
+    np.testing.assert_allclose(half, 0.5 * (points + full), atol=TOLERANCE)
+    mask = np.where(np.arange(len(points)) % 2, 0.0, 1.0).astype(np.float32)
+    masked = sinew.BulgeLimit(*rig.mesh, *ends, weights=mask).apply(points, rig.transforms)
+    np.testing.assert_array_equal(masked[1::2], points[1::2])
+    np.testing.assert_array_equal(masked[::2], full[::2])
+
+
+@every_form
+def test_threads_out_and_pickles_change_no_bit(form):
+    rig = random_rig(10, vertices=3000)
+    mask = np.random.default_rng(11).uniform(size=3000).astype(np.float32)
+    space = random_motion(np.random.default_rng(12))
+    limit = sinew.BulgeLimit(*rig.mesh, *bones_of(rig), weights=mask, bones_from_model=space)
+    points = rig.deform("dq") * np.float32(1.3)
+    expected = limit.apply(points, rig.transforms, form=form, threads=1)
+    np.testing.assert_array_equal(limit.apply(points, rig.transforms, form=form, threads=7), expected)
+    other = pickle.loads(pickle.dumps(limit))
+    assert repr(other) == repr(limit) == "<sinew.BulgeLimit: 3000 vertices, 15 bones>"
+    np.testing.assert_array_equal(other.apply(points, rig.transforms, form=form), expected)
+    assert limit.apply(points, rig.transforms, points, form=form) is points
+    np.testing.assert_array_equal(points, expected)
+
+
+@every_form
+def test_degenerate_bones_and_points_are_finite(form):
+    rig = random_rig(13, vertices=50)
+    heads, tails = bones_of(rig)
+    motions = rig.transforms.copy()
+    motions[::2, :3, :3] = 0.0
+    limit = sinew.BulgeLimit(*rig.mesh, heads, heads)
+    assert np.isfinite(limit.apply(rig.rest_points, motions, form=form)).all()
+    assert np.isfinite(limit.apply(np.tile(heads[:1], (50, 1)), motions, form=form)).all()
+    assert np.isfinite(sinew.BulgeLimit(*rig.mesh, heads, tails).apply(rig.rest_points, motions)).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tails": np.zeros((3, 3))}, r"^tails: expected float32 \[15, 3\], one for each of heads, got "),
+        (
+            {"heads": np.zeros((3, 3)), "tails": np.zeros((3, 3))},
+            r"^segments: expected at least 15 bones, got 3$",
+        ),
+        (
+            {"heads": np.full((15, 3), np.nan)},
+            r"^segments: expected finite values, got NaN or infinity at bone 0$",
+        ),
+        ({"weights": np.zeros(7)}, r"^weights: expected None or float32 \[200\], got float64 \[7\]$"),
+        ({"weights": np.full(200, np.nan)}, r"^weights: expected weights from 0 to 1, got NaN at vertex 0$"),
+        (
+            {"bones_from_model": np.zeros((4, 4))},
+            r"^bones_from_model: expected an invertible transform, got ",
+        ),
+    ],
+)
+def test_wrong_data_is_refused(change, message):
+    rig = random_rig(14)
+    heads, tails = bones_of(rig)
+    with pytest.raises(ValueError, match=message):
+        sinew.BulgeLimit(*rig.mesh, **({"heads": heads, "tails": tails} | change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"strength": 1.5},
+            r"^strength: expected of bulge_limit.strength a finite number from 0 to 1, got 1.5$",
+        ),
+        ({"strength": "much"}, r"^strength: expected .*, got 'much'$"),
+        ({"form": "hard"}, r"^form: expected of bulge_limit.form one of continuous, kim_han, got 'hard'$"),
+        ({"threads": -1}, r"^threads: expected None or an integer, 0 or more, got -1$"),
+    ],
+)
+def test_wrong_options_are_refused(change, message):
+    rig = random_rig(15)
+    with pytest.raises(ValueError, match=message):
+        sinew.BulgeLimit(*rig.mesh, *bones_of(rig)).apply(rig.rest_points, rig.transforms, **change)
+
+
+# --- A tube of two bones along z, of radius 0.5, bent by 90 degrees at z = 2.
+
+RINGS, SIDES, RADIUS = 81, 32, 0.5
+HEADS, TAILS = np.float32([[0, 0, 0], [0, 0, 2]]), np.float32([[0, 0, 2], [0, 0, 4]])
+BENT = np.stack([np.eye(4), translation([0, 0, 2]) @ about([1, 0, 0], 90) @ translation([0, 0, -2])]).astype(
+    np.float32
+)
+
+
+def tube(offset):
+    """Its mesh and edges; the middle of the weights' ramp lies `offset` beside the joint."""
+    angles = 2 * np.pi * np.arange(SIDES) / SIDES
+    points = np.float32(
+        [[RADIUS * np.cos(a), RADIUS * np.sin(a), z] for z in np.linspace(0, 4, RINGS) for a in angles]
+    )
+    ramp = np.clip(points[:, 2] - 2 - offset + 0.5, 0.0, 1.0)
+    share = ramp * ramp * (3.0 - 2.0 * ramp)
+    weights = np.stack([1.0 - share, share], axis=1).astype(np.float32)
+    bones = np.tile(np.int32([0, 1]), len(points))
+    offsets = np.arange(0, 2 * len(points) + 1, 2, dtype=np.int32)
+    ring = np.arange(RINGS * SIDES).reshape(RINGS, SIDES)
+    along = np.stack([ring[:-1].ravel(), ring[1:].ravel()], axis=1)
+    around = np.stack([ring.ravel(), np.roll(ring, -1, axis=1).ravel()], axis=1)
+    return (points, offsets, bones, weights.ravel()), np.vstack([along, around])
+
+
+def bulge(points):
+    """The largest distance from the posed bones, in radii."""
+    segments = [transform(motion, np.stack(ends)) for motion, *ends in zip(BENT, HEADS, TAILS, strict=True)]
+    return (
+        max(
+            min(np.linalg.norm(p - bulge_limit_reference.nearest(*segment, p)) for segment in segments)
+            for p in points.astype(np.float64)
+        )
+        / RADIUS
+    )
+
+
+def tear(mesh, edges, before, after):
+    """How far apart the stage takes the ends of an edge at most, in its lengths."""
+    moved = after.astype(np.float64) - before
+    lengths = np.linalg.norm(mesh[0][edges[:, 0]] - mesh[0][edges[:, 1]], axis=1)
+    return (np.linalg.norm(moved[edges[:, 0]] - moved[edges[:, 1]], axis=1) / lengths).max()
+
+
+def test_an_elbow_with_misaligned_weights_keeps_its_thickness_and_its_surface():
+    mesh, edges = tube(0.25)
+    points = sinew.Deformer(*mesh, "dq").deform(BENT)
+    assert bulge(points) > 1.2
+    limit = sinew.BulgeLimit(*mesh, HEADS, TAILS)
+    continuous = limit.apply(points, BENT)
+    assert bulge(continuous) <= 1.08
+    assert tear(mesh, edges, points, continuous) <= 0.5
+    # Kim and Han's form tears where the heaviest bone changes.
+    hard = limit.apply(points, BENT, form="kim_han")
+    assert bulge(hard) <= 1.12
+    assert tear(mesh, edges, points, hard) > 1.5
+
+
+def test_an_elbow_with_good_weights_keeps_its_thickness():
+    mesh, _edges = tube(0.0)
+    points = sinew.Deformer(*mesh, "dq").deform(BENT)
+    limit = sinew.BulgeLimit(*mesh, HEADS, TAILS)
+    assert bulge(points) > 1.08
+    assert bulge(limit.apply(points, BENT)) <= 1.02
+    assert bulge(limit.apply(points, BENT, form="kim_han")) <= 1.001
