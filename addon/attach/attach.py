@@ -11,7 +11,16 @@ import bpy
 
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths, is_visibility_animated
-from . import node_group, point_store, pose_driver, properties, setting_animation, stack, upstream_proxy
+from . import (
+    node_group,
+    point_store,
+    pose_driver,
+    properties,
+    setting_animation,
+    stack,
+    stored_vertex_data,
+    upstream_proxy,
+)
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -165,6 +174,10 @@ def _take_off(obj: bpy.types.Object) -> None:
             obj.modifiers.remove(modifier)
         obj.parent_type = settings.parent_type
     point_store.remove(obj)
+    if not any(
+        other.data == obj.data and properties.has_sinew(other) for other in bpy.data.objects if other != obj
+    ):
+        stored_vertex_data.remove(obj.data)
     setting_animation.remove(obj)
     properties.clear(obj)
 

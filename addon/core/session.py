@@ -61,6 +61,8 @@ class Binding:
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
+        # That of the vertex data which the packed meshes have.
+        self._data_version = 0
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
         # The last frame was written to another array than _points.
         self._points_outdated = False
@@ -96,7 +98,8 @@ class Binding:
         Raises ValueError where `out` has another shape.
         """
         last = self._last
-        if out is None and last is not None and _same(last, frame):
+        is_packed_anew = self._take_new_data(frame)
+        if out is None and last is not None and _same(last, frame) and not is_packed_anew:
             return False
         self._shape(frame, self._points if out is None else out)
         self._last, self._points_outdated = frame, out is not None
@@ -166,14 +169,18 @@ class Binding:
             rest_inverses=rest_inverses,
         )
 
-    def replace_vertex_data(self, vertex_data: VertexData) -> None:
-        """For a mesh of other points or triangles. Deforms the next frame anew if the old data was used."""
-        old, self.vertex_data = self.vertex_data, vertex_data
-        if old is None or not old.is_used:
-            return
+    def _take_new_data(self, frame: Frame) -> bool:
+        """Whether methods keep other numbers of vertices since: then meshes are packed anew."""
+        if self.vertex_data is None:
+            return False
+        self._vertex_data_of(frame)
+        version, known = self.vertex_data.version, self._data_version
+        if version == known:
+            return False
+        self._data_version = version
         self._packed.clear()
         self._bound.clear()
-        self._last = None
+        return True
 
     def _weights_changed(self, frame: Frame) -> bool:
         """Whether the influences differ from the last frame's: they can depend on the rest points."""

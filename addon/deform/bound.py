@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import bpy
@@ -10,11 +11,11 @@ import numpy as np
 
 from ..attach import attach, properties
 from ..attach.modifier_options import ModifierOptions
-from ..core.rig import Bones, RigFacts
+from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
 from ..core.vertex_data import VertexData
 from ..io import armature_io
-from . import source, survey
+from . import method_needs, source, survey
 from .changes import Changes
 from .source import Source
 
@@ -43,6 +44,12 @@ class Bound:
         return other is None or self.skin_stack is not other.skin_stack
 
     @property
+    def data_versions(self) -> list[int]:
+        """Of what methods keep of vertices, for each Armature modifier."""
+        data = (stage.binding.vertex_data for stage in self.skin_stack.skin_stages)
+        return [0 if each is None else each.version for each in data]
+
+    @property
     def binding(self) -> Binding:
         """Of the first Armature modifier."""
         return self.skin_stack.skin_stages[0].binding
@@ -53,15 +60,14 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
 
     old  where neither modifiers nor their options changed since. Requires source.is_ready().
     """
-    read_now = source.read(obj, depsgraph)
+    read_now = source.read(obj, depsgraph, method_needs.needs_surface(obj))
     pairs = attach.replaced_modifiers(obj)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     mix_group = properties.of(obj).mix.group
     if old is not None and old.mix_group == mix_group and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
-                weighting = stage.binding.weighting
-                stage.binding.replace_vertex_data(VertexData(weighting, read_now.points, read_now.triangles))
+                stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
         if np.array_equal(read_now.points, old.source.points):
             # The same array tells that nothing moved.
             read_now.points = old.source.points
@@ -69,15 +75,28 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
     mix_weights = _mix_weights(obj, read_now, mix_group)
     stages = []
-    for option, its_bones in zip(options, bones, strict=True):
+    before = () if old is None else old.skin_stack.skin_stages
+    for option, its_bones, its_old in itertools.zip_longest(options, bones, before):
+        if option is None:
+            break
         weighting = option.weighting(obj, read_now.weights, its_bones)
-        vertex_data = VertexData(weighting, read_now.points, read_now.triangles)
-        binding = Binding(weighting, mix_weights, vertex_data)
+        binding = Binding(weighting, mix_weights, _vertex_data(weighting, read_now, its_old))
         stages.append(SkinStage(binding, option.mask_weights(obj, read_now.weights), option.multi))
     weighting = stages[0].binding.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
     return Bound(armatures, options, read_now, SkinStack(stages), facts, mix_group)
+
+
+def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
+    """before  of the same modifier as it was"""
+    old = None if before is None else before.binding.vertex_data
+    return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old)
+
+
+def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
+    """Whether a method was chosen since that needs the mesh's triangles."""
+    return bound.source.triangles is None and method_needs.needs_surface(obj)
 
 
 def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:

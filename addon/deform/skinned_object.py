@@ -99,6 +99,7 @@ class SkinnedObject:
     needs_recheck        the mesh may have changed since it was read: it is read with the next event, or when
                          somebody measures it
     dirtied_by_frames    the last change of frame moved the object or its rest points
+    data_versions        of what methods keep of vertices, for each Armature modifier
     """
 
     bound: Bound
@@ -120,6 +121,12 @@ class SkinnedObject:
     group_losses: int = 0
     needs_recheck: bool = False
     dirtied_by_frames: bool = False
+    data_versions: list[int] = field(default_factory=list)
+
+    @property
+    def has_new_data(self) -> bool:
+        """Whether methods keep other numbers of vertices than when the object was last seen to."""
+        return self.data_versions != self.bound.data_versions
 
     def bind(self, bound: Bound) -> None:
         """Another shape comes next where the stack of modifiers or its bones are others."""

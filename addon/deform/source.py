@@ -4,12 +4,12 @@ or from what the modifiers in front make of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
-from ..attach import properties, upstream_proxy
+from ..attach import properties, stored_vertex_data, upstream_proxy
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
 from ..io import mesh_io
@@ -21,7 +21,8 @@ class Source:
     """Read once, and again when it may be out of date.
 
     points            float32 [vertices, 3], object space, without shape keys
-    triangles         int32 [triangles, 3]
+    triangles         int32 [triangles, 3]; None where no method needs them: to read them takes long
+    stored            what the file has of numbers that methods keep of vertices, by its key; read with these
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  of those when changes were looked at last
@@ -30,9 +31,10 @@ class Source:
     group_names: list[str]
     weights: GroupWeights
     points: np.ndarray
-    triangles: np.ndarray
+    triangles: np.ndarray | None
     shape_keys: ShapeKeys | None
     from_front: bool = False
+    stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
     known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
@@ -51,6 +53,8 @@ class Source:
 
     def has_same_surface(self, other: Source) -> bool:
         """Whether points and triangles, which methods keep numbers of vertices from, are the same."""
+        if (self.triangles is None) != (other.triangles is None):
+            return False
         return np.array_equal(self.points, other.points) and np.array_equal(self.triangles, other.triangles)
 
 
@@ -62,18 +66,20 @@ def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool
     return was_on and upstream_proxy.evaluated_mesh(obj, depsgraph) is not None
 
 
-def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
-    """Requires is_ready."""
+def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bool = False) -> Source:
+    """Requires is_ready.
+
+    with_surface  with the triangles, and with what was made from them before
+    """
     names = [group.name for group in obj.vertex_groups]
-    if properties.of(obj).upstream_proxy is not None:
-        mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
-        points = mesh_io.read_points(mesh)
-        triangles = mesh_io.read_triangles(mesh)
-        return Source(names, mesh_io.read_group_weights(mesh), points, triangles, None, from_front=True)
-    weights = mesh_io.read_group_weights(obj.data)
-    points = mesh_io.read_points(obj.data)
-    triangles = mesh_io.read_triangles(obj.data)
-    return Source(names, weights, points, triangles, mesh_io.read_shape_keys(obj, weights))
+    from_front = properties.of(obj).upstream_proxy is not None
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_front else obj.data
+    weights = mesh_io.read_group_weights(mesh)
+    points = mesh_io.read_points(mesh)
+    triangles = mesh_io.read_triangles(mesh) if with_surface else None
+    keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
+    stored = stored_vertex_data.read(obj.data) if with_surface else {}
+    return Source(names, weights, points, triangles, keys, from_front, stored)
 
 
 def has_changed(

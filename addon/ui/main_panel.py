@@ -8,7 +8,7 @@ import bpy
 from ..attach import attach, properties
 from ..deform import session, small_meshes
 from ..deform.plan import ObjectFacts, plan
-from . import operators
+from . import operators, precomputing
 from .sidebar import Sidebar, draw_text
 
 
@@ -62,6 +62,7 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
         reason = plan(facts).reason or (state.plan.reason if state is not None else "")
         if reason:
             draw_text(layout, context, reason, icon="INFO")
+        precomputing.draw(layout, obj, state)
     if state is not None and state.evaluation.failures:
         text = (
             f"{state.evaluation.failures} times not deformed within Blender's evaluation; last: "

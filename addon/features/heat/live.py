@@ -120,11 +120,16 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         if mesh is None or shown.frames is None or len(mesh.vertices) != len(shown.rest_points):
             return None
         known = [(stage, stage.binding) for stage in skinned.bound.skin_stack.skin_stages]
+        surface = mesh_io.read_surface(mesh)
+        for _stage, binding in known:
+            if binding.vertex_data is not None:
+                # Distances may be measured to a method that needs them.
+                binding.vertex_data.add_triangles(surface.triangles)
         stages = [
             SkinStage(Binding(b.weighting, b.mix_weights, b.vertex_data), stage.mask, stage.multi)
             for stage, b in known
         ]
-        parts.append(Part(obj, skinned, skinned.bound, mesh_io.read_surface(mesh), SkinStack(stages)))
+        parts.append(Part(obj, skinned, skinned.bound, surface, SkinStack(stages)))
     if not parts:
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
