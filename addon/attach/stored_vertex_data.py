@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What methods keep of vertices, in the mesh that it belongs to: in saved files, so that who opens one need not
-compute it again. By the hash of what it was made from: a mesh that changed has none of its own.
+"""What methods keep of vertices, in the mesh that it belongs to: in saved files, so that who opens one need
+not compute it again. By the hash of what it was made from: a mesh that changed has none of its own.
 
 A property of the mesh, not an attribute: modifiers behind would interpolate that in every frame.
 """

@@ -153,8 +153,8 @@ class Precomputations:
             run.wait()
 
     def stop(self) -> None:
-        """As cancel_all(); none of these keys is started again on a thread of its own, until it is taken out of
-        `stopped`."""
+        """As cancel_all(); none of these keys is started again on a thread of its own, until it is taken out
+        of `stopped`."""
         self.stopped |= {run.key for run in self.running}
         self.cancel_all()
 

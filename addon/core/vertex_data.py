@@ -69,7 +69,8 @@ class VertexData:
     points     float32 [vertices, 3], object space
     triangles  int32 [triangles, 3]; None where no method that needs them was chosen
     stored     what the file has, by its key
-    before     of the same object as it was: where it has as many vertices, its data serves until there is other
+    before     of the same object as it was: where it has as many vertices, its data serves until there is
+               other
     """
 
     def __init__(
@@ -245,5 +246,5 @@ def _key(method: str, version: int, points: np.ndarray, influences: Influences, 
     digest = hashlib.blake2b(f"{method} {version}".encode(), digest_size=16)
     for array in (points, influences.offsets, influences.bones, influences.weights, triangles):
         digest.update(f" {array.dtype.str} {array.shape} ".encode())
-        digest.update(np.ascontiguousarray(array))
+        digest.update(array.tobytes())
     return digest.hexdigest()

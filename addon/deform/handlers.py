@@ -12,8 +12,8 @@ from bpy.app.handlers import persistent
 from ..attach import note, overrides, properties
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_rendering_in_window, reaction
-from ..io.animation_paths import animated_paths
 from ..core.precompute import precomputations
+from ..io.animation_paths import animated_paths
 from . import events, precompute_watch, precomputing, session
 from .changes import Changes, names_of_changed_meshes
 from .session import current

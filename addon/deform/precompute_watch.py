@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A timer of the window's that sees to precomputations as long as one runs, and gives objects what comes of it."""
+"""A timer of the window's that sees to precomputations as long as one runs, and gives objects what comes of
+it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What methods need computed before their first frame: asked for, and watched while a thread computes it.
 
-In a window it is computed beside the artist's work; the object meanwhile has its Armature modifier's shape, or by
-data of the mesh as it was. Scripts, commands and renders can not look later: they wait.
+In a window it is computed beside the artist's work; the object meanwhile has its Armature modifier's shape,
+or the one by data of the mesh as it was. Scripts, commands and renders can not look later: they wait.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ MOST_BYTES_IN_FILE = 16 * 2**20
 
 
 def request(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:
-    """Has what the object's methods need found, or made. Where it is there for the mesh as it was, the watcher
-    has it made anew once the artist pauses."""
+    """Has what the object's methods need found, or made. Where it is there for the mesh as it was, the
+    watcher has it made anew once the artist pauses."""
     is_asked = False
     for armature, data, method in _needed(obj, skinned):
         if data.is_current(method):
@@ -80,7 +80,8 @@ def take_results(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
         except Exception as error:
             what = PROVIDERS[method].what
             skinned.evaluation.user_error = SinewError(
-                f"{obj.name}: its {what} can not be found: {type(error).__name__}: {error}; press Rebind, or Remove"
+                f"{obj.name}: its {what} can not be found: {type(error).__name__}: {error}; press Rebind, or "
+                "Remove"
             )
             has_ended = True
     return has_ended

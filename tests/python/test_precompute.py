@@ -180,7 +180,8 @@ WRITER = """
 import importlib, sys, types
 import numpy as np
 package = types.ModuleType("core"); package.__path__ = [sys.argv[1]]; sys.modules["core"] = package
-cache = importlib.import_module("core.file_cache").FileCache(importlib.import_module("pathlib").Path(sys.argv[2]), 40_000)
+from pathlib import Path
+cache = importlib.import_module("core.file_cache").FileCache(Path(sys.argv[2]), 40_000)
 for number in range(300):
     key = f"key{number % 7}"
     found = cache.load(key)
