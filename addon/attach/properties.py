@@ -11,6 +11,7 @@ import sinew
 
 from ..core.scale_rule import SCALE_RULES
 from . import stage_settings
+from .method_items import method_items
 from .stage_settings import OFF
 
 METHODS = {method.name: method for method in sinew.methods()}
@@ -111,8 +112,9 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         description="How this modifier blends, where several chained Armature modifiers deform the mesh",
         items=[
             (SAME_METHOD, "Same Method", "The method that is chosen for the object", 0),
-            *((m.name, m.label, m.description, m.number + 1) for m in METHODS.values()),
+            *method_items(1),
         ],
+        default=SAME_METHOD,
         update=_method_changed,
         override=OVERRIDABLE,
     )
@@ -128,7 +130,8 @@ class SinewSettings(bpy.types.PropertyGroup):
     method: bpy.props.EnumProperty(
         name="Method",
         description="How the bones' motions are blended at each vertex",
-        items=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
+        items=method_items(),
+        default=next(iter(METHODS)),
         update=_method_changed,
         override=OVERRIDABLE,
     )

@@ -9,6 +9,7 @@ import bpy
 import sinew
 
 from ..core import parameters
+from .method_items import method_items
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
 # The choice beside the methods where a parameter names one: the stage does nothing.
@@ -45,9 +46,8 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
         "override": _OVERRIDE,
     }
     if parameter.kind == "method":
-        choices = [(OFF, "Off", "Without this stage", 0)]
-        choices += [(m.name, m.label, m.description, m.number + 1) for m in sinew.methods()]
-        return bpy.props.EnumProperty(items=choices, **facts)
+        choices = [(OFF, "Off", "Without this stage", 0), *method_items(1)]
+        return bpy.props.EnumProperty(items=choices, default=OFF, **facts)
     if parameter.kind == "enum":
         items = [(choice, choice.replace("_", " ").title(), "") for choice in parameter.choices]
         return bpy.props.EnumProperty(items=items, default=parameter.default, **facts)

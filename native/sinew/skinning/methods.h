@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -17,9 +18,9 @@
 
 namespace sinew {
 
-/// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
+/// THE list of methods, group by group in the order in which people see them. Dispatch, bindings, tests, measurements, command
 /// line and panel are made from it.
-using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sbs, Log, IterativeDq>;
+using Methods = std::tuple<Lbs, Dq, Cor, Qv, Sbs, Log, IterativeDq>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
@@ -32,6 +33,9 @@ constexpr void for_each_method(const Call& call) {
 /// The facts of each method.
 inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
     std::apply([](const auto&... methods) { return std::array{methods.info...}; }, Methods{});
+
+static_assert(std::ranges::is_sorted(kMethods, {}, &MethodInfo::group),
+              "methods of a group are one behind the other");
 
 /// The index of `method` in the list, or kMethodCount.
 [[nodiscard]] constexpr std::size_t index_of(const MethodInfo& method) noexcept {
