@@ -26,7 +26,6 @@ void Scene::add_vertex(const glm::vec3& rest, std::size_t count, const std::size
     }
     offsets.push_back(static_cast<std::int32_t>(bones.size()));
     plain.rest_points.push_back(rest);
-    centres.insert(centres.end(), {0.0f, 0.0f, rest.z});
     plain.bones.push_back(padded);
     plain.weights.push_back(padded_share);
 }

@@ -40,7 +40,7 @@ struct Scene {
     std::vector<glm::quat> rotations;
     std::vector<glm::vec3> translations;
     std::vector<Vec3<float>> points;
-    std::vector<float> centres;  // [vertices][3] on the axis: what Cor keeps
+    std::vector<float> method_values;  // what data_for() was last asked for
     std::vector<VertexData> vertex_data;
 
     BindData data() const { return {plain.rest_points, offsets, bones, weights}; }
@@ -48,8 +48,16 @@ struct Scene {
     /// With what the method keeps of each vertex.
     BindData data_for(const MethodInfo& method) {
         BindData bound = data();
-        vertex_data.assign(1, {method, centres});
-        if (method.vertex_floats > 0) bound.vertex_data = vertex_data;
+        if (method.vertex_floats == 0) return bound;
+        method_values.clear();
+        for (const glm::vec3& rest : plain.rest_points) {
+            // Points on the axis: the centre of Cor; C, R0, R1 and their use of Sdef.
+            const float z = rest.z;
+            const float numbers[] = {0, 0, z, 0, 0, z - 0.3f, 0, 0, z + 0.3f, 1};
+            method_values.insert(method_values.end(), numbers, numbers + method.vertex_floats);
+        }
+        vertex_data.assign(1, {method, method_values});
+        bound.vertex_data = vertex_data;
         return bound;
     }
 

@@ -71,6 +71,7 @@ class VertexData:
     stored     what the file has, by its key
     before     of the same object as it was: where it has as many vertices, its data serves until there is
                other
+    given      what is not made here but read from the mesh, by the name of the method
     """
 
     def __init__(
@@ -80,6 +81,7 @@ class VertexData:
         triangles: np.ndarray | None = None,
         stored: Mapping[str, np.ndarray] | None = None,
         before: VertexData | None = None,
+        given: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         self.weighting = weighting
         self.points = points
@@ -89,11 +91,14 @@ class VertexData:
         # Methods that were asked for and could not be had.
         self.missed: set[str] = set()
         self.read_at = time.monotonic()
+        self._given = dict(given or {})
         self._stored = stored or {}
         self._lock = threading.Lock()
         self._entries: dict[str, _Entry] = {}
         if before is not None:
             self._take_over(before)
+        if self._given:
+            self.version = next(_versions)
 
     def _take_over(self, before: VertexData) -> None:
         with before._lock:
@@ -169,7 +174,7 @@ class VertexData:
         bones_from_model  float64 [4, 4], where weights depend on where vertices are: the first call decides
         """
         if method not in PROVIDERS:
-            return None
+            return self._given.get(method)
         with self._lock:
             entry = self._entries.setdefault(method, _Entry())
             if entry.made is not None and not (entry.is_outdated and precomputations.waits):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..attach import attach, properties
 from ..attach.modifier_options import ModifierOptions
+from ..core import sdef
 from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
 from ..core.vertex_data import VertexData
@@ -48,6 +50,11 @@ class Bound:
         """Of what methods keep of vertices, for each Armature modifier."""
         data = (stage.binding.vertex_data for stage in self.skin_stack.skin_stages)
         return [0 if each is None else each.version for each in data]
+
+    def lacks(self, methods: Iterable[str]) -> list[str]:
+        """A sentence for each of the methods that does without something which the mesh lacks."""
+        lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
+        return [sdef.MISSING] if lacks_keys else []
 
     @property
     def binding(self) -> Binding:
@@ -91,7 +98,13 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
 def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
     """before  of the same modifier as it was"""
     old = None if before is None else before.binding.vertex_data
-    return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old)
+    given = {}
+    if read_now.sdef_keys is not None:
+        basis, *keys = read_now.sdef_keys
+        groups = sdef.group_of_bone(weighting.bones.names, read_now.group_names)
+        influences = weighting.entries.influences()
+        given[sdef.METHOD] = sdef.vertex_data(basis, np.array(keys), influences, groups)
+    return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old, given)
 
 
 def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:

@@ -23,6 +23,7 @@ class Source:
     points            float32 [vertices, 3], object space, without shape keys
     triangles         int32 [triangles, 3]; None where no method needs them: to read them takes long
     stored            what the file has of numbers that methods keep of vertices, by its key; read with these
+    sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  of those when changes were looked at last
@@ -33,6 +34,7 @@ class Source:
     points: np.ndarray
     triangles: np.ndarray | None
     shape_keys: ShapeKeys | None
+    sdef_keys: np.ndarray | None = None
     from_front: bool = False
     stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
@@ -46,16 +48,17 @@ class Source:
         if (keys is None) != (known is None) or not self.equals_but_for_points(other):
             return False
         has_same_keys = keys is None or keys.equals(known)
-        return has_same_keys and np.array_equal(self.points, other.points)
+        return has_same_keys and self.has_same_surface(other)
 
     def equals_but_for_points(self, other: Source) -> bool:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
     def has_same_surface(self, other: Source) -> bool:
-        """Whether points and triangles, which methods keep numbers of vertices from, are the same."""
-        if (self.triangles is None) != (other.triangles is None):
-            return False
-        return np.array_equal(self.points, other.points) and np.array_equal(self.triangles, other.triangles)
+        """Whether all that methods keep numbers of vertices from, but for weights, is the same."""
+        return np.array_equal(self.points, other.points) and all(
+            (mine is None) == (its is None) and (mine is None or np.array_equal(mine, its))
+            for mine, its in ((self.triangles, other.triangles), (self.sdef_keys, other.sdef_keys))
+        )
 
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
@@ -78,8 +81,11 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     points = mesh_io.read_points(mesh)
     triangles = mesh_io.read_triangles(mesh) if with_surface else None
     keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
+    sdef_keys = mesh_io.read_sdef_keys(obj.data)
+    if sdef_keys is not None and sdef_keys.shape[1] != len(points):
+        sdef_keys = None
     stored = stored_vertex_data.read(obj.data) if with_surface else {}
-    return Source(names, weights, points, triangles, keys, from_front, stored)
+    return Source(names, weights, points, triangles, keys, sdef_keys, from_front, stored)
 
 
 def has_changed(

@@ -11,6 +11,7 @@ import bmesh
 import bpy
 import numpy as np
 
+from ..core import sdef
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
@@ -39,6 +40,17 @@ def _read_key_points(block: bpy.types.ShapeKey) -> np.ndarray:
     points = np.empty((len(block.points), 3), dtype=np.float32)
     block.points.foreach_get("co", points.ravel())
     return points
+
+
+def read_sdef_keys(mesh: bpy.types.Mesh) -> np.ndarray | None:
+    """float32 [4, vertices, 3]: the basis, then C, R0 and R1 of the method sdef; None without these keys."""
+    keys = mesh.shape_keys
+    blocks = [] if keys is None else [keys.key_blocks.get(name) for name in sdef.KEYS]
+    if not blocks or None in blocks:
+        return None
+    points = np.array([_read_key_points(block) for block in (keys.reference_key, *blocks)])
+    # In edit mode the mesh can have other vertices than its keys.
+    return points if points.shape[1] == len(mesh.vertices) else None
 
 
 def read_triangles(mesh: bpy.types.Mesh) -> np.ndarray:

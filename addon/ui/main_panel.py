@@ -77,6 +77,8 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
         for replaced in list(settings.replaced_modifiers)[1:]:
             layout.prop(replaced, "method", text=replaced.name)
     _draw_mix(layout, context, obj)
+    for sentence in [] if state is None else state.bound.lacks((settings.method, settings.mix.method)):
+        draw_text(layout, context, sentence, icon="INFO")
     layout.prop(settings, "scale_rule")
     if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
         layout.prop(settings, "leave_small")

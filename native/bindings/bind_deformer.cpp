@@ -9,6 +9,7 @@
 #include "broadcast.h"
 #include "gil.h"
 #include "module.h"
+#include "parameters.h"
 #include "sinew/deform/deformer.h"
 #include "sinew/deform/thread_pool.h"
 #include "sinew/skinning/methods.h"
@@ -305,9 +306,61 @@ std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
     return bones;
 }
 
+/// Values of the parameters of `method` in its order.
+std::vector<double> default_parameters(const MethodInfo& method) {
+    std::vector<double> values;
+    for (const Parameter& parameter : method.parameters) values.push_back(parameter.initial);
+    return values;
+}
+
+/// A parameter of some method, and its index.
+struct MethodParameter {
+    MethodInfo method;
+    std::size_t index;
+};
+
+MethodParameter checked_parameter_name(const py::handle& name) {
+    const char* const wanted = "names of parameters of methods, METHOD.PARAMETER";
+    const std::string text = checked_name(name, "parameters", wanted);
+    const std::size_t dot = text.find('.');
+    if (const std::optional<MethodInfo> method = find_method(text.substr(0, dot));
+        method && dot != std::string::npos) {
+        for (std::size_t i = 0; i < method->parameters.size(); ++i) {
+            if (method->parameters[i].id == text.substr(dot + 1)) return {*method, i};
+        }
+    }
+    fail("parameters", wanted, "'" + text + "'");
+}
+
+/// What DeformOptions::parameters and mix_parameters point at.
+struct Parameters {
+    std::vector<double> of_method;
+    std::vector<double> of_mix;
+};
+
+/// From a dict of values by the full names of parameters. Those of other methods are checked, and change nothing.
+Parameters checked_parameters(const Deformer& deformer, const py::object& parameters) {
+    if (parameters.is_none()) return {};
+    if (!py::isinstance<py::dict>(parameters)) {
+        fail("parameters", "None or a dict of values by names such as METHOD.PARAMETER",
+             describe(parameters));
+    }
+    const MethodInfo* const mixed = deformer.mixed_method();
+    Parameters values{default_parameters(deformer.method()), {}};
+    if (mixed != nullptr) values.of_mix = default_parameters(*mixed);
+    for (const auto& [name, value] : py::reinterpret_borrow<py::dict>(parameters)) {
+        const auto [method, index] = checked_parameter_name(name);
+        const double number =
+            checked_parameter(value, method.parameters[index], "parameters", name.cast<std::string>());
+        if (method == deformer.method()) values.of_method[index] = number;
+        if (mixed != nullptr && method == *mixed) values.of_mix[index] = number;
+    }
+    return values;
+}
+
 py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
                           const py::object& threads, const py::object& bones_from_model,
-                          const py::object& rest_inverses) {
+                          const py::object& rest_inverses, const py::object& parameters) {
     const std::vector<Affine<float>> bones = rest_inverses.is_none()
                                                  ? checked_affines(bone_transforms, "bone_transforms")
                                                  : posed_from_rest(bone_transforms, rest_inverses);
@@ -317,6 +370,9 @@ py::array_t<float> deform(const Deformer& deformer, const py::object& bone_trans
     }
     DeformOptions options;
     options.threads = checked_threads(threads);
+    const Parameters values = checked_parameters(deformer, parameters);
+    options.parameters = values.of_method;
+    options.mix_parameters = values.of_mix;
     if (!bones_from_model.is_none()) {
         options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
         if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
@@ -412,23 +468,28 @@ void bind_deformer(py::module_& m) {
              "New rest points for this deformer alone, float32 [vertices, 3], as when shape keys change. "
              "Other\n"
              "threads may deform meanwhile: each of their results has the old points or the new ones.")
-        .def("deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
-             py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
-             py::arg("rest_inverses") = py::none(),
-             "The deformed points, float32 [vertices, 3], model space.\n\n"
-             "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
-             "read.\n"
-             "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never "
-             "converted.\n"
-             "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help.\n"
-             "    The result is the same bit for bit.\n"
-             "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
-             "    transforms, where the blending happens; the result is taken back. None: the same space.\n"
-             "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the "
-             "posed\n    bones, and each is multiplied by the inverse of its rest, in double.\n\n"
-             "A vertex without influences stays. The GIL is released for large meshes. Raises ValueError "
-             "that\n"
-             "names the argument, what was wanted and what came.");
+        .def(
+            "deform", &deform, py::arg("bone_transforms"), py::arg("out") = py::none(),
+            py::arg("threads") = py::none(), py::arg("bones_from_model") = py::none(),
+            py::arg("rest_inverses") = py::none(), py::arg("parameters") = py::none(),
+            "The deformed points, float32 [vertices, 3], model space.\n\n"
+            "bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest; a fourth row is not "
+            "read.\n"
+            "out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never "
+            "converted.\n"
+            "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help.\n"
+            "    The result is the same bit for bit.\n"
+            "bones_from_model: float32 [4, 4] or [3, 4], takes model space to the space of the bone\n"
+            "    transforms, where the blending happens; the result is taken back. None: the same space.\n"
+            "rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the "
+            "posed\n    bones, and each is multiplied by the inverse of its rest, in double.\n"
+            "parameters: a dict of values of parameters of methods by their full names, METHOD.PARAMETER, as "
+            "the\n"
+            "    Parameter says; one that is not here has its default. Those of methods that the deformer "
+            "does not\n    use change nothing.\n\n"
+            "A vertex without influences stays. The GIL is released for large meshes. Raises ValueError "
+            "that\n"
+            "names the argument, what was wanted and what came.");
 }
 
 }  // namespace sinew::bindings

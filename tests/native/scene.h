@@ -23,28 +23,40 @@ struct Scene {
     std::vector<Affine<float>> rest_bones;
     std::vector<Affine<float>> posed_from_rest;
 
-    std::vector<float>
-        vertex_numbers;  // [vertices][kVertexNumbers] any points: what methods keep of a vertex
+    // [vertices][kVertexNumbers] three points, then 1, or 0 of some vertices. A method keeps the first of them.
+    std::vector<float> vertex_numbers;
 
-    static constexpr std::size_t kVertexNumbers = 3;
+    static constexpr std::size_t kVertexNumbers = 10;
 
     BindData data() const {
         vertex_data_.clear();
+        vertex_values_.clear();
         for (const MethodInfo& method : kMethods) {
-            if (method.vertex_floats > 0) vertex_data_.push_back({method, vertex_numbers});
+            if (method.vertex_floats == 0) continue;
+            std::vector<float>& values = vertex_values_.emplace_back();
+            for (std::size_t vertex = 0; vertex < rest_points.size(); ++vertex) {
+                const auto numbers = numbers_of<float>(vertex, method);
+                values.insert(values.end(), numbers.begin(), numbers.end());
+            }
+        }
+        for (std::size_t i = 0; const MethodInfo& method : kMethods) {
+            if (method.vertex_floats > 0) vertex_data_.push_back({method, vertex_values_[i++]});
         }
         return {rest_points, offsets, bones, weights, rest_bones, vertex_data_};
     }
 
     template <class T>
-    std::vector<T> numbers_of(std::size_t vertex) const {
+    std::vector<T> numbers_of(std::size_t vertex, const MethodInfo& method) const {
         const auto first = vertex_numbers.begin() + static_cast<std::ptrdiff_t>(kVertexNumbers * vertex);
-        return {first, first + kVertexNumbers};
+        return {first, first + static_cast<std::ptrdiff_t>(method.vertex_floats)};
     }
 
     void add_vertex(const Vec3<float>& rest, const std::vector<Influence<float>>& influences) {
         rest_points.push_back(rest);
-        vertex_numbers.insert(vertex_numbers.end(), {0.5f * rest.y, 0.5f * rest.z, 0.5f * rest.x});
+        const float is_used = rest.x < 0.0f && rest.y < 0.0f && rest.z < 0.0f ? 0.0f : 1.0f;
+        vertex_numbers.insert(vertex_numbers.end(),
+                              {0.5f * rest.y, 0.5f * rest.z, 0.5f * rest.x, 0.5f * rest.z, -0.5f * rest.y,
+                               0.25f * rest.x, rest.x, 0.5f * rest.x, -0.5f * rest.y, is_used});
         for (const Influence<float>& influence : influences) {
             bones.push_back(influence.bone);
             weights.push_back(influence.weight);
@@ -57,13 +69,16 @@ struct Scene {
         for (std::size_t vertex = 0; vertex < rest_points.size(); ++vertex) {
             rest_points[vertex] = transform_point(by, rest_points[vertex]);
             float* const at = &vertex_numbers[kVertexNumbers * vertex];
-            const Vec3<float> point = transform_point(by, Vec3<float>(at[0], at[1], at[2]));
-            for (int i = 0; i < 3; ++i) at[i] = point[i];
+            for (std::size_t k = 0; k < 9; k += 3) {
+                const Vec3<float> point = transform_point(by, Vec3<float>(at[k], at[k + 1], at[k + 2]));
+                for (int i = 0; i < 3; ++i) at[k + static_cast<std::size_t>(i)] = point[i];
+            }
         }
     }
 
 private:
     mutable std::vector<VertexData> vertex_data_;
+    mutable std::vector<std::vector<float>> vertex_values_;
 };
 
 /// Bones 2, 5, ... are stretched along their own axes, every second of those mirrored; 1 to 8 influences.
@@ -99,7 +114,7 @@ inline std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& 
 
 /// As skinning/ has it in T, weights normalised in double and bones prepared in it.
 template <class T, class Method>
-std::vector<Vec3<T>> by_skinning(const Scene& scene) {
+std::vector<Vec3<T>> by_skinning(const Scene& scene, std::span<const double> parameters = {}) {
     std::vector<typename Method::template Bone<T>> palette;
     for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
         palette.push_back(cast<T>(Method::prepare(cast<double>(scene.posed_from_rest[bone]),
@@ -117,8 +132,13 @@ std::vector<Vec3<T>> by_skinning(const Scene& scene) {
                 {scene.bones[i], static_cast<T>(static_cast<double>(scene.weights[i]) / sum)});
         }
         const Vec3<T> rest(scene.rest_points[vertex]);
-        if constexpr (Method::info.vertex_floats > 0) {
-            const std::vector<T> numbers = scene.numbers_of<T>(vertex);
+        if constexpr (!Method::info.parameters.empty()) {
+            static_assert(Method::info.vertex_floats > 0);
+            const std::vector<T> numbers = scene.numbers_of<T>(vertex, Method::info);
+            points.push_back(
+                Method::template deform_vertex<T>(palette, influences, rest, numbers, parameters));
+        } else if constexpr (Method::info.vertex_floats > 0) {
+            const std::vector<T> numbers = scene.numbers_of<T>(vertex, Method::info);
             points.push_back(Method::template deform_vertex<T>(palette, influences, rest, numbers));
         } else {
             points.push_back(Method::template deform_vertex<T>(palette, influences, rest));
@@ -128,16 +148,18 @@ std::vector<Vec3<T>> by_skinning(const Scene& scene) {
 }
 
 template <class T>
-std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene) {
+std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene,
+                                 std::span<const double> parameters = {}) {
     std::vector<Vec3<T>> points;
     for_each_method([&]<class Method>(Method) {
-        if (Method::info == method) points = by_skinning<T, Method>(scene);
+        if (Method::info == method) points = by_skinning<T, Method>(scene, parameters);
     });
     return points;
 }
 
-inline std::vector<Vec3<double>> in_double(const MethodInfo& method, const Scene& scene) {
-    return by_skinning<double>(method, scene);
+inline std::vector<Vec3<double>> in_double(const MethodInfo& method, const Scene& scene,
+                                           std::span<const double> parameters = {}) {
+    return by_skinning<double>(method, scene, parameters);
 }
 
 // kTolerance times the size of the scene: float's 6e-8 after some tens of operations. The translation of a

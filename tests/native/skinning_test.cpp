@@ -57,8 +57,11 @@ template <class Method>
 Vec3<double> skinned(const Bones<Method>& bones, const std::vector<Influence<double>>& influences,
                      const Vec3<double>& rest, const Vec3<double>& centre = Vec3<double>(0.0)) {
     if constexpr (Method::info.vertex_floats > 0) {
-        const double numbers[] = {centre.x, centre.y, centre.z};
-        return Method::template deform_vertex<double>(bones, influences, rest, numbers);
+        // Of Sdef also R0 and R1, in the same place: a vertex of two bones is rotated about it.
+        const double numbers[] = {centre.x, centre.y, centre.z, centre.x, centre.y,
+                                  centre.z, centre.x, centre.y, centre.z, 1.0};
+        return Method::template deform_vertex<double>(
+            bones, influences, rest, std::span(numbers).template first<Method::info.vertex_floats>());
     } else {
         return Method::template deform_vertex<double>(bones, influences, rest);
     }
@@ -314,6 +317,7 @@ TYPED_TEST(RigidSkinning, antipodal_quaternions_do_not_cancel) {
 // comes from weights that vanish.
 TYPED_TEST(RigidSkinning, a_vanishing_blend_turns_with_the_heaviest) {
     if (std::is_same_v<TypeParam, Log>) GTEST_SKIP() << "logarithms that vanish are those of the identity";
+    if (std::is_same_v<TypeParam, Sdef>) GTEST_SKIP() << "vertices of three bones are blended linearly";
     Rig rig = rigid_rig(16);
     for (Affine<double>& bone : rig.posed_from_rest) bone.translation = Vec3<double>(0.0);
     const Bones<TypeParam> bones = prepared<TypeParam>(rig);

@@ -2,9 +2,9 @@
 """Skinning in float64 numpy and matrix form, from the papers: the oracle of the library.
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
-Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor) and
-Kavan, Zara 2005 (sbs); slow, one vertex at a time, and does not use the formulas of the library where others
-exist. Quaternions are (w, x, y, z).
+Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor),
+Kavan, Zara 2005 (sbs) and mmd_tools' formula (sdef); slow, one vertex at a time, and does not use the
+formulas of the library where others exist. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -176,6 +176,26 @@ def cor(point, motions, rotations, weights, heads, centre=None):
     return about(point if centre is None else centre, point, motions, rotations, weights, heads)
 
 
+def sdef(point, motions, rotations, weights, heads, spheres=None, interpolation="nlerp"):
+    """spheres: C, R0, R1 and whether they are used, [10]."""
+    used = np.flatnonzero(weights > 0.0)
+    if spheres is None or spheres[9] == 0.0 or len(used) != 2:
+        return lbs(point, motions, rotations, weights)
+    motions, rotations, weights = motions[used], rotations[used], weights[used]
+    translations = rigid_parts(motions, rotations, heads[used])
+    centre, ends = spheres[:3], spheres[3:9].reshape(2, 3)
+    ends = centre + ends - weights @ ends
+    middles = (centre + ends) / 2.0
+    rotated, margin = blended_rotation(rotations, weights)
+    if interpolation == "slerp":
+        # The short way is that of the logarithm.
+        between = Rotation.from_matrix(rotations[0].T @ rotations[1]).as_rotvec()
+        rotated = rotations[0] @ Rotation.from_rotvec(weights[1] * between).as_matrix()
+    scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - translations
+    moved = np.einsum("kij,kj->ki", rotations, middles) + translations + scaled
+    return rotated @ (point - centre) + weights @ moved, margin
+
+
 # Rotations of a set that differ by less along a direction leave its centre free there.
 SAME_ROTATION = 1e-3
 
@@ -239,16 +259,27 @@ def dib(point, motions, rotations, weights):
     return rotated @ point + translated, margin if steps < 40 else 0.0
 
 
-METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "cor": cor, "sbs": sbs, "log": log, "dib": dib}
+METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "cor": cor, "sdef": sdef, "sbs": sbs, "log": log, "dib": dib}
 # Those that also read where bones are at rest, and those that keep something of each vertex.
-WITH_HEADS = {"cor", "sbs"}
-WITH_VERTEX_DATA = {"cor"}
+WITH_HEADS = {"cor", "sbs", "sdef"}
+WITH_VERTEX_DATA = {"cor", "sdef"}
 
 
-def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=None, vertex_data=None):
+def deform(
+    method,
+    rest_points,
+    offsets,
+    bones,
+    weights,
+    transforms,
+    rest_bones=None,
+    vertex_data=None,
+    parameters=None,
+):
     """Deformed points float64 [vertices, 3], and [vertices] how far each is from a tie of signs.
 
     vertex_data  as sinew.Binding takes it
+    parameters   as sinew.Deformer.deform takes them
 
     A vertex without influences, or with all weights zero, stays.
     """
@@ -256,6 +287,8 @@ def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=
     if rest_bones is None:
         rest_bones = np.tile(np.eye(4), (len(transforms), 1, 1))
     rest_bones = np.asarray(rest_bones, np.float64)
+    prefix = f"{method}."
+    values = {name[len(prefix) :]: v for name, v in (parameters or {}).items() if name.startswith(prefix)}
     rotations = np.array([rotation_of_bone(m, b) for m, b in zip(transforms, rest_bones, strict=True)])
     points = np.asarray(rest_points, np.float64).copy()
     margins = np.ones(len(points))
@@ -265,9 +298,9 @@ def deform(method, rest_points, offsets, bones, weights, transforms, rest_bones=
         if share.sum() > 0.0:
             of = bones[span]
             more = [rest_bones[of, :3, 3]] if method in WITH_HEADS else []
-            if method in WITH_VERTEX_DATA and vertex_data is not None:
+            if method in WITH_VERTEX_DATA and vertex_data is not None and method in vertex_data:
                 more.append(vertex_data[method][vertex].astype(np.float64))
             points[vertex], margins[vertex] = METHODS[method](
-                points[vertex], transforms[of], rotations[of], share / share.sum(), *more
+                points[vertex], transforms[of], rotations[of], share / share.sum(), *more, **values
             )
     return points, margins

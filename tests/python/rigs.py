@@ -47,7 +47,7 @@ class Rig:
     weights: np.ndarray
     transforms: np.ndarray
     rest_bones: np.ndarray
-    centres: np.ndarray  # any point for each vertex, which cor rotates it about
+    centres: np.ndarray  # any point for each vertex, which cor and sdef rotate it about
 
     @property
     def mesh(self):
@@ -55,7 +55,11 @@ class Rig:
 
     @property
     def vertex_data(self):
-        return {"cor": self.centres.copy()}
+        # Of every tenth vertex sdef is not to use what it has.
+        used = np.arange(len(self.centres))[:, None] % 10 != 9
+        ends = (self.centres[::-1], np.roll(self.centres, 1, axis=0))
+        spheres = np.hstack([self.centres, *ends, used]).astype(np.float32)
+        return {"cor": self.centres.copy(), "sdef": spheres}
 
     def binding(self):
         return sinew.Binding(*self.mesh, self.rest_bones, self.vertex_data)
@@ -63,8 +67,10 @@ class Rig:
     def deformer(self, method):
         return sinew.Deformer(*self.mesh, method, self.rest_bones, self.vertex_data)
 
-    def reference(self, method):
-        return reference.deform(method, *self.mesh, self.transforms, self.rest_bones, self.vertex_data)
+    def reference(self, method, parameters=None):
+        return reference.deform(
+            method, *self.mesh, self.transforms, self.rest_bones, self.vertex_data, parameters
+        )
 
     def deform(self, method, **options):
         return self.deformer(method).deform(self.transforms, **options)

@@ -39,7 +39,7 @@ def test_methods_have_a_reference():
 def test_methods_say_what_they_are():
     rows = sinew.methods()
     assert len({row.number for row in rows}) == len({row.name for row in rows}) == len(rows)
-    numbers = {"lbs": 1, "qv": 2, "dq": 3, "log": 4, "cor": 5, "sbs": 6, "dib": 7}
+    numbers = {"lbs": 1, "qv": 2, "dq": 3, "log": 4, "cor": 5, "sbs": 6, "dib": 7, "sdef": 8}
     assert {row.name: row.number for row in rows}.items() >= numbers.items()
     for row in rows:
         assert row.label
@@ -214,7 +214,7 @@ def test_finite_for_whatever_is_finite(method, size):
     weights = rng.choice([1e-30, 1e-3, 1.0], len(bones)).astype(np.float32)
     rest = rng.uniform(-size, size, (len(counts), 3)).astype(np.float32)
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    data = {"cor": rng.uniform(-size, size, rest.shape).astype(np.float32)}
+    data = {"cor": rng.uniform(-size, size, rest.shape), "sdef": rng.uniform(-size, size, (len(rest), 10))}
     deformer = sinew.Deformer(rest, offsets, bones, weights, method, vertex_data=data)
     assert np.isfinite(deformer.deform(motions.astype(np.float32))).all()
 
@@ -370,7 +370,8 @@ def test_input_is_copied(method):
     arrays = [array.copy() for array in (*rig.mesh, rig.rest_bones)]
     data = rig.vertex_data
     deformer = sinew.Deformer(*arrays[:4], method, arrays[4], data)
-    data["cor"][...] = 0
+    for values in data.values():
+        values[...] = 0
     for array in arrays:
         array[...] = 0
     np.testing.assert_array_equal(deformer.deform(rig.transforms), rig.deform(method))
@@ -665,7 +666,7 @@ def test_unaligned_input_is_copied(method):
         *(unaligned(array) for array in rig.mesh),
         method,
         unaligned(rig.rest_bones),
-        {"cor": unaligned(rig.centres)},
+        {name: unaligned(values) for name, values in rig.vertex_data.items()},
     )
     np.testing.assert_array_equal(deformer.deform(unaligned(rig.transforms)), rig.deform(method))
     deformer.set_rest_points(unaligned(rig.rest_points))

@@ -334,7 +334,7 @@ def test_meshes(data):
     bones = data.draw(st.integers(1, 4))
     influences = vertices * each
     offsets = [each * vertex for vertex in range(vertices + 1)]
-    wild = wild_one(data.draw, 14)
+    wild = wild_one(data.draw, 15)
     nothing = st.just((None, None))
     mesh = [
         data.draw(strategy)
@@ -366,8 +366,11 @@ def test_meshes(data):
     inverses = data.draw(
         st.one_of(nothing, or_garbage(arrays((binding.bone_count, 4, 4), wild[13]), wild[13]))
     )
-    known = {"bone_transforms", "out", "threads", "bones_from_model", "rest_inverses"}
-    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0]], known)
+    parameters = data.draw(names(st.sampled_from([None, {}, {"sdef.interpolation": "slerp"}]), wild[14]))
+    if wild[14] and data.draw(st.booleans()):
+        parameters = {data.draw(names(st.just("sdef.interpolation"), True)): data.draw(GARBAGE)}
+    known = {"bone_transforms", "out", "threads", "bones_from_model", "rest_inverses", "parameters"}
+    result = attempt(deformer.deform, [pose[0], out, threads, space[0], inverses[0], parameters], known)
     if result is None:
         return
     assert result.shape == (binding.vertex_count, 3)
@@ -379,7 +382,7 @@ def test_meshes(data):
         given if array is None else np.array(array, dtype, order="C")
         for (given, array), dtype in zip((pose, space, inverses), types, strict=True)
     )
-    same(result, plain.deform(pose, None, 1, space, inverses))
+    same(result, plain.deform(pose, None, 1, space, inverses, parameters))
 
 
 def positive(pair):

@@ -283,6 +283,7 @@ class Deformer:
         threads: int | np.integer[Any] | None = None,
         bones_from_model: ArrayLike | None = None,
         rest_inverses: ArrayLike | None = None,
+        parameters: Mapping[str, float | bool | str] | None = None,
     ) -> NDArray[np.float32]:
         """The deformed points, float32 [vertices, 3], model space.
 
@@ -296,6 +297,9 @@ class Deformer:
             transforms, where the blending happens; the result is taken back. None: the same space.
         rest_inverses: float64 [bones, 4, 4] or [bones, 3, 4]. Where given, bone_transforms are the posed
             bones, and each is multiplied by the inverse of its rest, in double.
+        parameters: a dict of values of parameters of methods by their full names, METHOD.PARAMETER, as the
+            Parameter says; one that is not here has its default. Those of methods that the deformer does
+            not use change nothing.
 
         A vertex without influences stays. The GIL is released for large meshes. Raises ValueError that
         names the argument, what was wanted and what came.

@@ -62,6 +62,18 @@ std::size_t checked_vertex_data(const VertexData& data, std::size_t vertex_count
     return index;
 }
 
+/// Of one method in one frame; one more than needed, as there may be none.
+using ParameterValues = std::array<double, kMaxMethodParameters + 1>;
+
+ParameterValues valid_values(const MethodInfo& method, std::span<const double> given) noexcept {
+    ParameterValues values{};
+    for (std::size_t i = 0; i < method.parameters.size(); ++i) {
+        const Parameter& parameter = method.parameters[i];
+        values[i] = i < given.size() ? valid_value(parameter, given[i]) : parameter.initial;
+    }
+    return values;
+}
+
 MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, std::size_t vertex_count) {
     if (weights.size() != vertex_count) {
         fail("mix", "a weight for each of the " + std::to_string(vertex_count) + " vertices",
@@ -256,6 +268,9 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         write_displacement(transform, bones_from_model.data());
         write_displacement(inverse(transform), model_from_bones.data());
     }
+    const std::array<ParameterValues, 2> parameters{
+        valid_values(kMethods[state_->methods[0]], options.parameters),
+        valid_values(kMethods[state_->methods[1]], options.mix_parameters)};
     struct Work {
         const State& state;
         std::array<Frame, 2> frames;
@@ -279,6 +294,7 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                           &palette,
                           changes_space ? bones_from_model.data() : nullptr,
                           changes_space ? model_from_bones.data() : nullptr,
+                          parameters[k].data(),
                           points.data()};
     }
     const std::size_t threads = options.threads > 0

@@ -74,6 +74,11 @@ struct DeformOptions {
     Affine<float> bones_from_model{};
     /// 0: as many as help.
     std::size_t threads = 0;
+    /// [at most MethodInfo::parameters] values of the method's parameters, as valid_value() takes them; those that are
+    /// not here have their defaults.
+    std::span<const double> parameters{};
+    /// Of the method that the stage `mix` adds.
+    std::span<const double> mix_parameters{};
 };
 
 /// A mesh bound to bones: immutable, and shared by all its copies and by the deformers made of it. Binding sorts the

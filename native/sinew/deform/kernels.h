@@ -20,6 +20,7 @@ struct Frame {
     const Palette* palette;
     const Float4* bones_from_model;  // displacements of points to the space of the bones and back;
     const Float4* model_from_bones;  // null: the same space
+    const double* parameters;        // [MethodInfo::parameters] valid_value() of each
     Vec3<float>* points;
 };
 

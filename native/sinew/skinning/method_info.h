@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -42,6 +44,22 @@ struct Parameter {
     double maximum = std::numeric_limits<double>::infinity();
     std::span<const std::string_view> choices{};  // of a choice
 };
+
+/// The value that `value` stands for: within the limits, whole unless the kind is number, and of a choice one of its
+/// indices. NaN stands for the default.
+[[nodiscard]] inline double valid_value(const Parameter& parameter, double value) noexcept {
+    if (std::isnan(value)) return parameter.initial;
+    switch (parameter.kind) {
+        case ParameterKind::number: break;
+        case ParameterKind::integer: value = std::round(value); break;
+        case ParameterKind::boolean: return value != 0.0 ? 1.0 : 0.0;
+        case ParameterKind::choice:
+            return std::clamp(std::round(value), 0.0, static_cast<double>(parameter.choices.size()) - 1.0);
+        case ParameterKind::vertex_group:
+        case ParameterKind::method: return parameter.initial;  // no number
+    }
+    return std::clamp(value, parameter.minimum, parameter.maximum);
+}
 
 /// What a method takes besides points, influences and bone transforms.
 enum class Needs : unsigned {
@@ -86,8 +104,8 @@ struct MethodInfo {
     std::string_view description;  // one sentence: when to use it
     std::string_view source;       // the papers
     Needs needs;
-    std::span<const Parameter> parameters{};
-    std::size_t vertex_floats = 0;  // numbers that it keeps of each vertex
+    std::span<const Parameter> parameters{};  // numbers and choices, which each frame has its own of
+    std::size_t vertex_floats = 0;            // numbers that it keeps of each vertex
 };
 
 /// The number is the method's identity.

@@ -15,12 +15,13 @@
 #include "sinew/skinning/log.h"
 #include "sinew/skinning/qv.h"
 #include "sinew/skinning/sbs.h"
+#include "sinew/skinning/sdef.h"
 
 namespace sinew {
 
-/// THE list of methods, group by group in the order in which people see them. Dispatch, bindings, tests, measurements, command
-/// line and panel are made from it.
-using Methods = std::tuple<Lbs, Dq, Cor, Qv, Sbs, Log, IterativeDq>;
+/// THE list of methods, group by group, in the order in which people see them. Dispatch, bindings, tests, measurements,
+/// command line and panel are made from it.
+using Methods = std::tuple<Lbs, Dq, Cor, Sdef, Qv, Sbs, Log, IterativeDq>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
@@ -36,6 +37,12 @@ inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
 
 static_assert(std::ranges::is_sorted(kMethods, {}, &MethodInfo::group),
               "methods of a group are one behind the other");
+
+/// The most parameters that a method has.
+inline constexpr std::size_t kMaxMethodParameters =
+    std::ranges::max(kMethods, {}, [](const MethodInfo& method) {
+        return method.parameters.size();
+    }).parameters.size();
 
 /// The index of `method` in the list, or kMethodCount.
 [[nodiscard]] constexpr std::size_t index_of(const MethodInfo& method) noexcept {

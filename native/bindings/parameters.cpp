@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "parameters.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "arrays.h"
+
+namespace sinew::bindings {
+namespace {
+
+std::string wanted_of(const Parameter& parameter) {
+    std::ostringstream text;
+    switch (parameter.kind) {
+        case ParameterKind::choice:
+            for (std::size_t i = 0; i < parameter.choices.size(); ++i) {
+                text << (i == 0 ? "one of " : ", ") << parameter.choices[i];
+            }
+            break;
+        case ParameterKind::boolean: text << "True or False"; break;
+        default:
+            text << (parameter.kind == ParameterKind::integer ? "a whole number" : "a finite number");
+            if (std::isfinite(parameter.minimum)) text << " from " << parameter.minimum;
+            if (std::isfinite(parameter.maximum)) text << " to " << parameter.maximum;
+    }
+    return text.str();
+}
+
+/// The value, or NaN for what is none.
+double value_of(const py::handle& value, const Parameter& parameter) {
+    const double none = std::nan("");
+    if (parameter.kind == ParameterKind::choice) {
+        if (!py::isinstance<py::str>(value)) return none;
+        for (std::size_t i = 0; i < parameter.choices.size(); ++i) {
+            if (value.equal(py::str(std::string(parameter.choices[i])))) return static_cast<double>(i);
+        }
+        return none;
+    }
+    // Numbers of numpy, too, but no texts.
+    const bool is_whole = PyIndex_Check(value.ptr()) != 0;
+    const bool is_bool = py::isinstance<py::bool_>(value);
+    if (!is_whole && !is_bool && PyNumber_Check(value.ptr()) == 0) return none;
+    const double number = PyFloat_AsDouble(value.ptr());
+    if (PyErr_Occurred() != nullptr) {
+        PyErr_Clear();
+        return none;
+    }
+    switch (parameter.kind) {
+        case ParameterKind::boolean: return number == 0.0 || number == 1.0 ? number : none;
+        case ParameterKind::integer:
+            if (std::trunc(number) != number) return none;
+            break;
+        default: break;
+    }
+    const bool is_valid = std::isfinite(number) && parameter.minimum <= number && number <= parameter.maximum;
+    return is_valid ? number : none;
+}
+
+std::string text_of(const py::handle& value) {
+    if (py::isinstance<py::str>(value) || PyLong_Check(value.ptr()) || PyFloat_Check(value.ptr())) {
+        std::string text = py::repr(value).cast<std::string>();
+        constexpr std::size_t kMost = 60;
+        return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+    }
+    return describe(value);
+}
+
+}  // namespace
+
+double checked_parameter(const py::handle& value, const Parameter& parameter, const char* argument,
+                         const std::string& full_name) {
+    const double number = value_of(value, parameter);
+    if (std::isnan(number)) fail(argument, "of " + full_name + " " + wanted_of(parameter), text_of(value));
+    return number;
+}
+
+}  // namespace sinew::bindings

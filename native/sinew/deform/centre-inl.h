@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rows of bones for methods that rotate about a point which the bones move: compiled once for each instruction set, see
+// kernels/.
+#if defined(SINEW_DEFORM_CENTRE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SINEW_DEFORM_CENTRE_INL_H_
+#undef SINEW_DEFORM_CENTRE_INL_H_
+#else
+#define SINEW_DEFORM_CENTRE_INL_H_
+#endif
+
+#include "sinew/deform/bones-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+/// `v` rotated by the unit quaternion `q` (w, x, y, z).
+template <class D>
+HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
+    const Points<D> axis{hn::Set(d, q[1]), hn::Set(d, q[2]), hn::Set(d, q[3])};
+    const Points<D> inner = add_scaled<D>(cross<D>(axis, v), hn::Set(d, q[0]), v);
+    return add_scaled<D>(v, hn::Set(d, 2.0f), cross<D>(axis, inner));
+}
+
+/// `start`, and what the rotation by the quaternion `q` [4] of any length adds to `v`.
+template <class D>
+HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, const Points<D>& v) {
+    const Vec<D> squared_norm =
+        hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
+    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+    const Points<D> axis{q[1], q[2], q[3]};
+    const Points<D> inner = add_scaled<D>(cross<D>(axis, v), q[0], v);
+    return add_scaled<D>(start, scale, cross<D>(axis, inner));
+}
+
+/// What kernels of such rows have alike. A row is the rotation (w, x, y, z), then the rows of what the motion adds to
+/// a point.
+struct CentreRows {
+    static constexpr std::size_t kNumbers = 16;
+
+    /// The translation that also moves by the rotated scale.
+    template <class D>
+    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
+                                     const Points<D>& rest, Sum<D, kNumbers>& sum) {
+        Points<D> by;
+        if (!scaled(d, palette, bone, rest, by)) return;
+        const Points<D> rotated = rotated_by(d, row_of<kNumbers>(palette, bone), by);
+        sum.value[7] = hn::MulAdd(weight, rotated.x, sum.value[7]);
+        sum.value[11] = hn::MulAdd(weight, rotated.y, sum.value[11]);
+        sum.value[15] = hn::MulAdd(weight, rotated.z, sum.value[15]);
+    }
+
+    static HWY_INLINE void write_row(const Quats& q, const BonePoints& translation, BoneVec* row) {
+        const BoneTag d;
+        const BoneVec two = hn::Set(d, 2.0);
+        const BonePoints v{hn::Mul(two, q.v.x), hn::Mul(two, q.v.y), hn::Mul(two, q.v.z)};
+        // 2 v v^T - 2 |v|^2 + 2 w [v]x: the rotation without the identity.
+        const BoneVec xx = hn::Mul(v.x, q.v.x);
+        const BoneVec yy = hn::Mul(v.y, q.v.y);
+        const BoneVec zz = hn::Mul(v.z, q.v.z);
+        row[0] = q.w;
+        row[1] = q.v.x;
+        row[2] = q.v.y;
+        row[3] = q.v.z;
+        row[4] = hn::Neg(hn::Add(yy, zz));
+        row[5] = hn::MulSub(v.x, q.v.y, hn::Mul(v.z, q.w));
+        row[6] = hn::MulAdd(v.x, q.v.z, hn::Mul(v.y, q.w));
+        row[7] = translation.x;
+        row[8] = hn::MulAdd(v.x, q.v.y, hn::Mul(v.z, q.w));
+        row[9] = hn::Neg(hn::Add(xx, zz));
+        row[10] = hn::MulSub(v.y, q.v.z, hn::Mul(v.x, q.w));
+        row[11] = translation.y;
+        row[12] = hn::MulSub(v.x, q.v.z, hn::Mul(v.y, q.w));
+        row[13] = hn::MulAdd(v.y, q.v.z, hn::Mul(v.x, q.w));
+        row[14] = hn::Neg(hn::Add(xx, yy));
+        row[15] = translation.z;
+    }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#endif
