@@ -9,8 +9,8 @@ import sinew
 
 
 def method_items(first_number: int = 0) -> list[tuple[str, str, str, int]]:
-    """Blender shows an item without identifier as a heading. A property of these needs a default: else it would
-    be the first heading.
+    """Blender shows an item without identifier as a heading. A property of these needs a default: else it
+    would be the first heading.
 
     first_number  added to the numbers of methods, which start at 1
     """

@@ -121,6 +121,7 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
 
 
 STAGE_GROUPS = stage_settings.groups(_method_changed)
+METHOD_GROUPS = stage_settings.method_groups(_method_changed)
 
 
 class SinewSettings(bpy.types.PropertyGroup):
@@ -275,6 +276,12 @@ class SinewSettings(bpy.types.PropertyGroup):
         return list(dict.fromkeys(s.armature for s in self.replaced_modifiers if s.armature is not None))
 
 
+# One group of settings for each method that has parameters, by its name.
+SinewSettings.__annotations__.update(
+    {name: bpy.props.PointerProperty(type=group) for name, group in METHOD_GROUPS.items()}
+)
+
+
 def of(obj: bpy.types.Object) -> SinewSettings:
     return obj.sinew
 
@@ -331,7 +338,7 @@ def clear(obj: bpy.types.Object) -> None:
     obj.property_unset("sinew")
 
 
-CLASSES = (SinewReplacedModifier, *STAGE_GROUPS.values(), SinewSettings)
+CLASSES = (SinewReplacedModifier, *STAGE_GROUPS.values(), *METHOD_GROUPS.values(), SinewSettings)
 
 # A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
 MESH_REQUEST = bpy.props.FloatProperty(

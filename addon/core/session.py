@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import sinew
 
+from .parameters import Value
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
@@ -28,6 +29,7 @@ class Frame:
     rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
     mix               name of the second method, which the binding's mix weights mix in; empty for none
+    parameters        values of parameters of both methods, by their full names
     """
 
     method: str
@@ -36,6 +38,7 @@ class Frame:
     rest_points: np.ndarray
     scale_rule: str = BLENDER_4.name
     mix: str = ""
+    parameters: dict[str, Value] = field(default_factory=dict)
 
 
 class Binding:
@@ -167,6 +170,7 @@ class Binding:
             out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=rest_inverses,
+            parameters=frame.parameters or None,
         )
 
     def _take_new_data(self, frame: Frame) -> bool:
@@ -217,7 +221,7 @@ class Binding:
 
 def _same(a: Frame, b: Frame) -> bool:
     return (
-        (a.method, a.mix) == (b.method, b.mix)
+        (a.method, a.mix, a.parameters) == (b.method, b.mix, b.parameters)
         and a.scale_rule == b.scale_rule
         and _equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
@@ -247,6 +251,7 @@ class SkinStageFrame:
     bones_from_model: np.ndarray
     scale_rule: str = BLENDER_4.name
     mix: str = ""
+    parameters: dict[str, Value] = field(default_factory=dict)
 
 
 class SkinStack:
@@ -306,8 +311,9 @@ class SkinStack:
                 starts[behind] = result
             start = starts.get(number, result)
             is_end = skin_stage.binding is self._end
+            own = (frame.scale_rule, frame.mix, frame.parameters)
             changed |= skin_stage.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule, frame.mix),
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
                 out if is_end else None,
             )
             if skin_stage.mask is not None:

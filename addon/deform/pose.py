@@ -6,7 +6,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..attach import attach, properties
+from ..attach import attach, properties, stage_settings
+from ..core import parameters
 from ..core.errors import SinewError
 from ..core.session import SkinStageFrame
 from ..io import armature_io
@@ -62,8 +63,21 @@ def read(
             own, mix = attach.method_of(evaluated.modifiers[replaced.name]), ""
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
-        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix))
+        values = _parameters(evaluated, settings, own, mix)
+        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values))
     return frames
+
+
+def _parameters(
+    evaluated: bpy.types.Object, settings: properties.SinewSettings, method: str, mix: str
+) -> dict[str, parameters.Value]:
+    values = stage_settings.method_values(settings, (method, mix))
+    for name, value in values.items():
+        if value == "":
+            raise SinewError(
+                f"{evaluated.name}: the driver of {name} gives a number that stands for no choice"
+            )
+    return values
 
 
 def lacks_data(bound: Bound, frames: Frames | None) -> bool:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..attach import attach, properties
-from ..deform import session, small_meshes
+from ..deform import method_needs, session, small_meshes
 from ..deform.plan import ObjectFacts, plan
 from . import operators, precomputing
 from .sidebar import Sidebar, draw_text
@@ -76,6 +76,9 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     ):
         for replaced in list(settings.replaced_modifiers)[1:]:
             layout.prop(replaced, "method", text=replaced.name)
+    for name in method_needs.methods_of(obj):
+        for parameter in properties.METHODS[name].parameters:
+            layout.prop(getattr(settings, name), parameter.id)
     _draw_mix(layout, context, obj)
     for sentence in [] if state is None else state.bound.lacks((settings.method, settings.mix.method)):
         draw_text(layout, context, sentence, icon="INFO")

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, upstream_proxy
+from ...attach import attach, properties, stage_settings, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ...core.scale_rule import BLENDER_4
@@ -185,10 +185,12 @@ class _Other:
     @classmethod
     def of(cls, part: Part, other: str) -> _Other:
         shown, methods = part.skinned.shown, _modifiers_methods(part.obj, other)
+        values = stage_settings.method_values(properties.of(part.obj), (other,))
         frames: list[SkinStageFrame | None] = []
         for number, frame in enumerate(shown.frames):
             if frame is not None:
-                frame = replace(frame, method=methods[number] if methods else other, mix="")
+                method = methods[number] if methods else other
+                frame = replace(frame, method=method, mix="", parameters=values)
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)
