@@ -210,7 +210,6 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    mix: bpy.props.PointerProperty(type=STAGE_GROUPS["mix"])
     pose: bpy.props.FloatProperty(
         options={"HIDDEN", "ANIMATABLE"}, description="Carries pose_driver's driver"
     )
@@ -276,9 +275,12 @@ class SinewSettings(bpy.types.PropertyGroup):
         return list(dict.fromkeys(s.armature for s in self.replaced_modifiers if s.armature is not None))
 
 
-# One group of settings for each method that has parameters, by its name.
+# One group of settings for each stage, and for each method that has parameters, by its name.
 SinewSettings.__annotations__.update(
-    {name: bpy.props.PointerProperty(type=group) for name, group in METHOD_GROUPS.items()}
+    {
+        name: bpy.props.PointerProperty(type=group)
+        for name, group in (*STAGE_GROUPS.items(), *METHOD_GROUPS.items())
+    }
 )
 
 

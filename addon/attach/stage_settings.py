@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import bpy
 import sinew
@@ -57,6 +58,33 @@ def _group(kind: str, owner: sinew.Method | sinew.Stage, update: Callable) -> ty
             "__annotations__": {each.id: _property(each, update) for each in owner.parameters},
         },
     )
+
+
+def is_on(group: bpy.types.PropertyGroup, stage: sinew.Stage) -> bool:
+    """Whether the stage does anything, as its first parameter says."""
+    return getattr(group, stage.parameters[0].id) not in (False, OFF)
+
+
+def names_on(settings: bpy.types.PropertyGroup) -> list[str]:
+    """The stages that are on by an object's settings."""
+    return [name for name, stage in STAGES.items() if is_on(getattr(settings, name), stage)]
+
+
+def values_of(settings: bpy.types.PropertyGroup, name: str) -> dict[str, Any]:
+    """The parameters of a stage by their ids, but for vertex groups."""
+    group, stage = getattr(settings, name), STAGES[name]
+    return {each.id: getattr(group, each.id) for each in stage.parameters if each.kind != "vertex_group"}
+
+
+def vertex_groups(settings: bpy.types.PropertyGroup) -> dict[str, str]:
+    """The name of the vertex group of each stage that takes one, by the stage's name; empty where none is
+    chosen."""
+    return {
+        name: getattr(getattr(settings, name), each.id)
+        for name, stage in STAGES.items()
+        for each in stage.parameters
+        if each.kind == "vertex_group"
+    }
 
 
 def _property(parameter: sinew.Parameter, update: Callable) -> object:

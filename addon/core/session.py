@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 import sinew
@@ -14,9 +15,12 @@ from .parameters import Value
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
+from .stage_mesh import StageMesh
+from .stages import StagesAfter, StageValues
 from .vertex_data import VertexData
 
 LINEAR = "lbs"
+NO_STAGES: StageValues = MappingProxyType({})
 
 
 @dataclass
@@ -255,33 +259,80 @@ class SkinStageFrame:
 
 
 class SkinStack:
-    """The links of one mesh, in the order of its modifiers."""
+    """The links of one mesh, in the order of its modifiers, and the stages that follow the last.
 
-    def __init__(self, skin_stages: Sequence[SkinStage]) -> None:
+    stages_after  None for none
+    """
+
+    def __init__(self, skin_stages: Sequence[SkinStage], stages_after: StagesAfter | None = None) -> None:
         self.skin_stages = skin_stages
+        self.stages_after = stages_after
         # The last active link, if it has no mask: its points are the result.
         self._end: Binding | None = None
         self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
         self._active: tuple[bool, ...] = ()
+        self._frames: Sequence[SkinStageFrame | None] = ()
+        self._values = NO_STAGES
+        # The shape of the last frame after the stages; None where they are off, or it was not needed yet.
+        self._staged: np.ndarray | None = None
+        # The stages' mesh is another one since the last frame.
+        self._has_other_mesh = False
 
     @property
     def points(self) -> np.ndarray | None:
         """The shape of the last frame, float32 [vertices, 3], object space; None before the first."""
+        if not self._values:
+            return self._skin_points
+        if self._staged is None:
+            self._staged = np.array(self._skin_points, dtype=np.float32, order="C")
+            self._apply_stages(self._staged)
+        return self._staged
+
+    @property
+    def _skin_points(self) -> np.ndarray | None:
+        """Those before the stages."""
         return self._points if self._end is None else self._end.points
+
+    def set_stage_mesh(self, mesh: StageMesh) -> None:
+        """For a mesh of other points or faces."""
+        if self.stages_after is not None and self.stages_after.set_mesh(mesh) and self._values:
+            self._has_other_mesh = True
 
     def deform(
         self,
         rest_points: np.ndarray,
         frames: Sequence[SkinStageFrame | None],
         out: np.ndarray | None = None,
+        values: StageValues = NO_STAGES,
     ) -> bool:
         """Computes `points`; false where nothing differs from the last call.
 
         rest_points  float32 [vertices, 3], object space
         frames       one for each link, None for one that is switched off or has no pose
         out          see Binding.deform
+        values       the parameters of the stages that follow
         """
+        if self.stages_after is None:
+            values = NO_STAGES
+        changed = self._deform_skin(rest_points, frames, out)
+        changed |= values != self._values or self._has_other_mesh
+        self._frames, self._values, self._has_other_mesh = frames, values, False
+        if changed or out is not None:
+            self._staged = None
+        if values and out is not None:
+            self._apply_stages(out)
+        return changed
+
+    def _apply_stages(self, points: np.ndarray) -> None:
+        assert self.stages_after is not None
+        assert self._rest_points is not None
+        self.stages_after.apply(points, self._values, self._rest_points, self._frames)
+
+    def _deform_skin(
+        self, rest_points: np.ndarray, frames: Sequence[SkinStageFrame | None], out: np.ndarray | None
+    ) -> bool:
+        """The links alone."""
         active = tuple(frame is not None for frame in frames)
         changed = self._rest_points is None or active != self._active
         if any(active):

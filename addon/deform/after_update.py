@@ -61,7 +61,8 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
     shown = skinned.shown
     shown.frames = frames
     shown.rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)
-    differs = skinned.bound.skin_stack.deform(shown.rest_points, frames)
+    shown.stage_values = pose.stage_values(settings)
+    differs = skinned.bound.skin_stack.deform(shown.rest_points, frames, values=shown.stage_values)
     shown.number += differs
     return differs
 

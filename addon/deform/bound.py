@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..attach import attach, properties
+from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions
 from ..core import sdef
 from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
+from ..core.stage_mesh import StageMesh
+from ..core.stages import StagesAfter
 from ..core.vertex_data import VertexData
 from ..io import armature_io
 from . import method_needs, source, survey
@@ -29,9 +31,9 @@ class Bound:
     armatures   the session_uid of each Armature modifier's armature, 0 for none
     options     of each Armature modifier
     source      rest points and weights
-    skin_stack  deforms by them: one stage for each Armature modifier
+    skin_stack  deforms by them: one stage for each Armature modifier, then those of the library's list
     facts       of mesh and rig, for the panel
-    mix_group   the vertex group whose weights the stages have for their mix
+    groups      the vertex group of each stage of the library's list that has one, by the stage's name
     """
 
     armatures: list[int]
@@ -39,7 +41,7 @@ class Bound:
     source: Source
     skin_stack: SkinStack
     facts: RigFacts
-    mix_group: str
+    groups: dict[str, str]
 
     def is_of_another_stack(self, other: Bound | None) -> bool:
         """Whether modifiers, bones or weights differ from the other's: more than the rest points."""
@@ -70,29 +72,31 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     read_now = source.read(obj, depsgraph, method_needs.needs_surface(obj))
     pairs = attach.replaced_modifiers(obj)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
-    mix_group = properties.of(obj).mix.group
-    if old is not None and old.mix_group == mix_group and _equals_but_for_points(old, read_now, bones):
+    groups = stage_settings.vertex_groups(properties.of(obj))
+    if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
                 stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
         if np.array_equal(read_now.points, old.source.points):
             # The same array tells that nothing moved.
             read_now.points = old.source.points
+        old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skin_stages))
         return replace(old, source=read_now)
     options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
-    mix_weights = _mix_weights(obj, read_now, mix_group)
+    masks = _masks(obj, read_now, groups)
     stages = []
     before = () if old is None else old.skin_stack.skin_stages
     for option, its_bones, its_old in itertools.zip_longest(options, bones, before):
         if option is None:
             break
         weighting = option.weighting(obj, read_now.weights, its_bones)
-        binding = Binding(weighting, mix_weights, _vertex_data(weighting, read_now, its_old))
+        binding = Binding(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
         stages.append(SkinStage(binding, option.mask_weights(obj, read_now.weights), option.multi))
     weighting = stages[0].binding.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
-    return Bound(armatures, options, read_now, SkinStack(stages), facts, mix_group)
+    skin_stack = SkinStack(stages, StagesAfter(_stage_mesh(read_now, stages), masks))
+    return Bound(armatures, options, read_now, skin_stack, facts, groups)
 
 
 def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
@@ -113,12 +117,12 @@ def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
 
 
 def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
-    """Whether it was bound to other armatures, by other options or for another mix."""
+    """Whether it was bound to other armatures, by other options or with other vertex groups of stages."""
     pairs = attach.replaced_modifiers(obj)
     return (
         bound.armatures != [uid(replaced.armature) for _modifier, replaced in pairs]
         or bound.options != [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
-        or bound.mix_group != properties.of(obj).mix.group
+        or bound.groups != stage_settings.vertex_groups(properties.of(obj))
     )
 
 
@@ -151,10 +155,21 @@ def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> 
     )
 
 
-def _mix_weights(obj: bpy.types.Object, read_now: Source, name: str) -> np.ndarray | None:
-    """float32 [vertices], 0 to 1; None where there is no such group."""
-    group = obj.vertex_groups.get(name) if name else None
-    return None if group is None else read_now.weights.of_group(group.index)
+def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:
+    """float32 [vertices], 0 to 1, by the stage's name. None of a group that the object lacks, nor of a mesh
+    without weights, as Blender's modifiers have it."""
+    found = {stage: obj.vertex_groups.get(name) for stage, name in groups.items() if name}
+    has_weights = len(read_now.weights.groups) > 0
+    return {
+        stage: read_now.weights.of_group(group.index)
+        for stage, group in found.items()
+        if group is not None and has_weights
+    }
+
+
+def _stage_mesh(read_now: Source, stages: list[SkinStage]) -> StageMesh:
+    weightings = [stage.binding.weighting for stage in stages]
+    return StageMesh(read_now.topology, read_now.own_points, weightings)
 
 
 def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> Bones:

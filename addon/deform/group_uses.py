@@ -7,16 +7,16 @@ from collections.abc import Collection, Iterator
 
 import bpy
 
-from ..attach import properties
+from ..attach import properties, stage_settings
 
 
 def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
     """Those of the mesh object's groups `names` that something uses: a modifier (the Armature modifier's mask
-    too), a shape key, Sinew's mix, a constraint to the group, or a bone of another of the object's
+    too), a shape key, Sinew's stages, a constraint to the group, or a bone of another of the object's
     armatures."""
     unused = set(names)
     found: set[str] = set()
-    all_uses = (_in_modifiers, _in_shape_keys, _in_mix, _bones_of_all_armatures, _in_constraints)
+    all_uses = (_in_modifiers, _in_shape_keys, _in_stages, _bones_of_all_armatures, _in_constraints)
     for uses in all_uses:
         if not unused:
             break
@@ -56,9 +56,9 @@ def _in_shape_keys(obj: bpy.types.Object) -> Iterator[str]:
     yield from (key.vertex_group for key in keys.key_blocks) if keys is not None else ()
 
 
-def _in_mix(obj: bpy.types.Object) -> Iterator[str]:
+def _in_stages(obj: bpy.types.Object) -> Iterator[str]:
     if properties.has_sinew(obj):
-        yield properties.of(obj).mix.group
+        yield from stage_settings.vertex_groups(properties.of(obj)).values()
 
 
 def _bones_of_all_armatures(obj: bpy.types.Object) -> Iterator[str]:

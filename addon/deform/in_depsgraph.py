@@ -102,8 +102,9 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         last = bound.skin_stack.points
         out[:] = rest_points if last is None else last
     else:
-        bound.skin_stack.deform(rest_points, frames, out)
-        shown.frames, shown.rest_points = frames, rest_points
+        values = pose.stage_values(settings)
+        bound.skin_stack.deform(rest_points, frames, out, values)
+        shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
         shown.number += 1
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)

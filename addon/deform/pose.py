@@ -10,6 +10,7 @@ from ..attach import attach, properties, stage_settings
 from ..core import parameters
 from ..core.errors import SinewError
 from ..core.session import SkinStageFrame
+from ..core.stages import STAGES, StageValues
 from ..io import armature_io
 from .bound import Bound
 from .skinned_object import SkinnedObject
@@ -87,6 +88,21 @@ def lacks_data(bound: Bound, frames: Frames | None) -> bool:
         frame is not None and each is not None and not all(map(each.has, each.missed))
         for frame, each in zip(frames or (), data, strict=False)
     )
+
+
+def stage_values(settings: properties.SinewSettings) -> StageValues:
+    """The parameters of the stages that are on and follow the blend.
+
+    settings  the object's, evaluated
+    Raises SinewError where a driver sets a choice that there is not.
+    """
+    on = [name for name in stage_settings.names_on(settings) if name in STAGES]
+    values = {name: stage_settings.values_of(settings, name) for name in on}
+    for name, of_stage in values.items():
+        for parameter, value in of_stage.items():
+            if value == "":
+                raise SinewError(f"{name}.{parameter}: its driver gives a number that stands for no choice")
+    return values
 
 
 def is_finite(frames: Frames) -> bool:

@@ -12,7 +12,8 @@ import numpy as np
 from ..attach import attach, properties, stack, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
-from ..core.session import SkinStageFrame
+from ..core.session import NO_STAGES, SkinStageFrame
+from ..core.stages import StageValues
 from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
@@ -26,6 +27,7 @@ class Shown:
 
     frames        what decided it, for each Armature modifier; None before the first
     rest_points   float32 [vertices, 3], what it was deformed from
+    stage_values  the parameters of the stages that followed
     first_point   its first point, by which it is known from one that somebody else wrote
     number        how many there have been: another shape has another number
     milliseconds  that it took
@@ -33,6 +35,7 @@ class Shown:
 
     frames: list[SkinStageFrame | None] | None = None
     rest_points: np.ndarray | None = None
+    stage_values: StageValues = NO_STAGES
     first_point: bytes | None = None
     number: int = 0
     milliseconds: float = 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import attach, pose_driver, properties, upstream_proxy
+from ..attach import attach, pose_driver, properties, stage_settings, upstream_proxy
 from ..core.scale_rule import BLENDER_4
 from ..io.animation_paths import animated_paths
 
@@ -27,7 +27,7 @@ def is_builtin_faster(obj: bpy.types.Object) -> bool:
         and settings.leave_small
         and len(obj.data.vertices) < VERTICES.get(settings.method, 0)
         and settings.scale_rule == BLENDER_4.name
-        and not settings.mixed_method
+        and not stage_settings.names_on(settings)
         # Its colours need the points.
         and not settings.heat
         and _blend_alike(obj)
@@ -41,7 +41,7 @@ def fingerprint(obj: bpy.types.Object) -> list[str]:
     settings = properties.of(obj)
     modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
     methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
-    return [settings.method, settings.mixed_method, settings.scale_rule, *methods]
+    return [settings.method, settings.scale_rule, *stage_settings.names_on(settings), *methods]
 
 
 def _blend_alike(obj: bpy.types.Object) -> bool:

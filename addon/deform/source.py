@@ -12,6 +12,7 @@ import numpy as np
 from ..attach import properties, stored_vertex_data, upstream_proxy
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
+from ..core.stage_mesh import Topology
 from ..io import mesh_io
 from .changes import Changes
 
@@ -23,6 +24,9 @@ class Source:
     points            float32 [vertices, 3], object space, without shape keys
     triangles         int32 [triangles, 3]; None where no method needs them: to read them takes long
     stored            what the file has of numbers that methods keep of vertices, by its key; read with these
+    topology          faces and edges
+    own_points        float32 [vertices, 3], object space, the mesh's own, whatever stands in front; None
+                      where that gives it other vertices
     sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
@@ -33,6 +37,8 @@ class Source:
     weights: GroupWeights
     points: np.ndarray
     triangles: np.ndarray | None
+    topology: Topology
+    own_points: np.ndarray | None
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     from_front: bool = False
@@ -82,10 +88,16 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     triangles = mesh_io.read_triangles(mesh) if with_surface else None
     keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
-    if sdef_keys is not None and sdef_keys.shape[1] != len(points):
+    own_points = points
+    if from_front:
+        own_points = mesh_io.read_points(obj.data) if len(obj.data.vertices) == len(points) else None
+    if sdef_keys is not None and own_points is None:
         sdef_keys = None
     stored = stored_vertex_data.read(obj.data) if with_surface else {}
-    return Source(names, weights, points, triangles, keys, sdef_keys, from_front, stored)
+    topology = mesh_io.read_topology(mesh)
+    return Source(
+        names, weights, points, triangles, topology, own_points, keys, sdef_keys, from_front, stored
+    )
 
 
 def has_changed(

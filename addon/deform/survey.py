@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..attach import attach, properties, stack
+from ..attach import attach, properties, stack, stage_settings
 from ..attach.modifier_options import ModifierOptions, differences
 from ..core.errors import SinewError
 from ..core.rig import RigFacts, Weighting, describe_rig
@@ -35,17 +35,23 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    return facts.with_warnings([*differences(obj), *_missing_mix_group(obj)])
+    return facts.with_warnings([*differences(obj), *_missing_groups(obj)])
 
 
-def _missing_mix_group(obj: bpy.types.Object) -> list[str]:
+def _missing_groups(obj: bpy.types.Object) -> list[str]:
+    """A sentence for each stage that is on without the vertex group that it names."""
     if not properties.has_sinew(obj):
         return []
     settings = properties.of(obj)
-    if not settings.mixed_method or settings.mix.group in obj.vertex_groups:
-        return []
-    name = f"no vertex group {settings.mix.group}" if settings.mix.group else "no vertex group is chosen"
-    return [f"{name} for the mix: nothing is mixed"]
+    groups, found = stage_settings.vertex_groups(settings), []
+    for stage in stage_settings.names_on(settings):
+        name = groups.get(stage, "")
+        missing = f"no vertex group {name}" if name else "no vertex group is chosen"
+        if stage == "mix" and name not in obj.vertex_groups:
+            found.append(f"{missing} for the mix: nothing is mixed")
+        elif name and name not in obj.vertex_groups:
+            found.append(f"{missing} for {stage_settings.STAGES[stage].label}: it acts everywhere")
+    return found
 
 
 def describe_undriven(obj: bpy.types.Object) -> RigFacts:

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "arrays.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <type_traits>
 #include <utility>
 
 #include "sinew/deform/deformer.h"
+#include "sinew/deform/thread_pool.h"
 
 namespace sinew::bindings {
 namespace {
@@ -171,6 +173,57 @@ Affine<float> checked_affine(const py::handle& value, const char* argument) {
     }
     if (!is_finite(array.data(), 12)) fail(argument, "finite values", "NaN or infinity");
     return read_affine(array.data());
+}
+
+py::array_t<float> array_of(std::span<const Vec3<float>> points) {
+    py::array_t<float> array({static_cast<py::ssize_t>(points.size()), py::ssize_t{3}});
+    const auto* const first = reinterpret_cast<const float*>(points.data());
+    std::copy(first, first + array.size(), array.mutable_data());
+    return array;
+}
+
+// An array to write into: never a silent copy, or the caller's array would keep its old points.
+py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) {
+    const auto rows = static_cast<py::ssize_t>(vertex_count);
+    if (out.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
+    const std::string wanted = "writable C-contiguous float32 [" + std::to_string(vertex_count) + ", 3]";
+    if (!py::isinstance<py::array_t<float>>(out)) fail("out", wanted, describe(out));
+    auto array = py::reinterpret_borrow<py::array_t<float>>(out);
+    if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3)
+        fail("out", wanted, describe(out));
+    if ((array.flags() & py::array::c_style) == 0) fail("out", wanted, "one that is not C-contiguous");
+    if ((array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0) {
+        fail("out", wanted, "one that is not aligned");
+    }
+    if (!array.writeable()) fail("out", wanted, "a read-only array");
+    return array;
+}
+
+std::size_t checked_threads(const py::object& threads) {
+    if (threads.is_none()) return 0;
+    const char* const wanted = "None or an integer, 0 or more";
+    // Those of numpy, too.
+    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(threads.ptr()));
+    if (!number) {
+        PyErr_Clear();
+        fail("threads", wanted, describe(threads));
+    }
+    int overflow = 0;
+    const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
+    // As text the longest are refused by Python.
+    if (overflow < 0) fail("threads", wanted, "a negative one");
+    if (overflow == 0 && count < 0) fail("threads", wanted, std::to_string(count));
+    if (overflow == 0 && count == 0) return hardware_threads();
+    return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
+}
+
+/// The item `index` of a state of `size` items.
+py::object part_of(const py::object& state, std::size_t size, std::size_t index) {
+    const std::string wanted = "a tuple of " + std::to_string(size) + ", as pickling makes it";
+    if (!py::isinstance<py::tuple>(state)) fail("state", wanted, describe(state));
+    const auto parts = py::reinterpret_borrow<py::tuple>(state);
+    if (parts.size() != size) fail("state", wanted, "a tuple of " + std::to_string(parts.size()));
+    return parts[index];
 }
 
 }  // namespace sinew::bindings

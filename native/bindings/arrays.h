@@ -6,6 +6,7 @@
 
 #include <limits>
 #include <new>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -79,5 +80,34 @@ std::vector<Affine<float>> checked_affines(const py::handle& value, const char* 
 
 /// [4, 4] or [3, 4].
 Affine<float> checked_affine(const py::handle& value, const char* argument);
+
+static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and written in place");
+
+/// Of an array [n, 3].
+inline std::span<const Vec3<float>> as_points(const py::array_t<float>& points) {
+    return {reinterpret_cast<const Vec3<float>*>(points.data()), static_cast<std::size_t>(points.shape(0))};
+}
+
+template <class T>
+std::span<const T> as_span(const py::array_t<T>& array) {
+    return {array.data(), static_cast<std::size_t>(array.size())};
+}
+
+template <class T>
+py::array_t<T> array_of(std::span<const T> values) {
+    return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+/// [n, 3]
+py::array_t<float> array_of(std::span<const Vec3<float>> points);
+
+/// An array of points to write into, made where `out` is None.
+py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count);
+
+/// 0 where `threads` is None: as many as help.
+std::size_t checked_threads(const py::object& threads);
+
+/// The item `index` of a pickle's state of `size` items.
+py::object part_of(const py::object& state, std::size_t size, std::size_t index);
 
 }  // namespace sinew::bindings

@@ -11,24 +11,12 @@
 #include "module.h"
 #include "parameters.h"
 #include "sinew/deform/deformer.h"
-#include "sinew/deform/thread_pool.h"
 #include "sinew/skinning/methods.h"
 
 namespace sinew::bindings {
 namespace {
 
 constexpr std::size_t kVerticesUnderLock = 32'768;  // some 30 microseconds
-
-static_assert(sizeof(Vec3<float>) == 3 * sizeof(float), "points are read and written in place");
-
-std::span<const Vec3<float>> as_points(const py::array_t<float>& points) {
-    return {reinterpret_cast<const Vec3<float>*>(points.data()), static_cast<std::size_t>(points.shape(0))};
-}
-
-template <class T>
-std::span<const T> as_span(const py::array_t<T>& array) {
-    return {array.data(), static_cast<std::size_t>(array.size())};
-}
 
 std::string names_of_methods() {
     std::string names;
@@ -147,15 +135,7 @@ Deformer make_deformer_of(const Binding& binding, const py::object& method, cons
 
 // --- Pickles: what a Binding keeps, as arrays; of a Deformer, then its method and mix.
 
-template <class T>
-py::array_t<T> array_of(const std::vector<T>& values) {
-    return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
-}
-
 py::tuple state_of(const BoundMesh& mesh) {
-    py::array_t<float> points({static_cast<py::ssize_t>(mesh.rest_points.size()), py::ssize_t{3}});
-    const auto* const first = reinterpret_cast<const float*>(mesh.rest_points.data());
-    std::copy(first, first + points.size(), points.mutable_data());
     py::object rest_bones = py::none();
     if (!mesh.rest_bones.empty()) {
         Output<Affine<float>> output({static_cast<py::ssize_t>(mesh.rest_bones.size())});
@@ -170,29 +150,22 @@ py::tuple state_of(const BoundMesh& mesh) {
         for (const auto& [method, values] : mesh.vertex_data) {
             const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
             by_method[py::str(std::string(method.name))] =
-                array_of(values).reshape({static_cast<py::ssize_t>(mesh.rest_points.size()), floats});
+                array_of(std::span(values))
+                    .reshape({static_cast<py::ssize_t>(mesh.rest_points.size()), floats});
         }
         vertex_data = by_method;
     }
-    return py::make_tuple(points, array_of(mesh.influence_offsets), array_of(mesh.influence_bones),
-                          array_of(mesh.influence_weights), rest_bones, vertex_data);
+    return py::make_tuple(array_of(std::span(mesh.rest_points)), array_of(std::span(mesh.influence_offsets)),
+                          array_of(std::span(mesh.influence_bones)),
+                          array_of(std::span(mesh.influence_weights)), rest_bones, vertex_data);
 }
 
 py::tuple state_of(const Deformer& deformer) {
     py::object mix = py::none();
     if (const MethodInfo* const mixed = deformer.mixed_method(); mixed != nullptr) {
-        mix = py::make_tuple(std::string(mixed->name), array_of(deformer.mix_weights()));
+        mix = py::make_tuple(std::string(mixed->name), array_of<float>(deformer.mix_weights()));
     }
     return py::make_tuple(state_of(deformer.unpack()), std::string(deformer.method().name), mix);
-}
-
-/// The item `index` of a state of `size` items.
-py::object part_of(const py::object& state, std::size_t size, std::size_t index) {
-    const std::string wanted = "a tuple of " + std::to_string(size) + ", as pickling makes it";
-    if (!py::isinstance<py::tuple>(state)) fail("state", wanted, describe(state));
-    const auto parts = py::reinterpret_borrow<py::tuple>(state);
-    if (parts.size() != size) fail("state", wanted, "a tuple of " + std::to_string(parts.size()));
-    return parts[index];
 }
 
 BindArrays arrays_of_state(const py::object& state) {
@@ -227,41 +200,6 @@ std::string text_of_deformer(const Deformer& deformer) {
         text += " mixed with " + std::string(mixed->name);
     }
     return text + ": " + counts_of(deformer);
-}
-
-// An array to write into: never a silent copy, or the caller's array would keep its old points.
-py::array_t<float> checked_out(const py::object& out, std::size_t vertex_count) {
-    const auto rows = static_cast<py::ssize_t>(vertex_count);
-    if (out.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
-    const std::string wanted = "writable C-contiguous float32 [" + std::to_string(vertex_count) + ", 3]";
-    if (!py::isinstance<py::array_t<float>>(out)) fail("out", wanted, describe(out));
-    auto array = py::reinterpret_borrow<py::array_t<float>>(out);
-    if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3)
-        fail("out", wanted, describe(out));
-    if ((array.flags() & py::array::c_style) == 0) fail("out", wanted, "one that is not C-contiguous");
-    if ((array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0) {
-        fail("out", wanted, "one that is not aligned");
-    }
-    if (!array.writeable()) fail("out", wanted, "a read-only array");
-    return array;
-}
-
-std::size_t checked_threads(const py::object& threads) {
-    if (threads.is_none()) return 0;
-    const char* const wanted = "None or an integer, 0 or more";
-    // Those of numpy, too.
-    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(threads.ptr()));
-    if (!number) {
-        PyErr_Clear();
-        fail("threads", wanted, describe(threads));
-    }
-    int overflow = 0;
-    const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
-    // As text the longest are refused by Python.
-    if (overflow < 0) fail("threads", wanted, "a negative one");
-    if (overflow == 0 && count < 0) fail("threads", wanted, std::to_string(count));
-    if (overflow == 0 && count == 0) return hardware_threads();
-    return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
 // Read in place, as posed bones come by columns from Blender on every frame. Multiplied in double, as a bone

@@ -125,7 +125,7 @@ void bind_methods(py::module_& m) {
         "methods", [] { return tuple_of<MethodInfo>(kMethods); }, "Every skinning method, one Method each.");
     m.def(
         "stages", [] { return tuple_of<StageInfo>(kStages); },
-        "Every stage, one Stage each. `mix` is an argument of Deformer.");
+        "Every stage, one Stage each. `mix` is an argument of Deformer, `delta_mush` is DeltaMush.");
 }
 
 }  // namespace sinew::bindings

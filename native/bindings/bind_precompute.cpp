@@ -13,11 +13,6 @@
 namespace sinew::bindings {
 namespace {
 
-template <class T>
-std::span<const T> as_span(const py::array_t<T>& array) {
-    return {array.data(), static_cast<std::size_t>(array.size())};
-}
-
 /// Calls `run` with options that report to `progress`, a callable or None. The lock is given away but for these calls.
 template <class Run>
 auto precompute(const py::object& progress, PrecomputeOptions options, const Run& run) {
@@ -75,11 +70,7 @@ py::object centres(const py::object& rest_points, const py::object& influence_of
         checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences);
     const auto corners = checked<std::int32_t>(triangles, "triangles", 2, "int32 [triangles, 3]");
     if (corners.shape(1) != 3) fail("triangles", "int32 [triangles, 3]", describe(triangles));
-    const BindData data{
-        {reinterpret_cast<const Vec3<float>*>(points.data()), static_cast<std::size_t>(points.shape(0))},
-        as_span(offsets),
-        as_span(bones),
-        as_span(weights)};
+    const BindData data{as_points(points), as_span(offsets), as_span(bones), as_span(weights)};
     PrecomputeOptions options;
     options.threads = thread_count(threads);
     options.exact = exact;

@@ -9,6 +9,7 @@ PYBIND11_MODULE(_native, m) {
     sinew::bindings::bind_transforms(m);
     sinew::bindings::bind_interpolate(m);
     sinew::bindings::bind_deformer(m);
+    sinew::bindings::bind_delta_mush(m);
     sinew::bindings::bind_precompute(m);
     sinew::bindings::bind_threads(m);
 }

@@ -11,6 +11,7 @@ void bind_threads(pybind11::module_& m);
 void bind_transforms(pybind11::module_& m);
 void bind_interpolate(pybind11::module_& m);
 void bind_deformer(pybind11::module_& m);
+void bind_delta_mush(pybind11::module_& m);
 void bind_precompute(pybind11::module_& m);
 
 }  // namespace sinew::bindings

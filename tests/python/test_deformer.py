@@ -69,7 +69,7 @@ def parameters_are_whole(parameters):
 
 def test_stages_say_what_they_are():
     rows = sinew.stages()
-    assert [row.name for row in rows] == ["mix"]
+    assert [row.name for row in rows] == ["mix", "delta_mush"]
     for row in rows:
         assert row.label
         assert row.description

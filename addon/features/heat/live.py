@@ -16,8 +16,9 @@ from ...attach import attach, properties, stage_settings, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ...core.scale_rule import BLENDER_4
-from ...core.session import Binding, SkinStack, SkinStage, SkinStageFrame
+from ...core.session import NO_STAGES, Binding, SkinStack, SkinStage, SkinStageFrame
 from ...core.spaces import is_same_space, transformed, transformed_axes
+from ...core.stages import StageValues
 from ...core.surface import Surface, joined
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
@@ -129,7 +130,9 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
             SkinStage(Binding(b.weighting, b.mix_weights, b.vertex_data), stage.mask, stage.multi)
             for stage, b in known
         ]
-        parts.append(Part(obj, skinned, skinned.bound, surface, SkinStack(stages)))
+        after = skinned.bound.skin_stack.stages_after
+        own_stack = SkinStack(stages, None if after is None else after.another())
+        parts.append(Part(obj, skinned, skinned.bound, surface, own_stack))
     if not parts:
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
@@ -181,6 +184,7 @@ class _Other:
     skin_stack: SkinStack
     rest_points: np.ndarray
     frames: list[SkinStageFrame | None]
+    stage_values: StageValues
 
     @classmethod
     def of(cls, part: Part, other: str) -> _Other:
@@ -194,11 +198,12 @@ class _Other:
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)
-        return cls(part.skin_stack, shown.rest_points, frames)
+        # The Armature modifiers have no stages.
+        return cls(part.skin_stack, shown.rest_points, frames, NO_STAGES if methods else shown.stage_values)
 
     def points(self) -> np.ndarray:
         """float32 [vertices, 3], object space."""
-        self.skin_stack.deform(self.rest_points, self.frames)
+        self.skin_stack.deform(self.rest_points, self.frames, values=self.stage_values)
         return self.skin_stack.points
 
 

@@ -9,6 +9,7 @@ from . import affine, dual_quat, interpolate, quat_vec, spline
 from ._native import (
     Binding,
     Deformer,
+    DeltaMush,
     Method,
     Parameter,
     Skeleton,
@@ -23,6 +24,7 @@ from ._native import (
 __all__ = [
     "Binding",
     "Deformer",
+    "DeltaMush",
     "Method",
     "Parameter",
     "Skeleton",

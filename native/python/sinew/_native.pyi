@@ -105,7 +105,7 @@ def methods() -> tuple[Method, ...]:
     """Every skinning method, one Method each."""
 
 def stages() -> tuple[Stage, ...]:
-    """Every stage, one Stage each. `mix` is an argument of Deformer."""
+    """Every stage, one Stage each. `mix` is an argument of Deformer, `delta_mush` is DeltaMush."""
 
 def keep_thread_state() -> None:
     """Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and
@@ -303,4 +303,81 @@ class Deformer:
 
         A vertex without influences stays. The GIL is released for large meshes. Raises ValueError that
         names the argument, what was wanted and what came.
+        """
+
+@final
+class DeltaMush:
+    """The stage `delta_mush` of one mesh: smooths deformed points and gives them the details of the rest
+    points back (Mancewicz et al. 2014), as Blender's Corrective Smooth does. Can be pickled.
+    """
+
+    def __init__(
+        self,
+        rest_points: ArrayLike,
+        face_offsets: ArrayLike,
+        corner_vertices: ArrayLike,
+        edges: ArrayLike,
+        *,
+        iterations: int | np.integer[Any] = 5,
+        radius: float = 0.0,
+        factor: float = 0.5,
+        smooth_type: str = "simple",
+        pin_boundary: bool = False,
+        weights: ArrayLike | None = None,
+    ) -> None:
+        """rest_points: float32 [vertices, 3], without shape keys.
+        face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
+        corner_vertices: int32 [corners], the vertex of each corner.
+        edges: int32 [edges, 2], the vertices of every edge of a face and of those without one.
+            At most 2^29 - 1 vertices.
+        iterations: how often the mesh is smoothed, 0 to 1,000; not used with a radius.
+        radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian, however
+            dense the mesh is; 0 for so many iterations. The shortest tenth of edges, and all where it would
+            take more than 1,000 iterations, are smoothed less far.
+        factor: how far one iteration moves a vertex, 0 to 1.
+        smooth_type: "simple", or "length_weighted": neighbours count by the length of their edges.
+        pin_boundary: the ends of edges with one face are not smoothed.
+        weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.
+
+        All input is copied. Raises ValueError that names the argument, what was wanted and what came.
+        """
+    @property
+    def vertex_count(self) -> int:
+        """Vertices of the mesh."""
+    @property
+    def iterations(self) -> int:
+        """How often it smooths, also with a radius."""
+    def bind(
+        self,
+        rest_points: ArrayLike,
+        *,
+        iterations: int | np.integer[Any] = 5,
+        radius: float = 0.0,
+        factor: float = 0.5,
+        smooth_type: str = "simple",
+        pin_boundary: bool = False,
+        weights: ArrayLike | None = None,
+    ) -> None:
+        """Other rest points and settings, of the same faces and edges; it takes about as long as to apply it.
+
+        Arguments are those of the constructor. Raises ValueError as that does, and is then as it was.
+        """
+    def apply(
+        self,
+        points: ArrayLike,
+        out: NDArray[np.float32] | None = None,
+        scale: float = 1.0,
+        threads: int | np.integer[Any] | None = None,
+    ) -> NDArray[np.float32]:
+        """The smoothed points, float32 [vertices, 3].
+
+        points: float32 [vertices, 3], deformed, in the space of the rest points.
+        out: written and returned where given: float32 [vertices, 3], C-contiguous, aligned; never converted.
+            May be `points`.
+        scale: how much of the details comes back; 1 all.
+        threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The result
+            is the same bit for bit.
+
+        A vertex without faces is smoothed without details. The GIL is released for large meshes. Raises
+        ValueError that names the argument, what was wanted and what came.
         """

@@ -3,11 +3,12 @@
 
 #include <array>
 
+#include "sinew/skinning/delta_mush.h"
 #include "sinew/skinning/mix.h"
 
 namespace sinew {
 
-/// THE list of stages: what may follow a method.
-inline constexpr std::array kStages{Mix::info};
+/// THE list of stages: what may follow a method, in the order in which they do.
+inline constexpr std::array kStages{Mix::info, DeltaMushStage::info};
 
 }  // namespace sinew

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What stages know of the mesh that they are bound to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .rig import Weighting
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Faces and edges of a mesh.
+
+    face_offsets     int32 [faces + 1], the first corner of each face, then the end
+    corner_vertices  int32 [corners]
+    edges            int32 [edges, 2]
+    """
+
+    face_offsets: np.ndarray
+    corner_vertices: np.ndarray
+    edges: np.ndarray
+
+    def equals(self, other: Topology) -> bool:
+        return (
+            np.array_equal(self.face_offsets, other.face_offsets)
+            and np.array_equal(self.corner_vertices, other.corner_vertices)
+            and np.array_equal(self.edges, other.edges)
+        )
+
+
+@dataclass(frozen=True)
+class StageMesh:
+    """
+    topology     as it comes to the first Armature modifier
+    rest_points  float32 [vertices, 3], object space: the mesh's own, without shape keys and modifiers; None
+                 where modifiers in front give it other vertices: then each frame's rest points are taken
+    weightings   of the Armature modifiers
+    """
+
+    topology: Topology
+    rest_points: np.ndarray | None
+    weightings: Sequence[Weighting]
+
+    def equals(self, other: StageMesh) -> bool:
+        """Of the same Armature modifiers."""
+        points, known = self.rest_points, other.rest_points
+        if points is None or known is None:
+            return points is known and self.topology.equals(other.topology)
+        return np.array_equal(points, known) and self.topology.equals(other.topology)

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/deform/delta_mush.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "sinew/deform/check_bind_data.h"
+#include "sinew/deform/mush_mesh.h"
+#include "sinew/deform/thread_pool.h"
+#include "sinew/skinning/delta_mush.h"
+
+namespace sinew {
+namespace {
+
+// Below this, waking a second thread at each iteration costs more than it saves.
+constexpr std::size_t kVerticesWorthAThread = 16384;
+
+// With a radius, the share of vertices whose edges may be too short for the number of iterations.
+constexpr double kShareOfShortest = 0.1;
+
+void check_range(const std::string& argument, double value, double least, double most) {
+    if (!(value >= least && value <= most)) {
+        fail(argument, "a number from " + std::to_string(least) + " to " + std::to_string(most),
+             std::to_string(value));
+    }
+}
+
+void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings,
+           std::size_t vertices) {
+    if (rest_points.size() != vertices) {
+        fail("rest_points", std::to_string(vertices) + " points", std::to_string(rest_points.size()));
+    }
+    check_points(rest_points);
+    const auto most = static_cast<std::size_t>(DeltaMushStage::kMaxIterations);
+    if (settings.iterations > most) {
+        fail("iterations", "at most " + std::to_string(most), std::to_string(settings.iterations));
+    }
+    if (!(settings.radius >= 0.0f) || !std::isfinite(settings.radius)) {
+        fail("radius", "0 or more", std::to_string(settings.radius));
+    }
+    check_range("factor", static_cast<double>(settings.factor), 0.0, 1.0);
+    if (settings.weights.empty()) return;
+    if (settings.weights.size() != vertices) {
+        fail("weights", "none, or one for each of the " + std::to_string(vertices) + " vertices",
+             std::to_string(settings.weights.size()));
+    }
+    for (std::size_t vertex = 0; vertex < vertices; ++vertex) {
+        if (std::isnan(settings.weights[vertex])) {
+            fail("weights", "weights from 0 to 1", "NaN at vertex " + std::to_string(vertex));
+        }
+    }
+}
+
+Float4 float4_of(const Vec3<float>& point) { return {{point.x, point.y, point.z, 0.0f}}; }
+
+/// How often a mesh is smoothed, and by how much each of its vertices in its order: the factor of its own alone.
+struct Amount {
+    std::size_t iterations;
+    std::vector<float> factors;
+};
+
+/// The mean square of the lengths of each vertex's edges at rest, in the order of the mesh; 0 without edges.
+std::vector<double> squared_lengths(const MushMesh& mesh, std::span<const Vec3<float>> rest_points) {
+    std::vector<double> squared(mesh.vertices.size());
+    const auto point = [&](std::size_t i) { return Vec3<double>(rest_points[mesh.vertices[i]]); };
+    for (const MushRun& run : mesh.runs) {
+        const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
+        for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i, neighbours += run.valence) {
+            for (std::size_t k = 0; k < run.valence; ++k) {
+                const Vec3<double> edge = point(static_cast<std::size_t>(neighbours[k])) - point(i);
+                squared[i] += glm::dot(edge, edge);
+            }
+            squared[i] /= run.valence;
+        }
+    }
+    return squared;
+}
+
+Amount amount_of(const MushMesh& mesh, std::span<const Vec3<float>> rest_points,
+                 const DeltaMushSettings& settings) {
+    Amount amount{settings.iterations, std::vector<float>(mesh.vertices.size(), settings.factor)};
+    if (settings.radius == 0.0f) return amount;
+    const std::vector<double> squared = squared_lengths(mesh, rest_points);
+    std::vector<double> sorted;
+    std::ranges::copy_if(squared, std::back_inserter(sorted), [](double square) { return square > 0.0; });
+    if (sorted.empty() || settings.factor == 0.0f) return {0, std::move(amount.factors)};
+    const auto shortest =
+        sorted.begin() + static_cast<std::ptrdiff_t>(kShareOfShortest * static_cast<double>(sorted.size()));
+    std::ranges::nth_element(sorted, shortest);
+    const auto radius = static_cast<double>(settings.radius);
+    // What the factors of all iterations have to add up to, times the square of the length of edges.
+    const double wanted = (settings.type == SmoothType::length_weighted ? 4.0 : 2.0) * radius * radius;
+    const double iterations = std::ceil(wanted / (static_cast<double>(settings.factor) * *shortest));
+    amount.iterations = static_cast<std::size_t>(std::clamp(iterations, 1.0, DeltaMushStage::kMaxIterations));
+    for (std::size_t i = 0; i < squared.size(); ++i) {
+        const double factor = wanted / (static_cast<double>(amount.iterations) * squared[i]);
+        amount.factors[i] = static_cast<float>(std::min(factor, static_cast<double>(settings.factor)));
+    }
+    return amount;
+}
+
+}  // namespace
+
+struct DeltaMush::State {
+    State(const MeshTopology& topology, std::size_t vertices)
+        : face_offsets(topology.face_offsets.begin(), topology.face_offsets.end()),
+          corner_vertices(topology.corner_vertices.begin(), topology.corner_vertices.end()),
+          edges(topology.edges.begin(), topology.edges.end()),
+          mesh(make_mush_mesh(topology, vertices)),
+          kept(vertices + kLanes),
+          smoothed{std::vector<Float4>(vertices + kLanes), std::vector<Float4>(vertices + kLanes)} {}
+
+    void bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with);
+
+    /// Smooths smoothed[0]; the index of the result.
+    std::size_t smooth(const MushKernel& kernel, std::size_t threads) const noexcept;
+
+    [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
+        if (threads > 0) return threads;
+        return std::min(hardware_threads(), 1 + mesh.vertices.size() / kVerticesWorthAThread);
+    }
+
+    // As they came.
+    std::vector<std::int32_t> face_offsets;
+    std::vector<std::int32_t> corner_vertices;
+    std::vector<std::int32_t> edges;
+    std::vector<Vec3<float>> rest_points;
+    std::vector<float> weights;
+    DeltaMushSettings settings;
+
+    MushMesh mesh;
+    std::size_t iterations = 0;
+    std::vector<float> factors;        // as MushFrame has them
+    std::vector<MushDetails> details;  // of mesh.corners
+
+    // Of one call at a time. Those beyond the vertices stay 0.
+    mutable std::mutex mutex;
+    std::vector<Float4> kept;
+    mutable std::vector<Float4> smoothed[2];
+};
+
+void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with) {
+    check(points, with, mesh.vertices.size());
+    Amount amount = amount_of(mesh, points, with);
+    std::vector<Vec3<float>> own_points(points.begin(), points.end());
+    std::vector<float> own_weights(with.weights.begin(), with.weights.end());
+    std::vector<MushDetails> own_details(mesh.corners.size());
+    for (float& weight : own_weights) weight = std::clamp(weight, 0.0f, 1.0f);
+    const float by_type = with.type == SmoothType::length_weighted ? 2.0f : 1.0f;
+    for (const MushRun& run : mesh.runs) {
+        for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i) {
+            const float weight = own_weights.empty() ? 1.0f : own_weights[mesh.vertices[i]];
+            const bool is_pinned = with.pin_boundary && mesh.on_boundary[i] != 0;
+            amount.factors[i] *= is_pinned ? 0.0f : by_type * weight / static_cast<float>(run.valence);
+        }
+    }
+
+    const std::scoped_lock lock(mutex);
+    iterations = amount.iterations;
+    factors = std::move(amount.factors);
+    details = std::move(own_details);
+    rest_points = std::move(own_points);
+    weights = std::move(own_weights);
+    settings = with;
+    settings.weights = weights;
+    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+        kept[i] = smoothed[0][i] = float4_of(rest_points[mesh.vertices[i]]);
+    }
+    // By the kernels that smooth each frame, so that the rest pose comes out as it was.
+    const MushKernel kernel = mush_kernel();
+    const std::size_t result = smooth(kernel, threads_for(0));
+    const MushFrame frame{&mesh, smoothed[result].data(), nullptr, nullptr, nullptr, 0.0f, nullptr};
+    kernel.take_details(frame, kept.data(), details.data(), 0, mesh.chunk_count());
+}
+
+std::size_t DeltaMush::State::smooth(const MushKernel& kernel, std::size_t threads) const noexcept {
+    const bool by_length = settings.type == SmoothType::length_weighted;
+    struct Work {
+        decltype(kernel.smooth) run;
+        MushFrame frame;
+    } work{by_length ? kernel.smooth_by_length : kernel.smooth,
+           {&mesh, nullptr, nullptr, factors.data(), nullptr, 0.0f, nullptr}};
+    for (std::size_t i = 0; i < iterations; ++i) {
+        work.frame.from = smoothed[i % 2].data();
+        work.frame.to = smoothed[1 - i % 2].data();
+        parallel_for(
+            mesh.chunk_count(), threads,
+            [&work](std::size_t begin, std::size_t end) { work.run(work.frame, begin, end); }, 1);
+    }
+    return iterations % 2;
+}
+
+DeltaMush::DeltaMush(const MeshTopology& topology, std::span<const Vec3<float>> rest_points,
+                     const DeltaMushSettings& settings)
+    : state_(std::make_unique<State>(topology, rest_points.size())) {
+    state_->bind(rest_points, settings);
+}
+
+DeltaMush::DeltaMush(DeltaMush&&) noexcept = default;
+DeltaMush& DeltaMush::operator=(DeltaMush&&) noexcept = default;
+DeltaMush::~DeltaMush() = default;
+
+void DeltaMush::bind(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings) {
+    state_->bind(rest_points, settings);
+}
+
+std::size_t DeltaMush::vertex_count() const noexcept { return state_->mesh.vertices.size(); }
+std::size_t DeltaMush::iterations() const noexcept { return state_->iterations; }
+
+DeltaMush::Parts DeltaMush::parts() const noexcept {
+    const State& state = *state_;
+    return {{state.face_offsets, state.corner_vertices, state.edges}, state.rest_points, state.settings};
+}
+
+void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
+    const State& state = *state_;
+    const MushMesh& mesh = state.mesh;
+    if (points.size() != mesh.vertices.size()) return;
+    const std::scoped_lock lock(state.mutex);
+    threads = state.threads_for(threads);
+    const MushKernel kernel = mush_kernel();
+    struct Work {
+        const State& state;
+        const MushKernel& kernel;
+        MushFrame frame;
+    } work{state, kernel, {&mesh, nullptr, nullptr, nullptr, state.details.data(), scale, points.data()}};
+    parallel_for(
+        mesh.chunk_count(), threads,
+        [&work](std::size_t begin, std::size_t end) {
+            const std::vector<std::uint32_t>& vertices = work.state.mesh.vertices;
+            end = std::min(end * MushMesh::kChunk, vertices.size());
+            for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
+                work.state.smoothed[0][i] = float4_of(work.frame.points[vertices[i]]);
+            }
+        },
+        1);
+    work.frame.from = state.smoothed[state.smooth(kernel, threads)].data();
+    parallel_for(
+        mesh.chunk_count(), threads,
+        [&work](std::size_t begin, std::size_t end) { work.kernel.finish(work.frame, begin, end); }, 1);
+}
+
+}  // namespace sinew

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stage `delta_mush` in float64 numpy: Blender's Corrective Smooth (Mancewicz, Derksen, Rijpkema, Wilson
+2014), one vertex or corner at a time, with angles by Blender's polynomial."""
+
+import numpy as np
+
+EPSILON = 10 * np.finfo(np.float32).eps
+
+
+def corners_of(faces):
+    """(vertex, the one before it, the one after it) of each corner of `faces`, lists of vertices."""
+    return [(f[i], f[i - 1], f[(i + 1) % len(f)]) for f in faces for i in range(len(f))]
+
+
+def boundary_of(faces, edges):
+    """The vertices at the ends of edges that have one face."""
+    count = {frozenset(map(int, edge)): 0 for edge in edges}
+    for vertex, _, following in corners_of(faces):
+        count[frozenset((vertex, following))] += 1
+    return sorted({v for edge, number in count.items() if number == 1 for v in edge})
+
+
+def smoothed(points, edges, factors, iterations, smooth_type):
+    """factors: of each vertex."""
+    points, (a, b) = np.array(points, np.float64), np.asarray(edges).reshape(-1, 2).T
+    valence = np.bincount(np.concatenate([a, b]), minlength=len(points))
+    for _ in range(iterations):
+        along = points[b] - points[a]
+        lengths = np.linalg.norm(along, axis=1) if smooth_type == "length_weighted" else np.ones(len(along))
+        total, weight = np.zeros_like(points), np.zeros(len(points))
+        for ends, sign in ((a, 1.0), (b, -1.0)):
+            np.add.at(total, ends, sign * lengths[:, None] * along)
+            np.add.at(weight, ends, lengths)
+        if smooth_type == "length_weighted":
+            divisor = weight * valence
+            moves = divisor > EPSILON
+            points[moves] += (2 * factors / np.where(moves, divisor, 1))[moves, None] * total[moves]
+        else:
+            points += (factors / np.maximum(valence, 1))[:, None] * total
+    return points
+
+
+def angle(cosine):
+    m = min(abs(cosine), 1.0)
+    size = np.sqrt(1 - m) * (1.5707963267 + m * (-0.213300989 + m * (0.077980478 + m * -0.02164095)))
+    return np.pi - size if cosine < 0 else size
+
+
+def unit(vector):
+    length = np.linalg.norm(vector)
+    return vector / length if length > np.sqrt(1e-35) else np.zeros(3)
+
+
+def frame(before, at, after):
+    """The axes of a corner, in columns, and its weight."""
+    a, b = unit(before - at), unit(at - after)
+    if (np.abs(a - b) <= EPSILON).all():
+        return np.eye(3), 0.0
+    z, x = unit(np.cross(a, b)), unit(a + b)
+    return np.column_stack([x, np.cross(z, x), z]), angle(a @ b)
+
+
+def delta_mush(
+    points,
+    mesh,
+    *,
+    iterations=5,
+    factor=0.5,
+    smooth_type="simple",
+    pin_boundary=False,
+    weights=None,
+    scale=1.0,
+):
+    """mesh: (rest points, faces as lists of vertices, edges)."""
+    rest, faces, edges = mesh
+    factors = factor * (np.ones(len(rest)) if weights is None else np.array(weights, np.float64))
+    if pin_boundary:
+        factors[boundary_of(faces, edges)] = 0.0
+    rest = np.asarray(rest, np.float64)
+    rest_smoothed = smoothed(rest, edges, factors, iterations, smooth_type)
+    result = smoothed(points, edges, factors, iterations, smooth_type)
+    details, weight_sums = np.zeros_like(result), np.zeros(len(result))
+    for at, before, after in corners_of(faces):
+        axes, _ = frame(*rest_smoothed[[before, at, after]])
+        posed_axes, weight = frame(*result[[before, at, after]])
+        details[at] += weight * posed_axes @ axes.T @ (rest[at] - rest_smoothed[at])
+        weight_sums[at] += weight
+    has_details = weight_sums > 0
+    result[has_details] += scale * details[has_details] / weight_sums[has_details, None]
+    return result
