@@ -35,7 +35,7 @@ class Shown:
 
     frames: list[SkinStageFrame | None] | None = None
     rest_points: np.ndarray | None = None
-    stage_values: StageValues = NO_STAGES
+    stage_values: StageValues = field(default_factory=lambda: NO_STAGES)
     first_point: bytes | None = None
     number: int = 0
     milliseconds: float = 0.0
