@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import bpy
@@ -326,6 +326,13 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
                 target[name] = value
             else:
                 setattr(target, name, value)
+
+
+def copy_groups(source: SinewSettings, target: SinewSettings, names: Iterable[str]) -> None:
+    """The same for some groups within the settings. One that is not there is not made by being read."""
+    for name in names:
+        if source.is_property_set(name):
+            copy(getattr(source, name), getattr(target, name))
 
 
 def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:

@@ -122,8 +122,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         properties.of(origin).scale_rule,
         properties.of(origin).leave_small,
     )
-    for group in (*properties.STAGE_GROUPS, *properties.METHOD_GROUPS):
-        properties.copy(getattr(properties.of(origin), group), getattr(settings, group))
+    groups = (*properties.STAGE_GROUPS, *properties.METHOD_GROUPS)
+    properties.copy_groups(properties.of(origin), settings, groups)
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True
