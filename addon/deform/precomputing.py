@@ -121,6 +121,9 @@ def store_in_meshes(pairs: list[tuple[bpy.types.Object, SkinnedObject | None]]) 
     of_meshes: dict[bpy.types.Mesh, dict[str, np.ndarray] | None] = {}
     for obj, skinned in pairs:
         mesh = obj.data
+        if properties.is_copy(obj):
+            # It goes with its comparison, and the mesh is the original's.
+            continue
         if skinned is None:
             of_meshes[mesh] = None
         elif of_meshes.setdefault(mesh, {}) is not None:
