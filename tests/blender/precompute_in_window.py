@@ -78,6 +78,15 @@ class KeepingEngine(bpy.types.RenderEngine):
         self.end_result(self.begin_result(0, 0, 4, 4))
 
 
+def make_hero() -> None:
+    """Its weights are all different, so that there is much to find."""
+    window_scene.make_character("Hero", VERTICES, (0.0, 0.0, 0.0))
+    weights = np.random.default_rng(1).uniform(0.05, 0.6, (len(hero().vertex_groups), VERTICES))
+    for group, own in zip(hero().vertex_groups, weights, strict=True):
+        for vertex, weight in enumerate(own.tolist()):
+            group.add([vertex], weight, "ADD")
+
+
 def forget() -> None:
     """As if nothing had been found before."""
     precomputations = sinew("core.precompute").precomputations
@@ -100,7 +109,7 @@ def add_sinew() -> Iterator[None]:
     window.install(ZIP)
     bpy.context.preferences.filepaths.temporary_directory = str(FOLDER)
     scene = bpy.context.window.scene
-    window_scene.make_character("Hero", VERTICES, (0.0, 0.0, 0.0))
+    make_hero()
     scene.frame_set(12)
     window.select_only(hero())
     window.open_sidebar()
@@ -181,8 +190,7 @@ def end_while_it_runs() -> Iterator[None]:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     facts["running_after_load"] = len(sinew("core.precompute").precomputations.running)
     yield
-    scene = bpy.context.window_manager.windows[0].scene
-    window_scene.make_character("Hero", VERTICES, (0.0, 0.0, 0.0))
+    make_hero()
     sinew("attach.attach").add(hero(), "cor")
     sinew("deform.session").refresh(bpy.context)
     facts["plan_at_the_end"] = plan()
