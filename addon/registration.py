@@ -21,7 +21,7 @@ def register() -> None:
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
         return
-    from .attach import properties
+    from .attach import properties, stored_vertex_data
     from .deform import exporters, handlers
     from .features.bake import feature as bake
     from .features.compare import feature as compare
@@ -29,23 +29,17 @@ def register() -> None:
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
     from .features.suggest import feature as suggest
-    from .ui import main_panel, operators, preferences
+    from .ui import main_panel, operators, precomputing, preferences
 
     # Panels appear in this order.
     for owner in (
-        preferences,
-        properties,
-        operators,
-        main_panel,
-        suggest,
-        inbetween,
-        bake,
-        compare,
-        heat,
-        diagnose,
+        *(preferences, properties, stored_vertex_data, operators, precomputing, main_panel),
+        *(suggest, inbetween, bake, compare, heat, diagnose),
     ):
         _register_classes(owner.CLASSES)
     properties.register()
+    stored_vertex_data.register()
+    precomputing.register()
     # Its handlers come first: poses before what they deform.
     inbetween.register()
     handlers.register()
@@ -59,7 +53,7 @@ def register() -> None:
 
 def unregister() -> None:
     if hasattr(bpy.types.Object, "sinew"):
-        from .attach import note, properties
+        from .attach import note, properties, stored_vertex_data
         from .deform import exporters, handlers, session
         from .features.bake import feature as bake
         from .features.compare import feature as compare
@@ -67,6 +61,7 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
+        from .ui import precomputing
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
@@ -76,6 +71,8 @@ def unregister() -> None:
         exporters.unregister()
         handlers.unregister()
         inbetween.unregister()
+        precomputing.unregister()
+        stored_vertex_data.unregister()
         properties.unregister()
     while _registered:
         bpy.utils.unregister_class(_registered.pop())

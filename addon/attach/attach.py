@@ -19,6 +19,7 @@ from . import (
     properties,
     setting_animation,
     stack,
+    stored_vertex_data,
     upstream_proxy,
 )
 from .stack import armature_modifier, sinew_modifier
@@ -174,6 +175,10 @@ def _take_off(obj: bpy.types.Object) -> None:
             obj.modifiers.remove(modifier)
         obj.parent_type = settings.parent_type
     point_store.remove(obj)
+    if not any(
+        other.data == obj.data and properties.has_sinew(other) for other in bpy.data.objects if other != obj
+    ):
+        stored_vertex_data.remove(obj.data)
     setting_animation.remove(obj)
     properties.clear(obj)
 

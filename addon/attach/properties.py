@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import bpy
@@ -11,6 +11,7 @@ import sinew
 
 from ..core.scale_rule import SCALE_RULES
 from . import stage_settings
+from .method_items import method_items
 from .stage_settings import OFF
 
 METHODS = {method.name: method for method in sinew.methods()}
@@ -111,8 +112,9 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         description="How this modifier blends, where several chained Armature modifiers deform the mesh",
         items=[
             (SAME_METHOD, "Same Method", "The method that is chosen for the object", 0),
-            *((m.name, m.label, m.description, m.number + 1) for m in METHODS.values()),
+            *method_items(1),
         ],
+        default=SAME_METHOD,
         update=_method_changed,
         override=OVERRIDABLE,
     )
@@ -129,6 +131,7 @@ class SinewReplacedSmooth(bpy.types.PropertyGroup):
 
 
 STAGE_GROUPS = stage_settings.groups(_method_changed)
+METHOD_GROUPS = stage_settings.method_groups(_method_changed)
 
 
 class SinewSettings(bpy.types.PropertyGroup):
@@ -138,7 +141,8 @@ class SinewSettings(bpy.types.PropertyGroup):
     method: bpy.props.EnumProperty(
         name="Method",
         description="How the bones' motions are blended at each vertex",
-        items=[(m.name, m.label, m.description, m.number) for m in METHODS.values()],
+        items=method_items(),
+        default=next(iter(METHODS)),
         update=_method_changed,
         override=OVERRIDABLE,
     )
@@ -284,9 +288,12 @@ class SinewSettings(bpy.types.PropertyGroup):
         return list(dict.fromkeys(s.armature for s in self.replaced_modifiers if s.armature is not None))
 
 
-# One group of settings for each stage of the library's list, by its name.
+# One group of settings for each stage, and for each method that has parameters, by its name.
 SinewSettings.__annotations__.update(
-    {name: bpy.props.PointerProperty(type=group) for name, group in STAGE_GROUPS.items()}
+    {
+        name: bpy.props.PointerProperty(type=group)
+        for name, group in (*STAGE_GROUPS.items(), *METHOD_GROUPS.items())
+    }
 )
 
 
@@ -334,6 +341,13 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
                 setattr(target, name, value)
 
 
+def copy_groups(source: SinewSettings, target: SinewSettings, names: Iterable[str]) -> None:
+    """The same for some groups within the settings. One that is not there is not made by being read."""
+    for name in names:
+        if source.is_property_set(name):
+            copy(getattr(source, name), getattr(target, name))
+
+
 def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:
     """Sets what Sinew keeps for itself: telling Blender would touch the object's mesh, as its weights' change
     does."""
@@ -346,7 +360,12 @@ def clear(obj: bpy.types.Object) -> None:
     obj.property_unset("sinew")
 
 
-CLASSES = (SinewReplacedModifier, SinewReplacedSmooth, *STAGE_GROUPS.values(), SinewSettings)
+CLASSES = (
+    *(SinewReplacedModifier, SinewReplacedSmooth),
+    *STAGE_GROUPS.values(),
+    *METHOD_GROUPS.values(),
+    SinewSettings,
+)
 
 # A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
 MESH_REQUEST = bpy.props.FloatProperty(

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of stages, one property group for each, made from the library's list."""
+"""The settings of stages and methods, one property group for each, made from the library's lists."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import bpy
 import sinew
 
 from ..core import parameters
+from .method_items import method_items
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
+# Those that can be set to something.
+METHODS = {method.name: method for method in sinew.methods() if method.parameters}
 # The choice beside the methods where a parameter names one: the stage does nothing.
 OFF = "OFF"
 # Of a library override, only what is marked so is kept with the file.
@@ -25,17 +28,36 @@ def as_stored(value: parameters.Value) -> parameters.Value:
 
 def groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:
     """A class of property groups for each stage, by its name. `update` is called at each change."""
+    return {name: _group("Stage", stage, update) for name, stage in STAGES.items()}
+
+
+def method_groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:
+    """The same for each method that has parameters."""
+    return {name: _group("Method", method, update) for name, method in METHODS.items()}
+
+
+def method_values(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> dict[str, parameters.Value]:
+    """The parameters of some methods by their full names, as Deformer.deform() takes them.
+
+    settings  of an object
+    """
     return {
-        name: type(
-            f"SinewStage{name.title().replace('_', '')}",
-            (bpy.types.PropertyGroup,),
-            {
-                "__doc__": stage.description,
-                "__annotations__": {each.id: _property(each, update) for each in stage.parameters},
-            },
-        )
-        for name, stage in STAGES.items()
+        f"{name}.{each.id}": getattr(getattr(settings, name), each.id)
+        for name in methods
+        if name in METHODS
+        for each in METHODS[name].parameters
     }
+
+
+def _group(kind: str, owner: sinew.Method | sinew.Stage, update: Callable) -> type:
+    return type(
+        f"Sinew{kind}{owner.name.title().replace('_', '')}",
+        (bpy.types.PropertyGroup,),
+        {
+            "__doc__": owner.description,
+            "__annotations__": {each.id: _property(each, update) for each in owner.parameters},
+        },
+    )
 
 
 def is_on(group: bpy.types.PropertyGroup, stage: sinew.Stage) -> bool:
@@ -73,9 +95,8 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
         "override": _OVERRIDE,
     }
     if parameter.kind == "method":
-        choices = [(OFF, "Off", "Without this stage", 0)]
-        choices += [(m.name, m.label, m.description, m.number + 1) for m in sinew.methods()]
-        return bpy.props.EnumProperty(items=choices, **facts)
+        choices = [(OFF, "Off", "Without this stage", 0), *method_items(1)]
+        return bpy.props.EnumProperty(items=choices, default=OFF, **facts)
     if parameter.kind == "enum":
         items = [(choice, choice.replace("_", " ").title(), "") for choice in parameter.choices]
         return bpy.props.EnumProperty(items=items, default=parameter.default, **facts)

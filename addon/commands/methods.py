@@ -22,14 +22,19 @@ def run(args: argparse.Namespace, console: Console) -> int:
     methods, stages = sinew.methods(), sinew.stages()
     if args.json:
         rows = {
-            "methods": [_facts(method) | {"needs": list(method.needs)} for method in methods],
+            "methods": [
+                _facts(method) | {"group": method.group, "needs": list(method.needs)} for method in methods
+            ],
             "stages": [_facts(stage) for stage in stages],
         }
         console.say(json.dumps(rows, indent=2))
     else:
         console.table(
-            ("method", "label", "when to use it", "needs"),
-            [(m.name, m.label, m.description, _needs(m)) for m in methods],
+            ("method", "group", "label", "when to use it", "parameters", "needs"),
+            [
+                (m.name, m.group, m.label, m.description, ", ".join(_parameters(m)), _needs(m))
+                for m in methods
+            ],
         )
         console.table(
             ("stage", "parameters", "what it does"),

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 import sinew
 
+from .parameters import Value
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
@@ -32,6 +33,7 @@ class Frame:
     rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
     mix               name of the second method, which the binding's mix weights mix in; empty for none
+    parameters        values of parameters of both methods, by their full names
     """
 
     method: str
@@ -40,6 +42,7 @@ class Frame:
     rest_points: np.ndarray
     scale_rule: str = BLENDER_4.name
     mix: str = ""
+    parameters: dict[str, Value] = field(default_factory=dict)
 
 
 class Binding:
@@ -65,6 +68,8 @@ class Binding:
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
         self._last: Frame | None = None
+        # That of the vertex data which the packed meshes have.
+        self._data_version = 0
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
         # The last frame was written to another array than _points.
         self._points_outdated = False
@@ -100,7 +105,8 @@ class Binding:
         Raises ValueError where `out` has another shape.
         """
         last = self._last
-        if out is None and last is not None and _same(last, frame):
+        is_packed_anew = self._take_new_data(frame)
+        if out is None and last is not None and _same(last, frame) and not is_packed_anew:
             return False
         self._shape(frame, self._points if out is None else out)
         self._last, self._points_outdated = frame, out is not None
@@ -168,16 +174,21 @@ class Binding:
             out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=rest_inverses,
+            parameters=frame.parameters or None,
         )
 
-    def replace_vertex_data(self, vertex_data: VertexData) -> None:
-        """For a mesh of other points or triangles. Deforms the next frame anew if the old data was used."""
-        old, self.vertex_data = self.vertex_data, vertex_data
-        if old is None or not old.is_used:
-            return
+    def _take_new_data(self, frame: Frame) -> bool:
+        """Whether methods keep other numbers of vertices since: then meshes are packed anew."""
+        if self.vertex_data is None:
+            return False
+        self._vertex_data_of(frame)
+        version, known = self.vertex_data.version, self._data_version
+        if version == known:
+            return False
+        self._data_version = version
         self._packed.clear()
         self._bound.clear()
-        self._last = None
+        return True
 
     def _weights_changed(self, frame: Frame) -> bool:
         """Whether the influences differ from the last frame's: they can depend on the rest points."""
@@ -214,7 +225,7 @@ class Binding:
 
 def _same(a: Frame, b: Frame) -> bool:
     return (
-        (a.method, a.mix) == (b.method, b.mix)
+        (a.method, a.mix, a.parameters) == (b.method, b.mix, b.parameters)
         and a.scale_rule == b.scale_rule
         and _equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
@@ -244,6 +255,7 @@ class SkinStageFrame:
     bones_from_model: np.ndarray
     scale_rule: str = BLENDER_4.name
     mix: str = ""
+    parameters: dict[str, Value] = field(default_factory=dict)
 
 
 class SkinStack:
@@ -350,8 +362,9 @@ class SkinStack:
                 starts[behind] = result
             start = starts.get(number, result)
             is_end = skin_stage.binding is self._end
+            own = (frame.scale_rule, frame.mix, frame.parameters)
             changed |= skin_stage.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, frame.scale_rule, frame.mix),
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
                 out if is_end else None,
             )
             if skin_stage.mask is not None:

@@ -3,25 +3,74 @@
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 import threading
+import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import sinew
 
+from .influences import Influences
+from .precompute import Make, Precomputation, Progress, precomputations
 from .rig import Weighting
 from .spaces import transformed
 
-# What makes the data of a method: of rest points, influences (offsets, bones, weights) and triangles.
-PROVIDERS: dict[str, Callable[..., np.ndarray | None]] = {"cor": sinew.centres_of_rotation}
+METHODS = {method.name: method for method in sinew.methods()}
+
+
+@dataclass(frozen=True)
+class Provider:
+    """What makes the data of a method.
+
+    what     it is called, for people
+    version  part of the hash: another one where the same mesh gives other data
+    make     of rest points, influences, triangles and progress
+    """
+
+    what: str
+    version: int
+    make: Callable[[np.ndarray, Influences, np.ndarray, Progress], np.ndarray | None]
+
+
+def _centres(
+    points: np.ndarray, influences: Influences, triangles: np.ndarray, progress: Progress
+) -> np.ndarray | None:
+    own = influences
+    return sinew.centres_of_rotation(
+        points, own.offsets, own.bones, own.weights, triangles, progress=progress
+    )
+
+
+PROVIDERS = {"cor": Provider("centres of rotation", 1, _centres)}
+
+
+@dataclass
+class _Entry:
+    """The data of one method. Where it is outdated, `made` has that of the mesh as it was before."""
+
+    key: str = ""
+    make: Make | None = None
+    made: np.ndarray | None = None
+    is_outdated: bool = False
+    run: Precomputation | None = None
+
+
+_versions = itertools.count(1)
 
 
 class VertexData:
-    """Of a mesh at rest, without shape keys. Any thread may ask.
+    """Of a mesh at rest, without shape keys. Any thread may ask; nobody writes to the arrays.
 
     weighting  of the bones that move the mesh
     points     float32 [vertices, 3], object space
-    triangles  int32 [triangles, 3]
+    triangles  int32 [triangles, 3]; None where no method that needs them was chosen
+    stored     what the file has, by its key
+    before     of the same object as it was: where it has as many vertices, its data serves until there is
+               other
     given      what is not made here but read from the mesh, by the name of the method
     """
 
@@ -29,40 +78,178 @@ class VertexData:
         self,
         weighting: Weighting,
         points: np.ndarray,
-        triangles: np.ndarray,
+        triangles: np.ndarray | None = None,
+        stored: Mapping[str, np.ndarray] | None = None,
+        before: VertexData | None = None,
         given: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         self.weighting = weighting
         self.points = points
         self.triangles = triangles
+        # The data differs where this does; 0 as long as there is none.
+        self.version = 0
+        # Methods that were asked for and could not be had.
+        self.missed: set[str] = set()
+        self.read_at = time.monotonic()
         self._given = dict(given or {})
-        self._made: dict[str, np.ndarray] = {}
+        self._stored = stored or {}
         self._lock = threading.Lock()
+        self._entries: dict[str, _Entry] = {}
+        if before is not None:
+            self._take_over(before)
+        if self._given:
+            self.version = next(_versions)
+
+    def _take_over(self, before: VertexData) -> None:
+        with before._lock:
+            for method, entry in before._entries.items():
+                if entry.run is not None:
+                    # Made of a mesh that is no longer there.
+                    entry.run.cancel()
+                if entry.made is not None and len(entry.made) == len(self.points):
+                    self._entries[method] = _Entry(made=entry.made, is_outdated=True)
+                    self.version = before.version
 
     @property
-    def is_used(self) -> bool:
-        return bool(self._made or self._given)
+    def made(self) -> dict[str, tuple[str, np.ndarray]]:
+        """The key and the data of each method that has some of this mesh."""
+        with self._lock:
+            entries = self._entries.items()
+            return {
+                method: (entry.key, entry.made)
+                for method, entry in entries
+                if entry.made is not None and not entry.is_outdated
+            }
+
+    def add_triangles(self, triangles: np.ndarray) -> None:
+        """Those of the mesh, where they were not read before."""
+        if self.triangles is None:
+            self.triangles = triangles
+
+    def is_ready(self, method: str) -> bool:
+        """Whether of() has something without making it, be it outdated; true for a method that keeps nothing.
+        Where precomputations are waited for, whether of() can make it."""
+        if method not in PROVIDERS:
+            return True
+        with self._lock:
+            entry = self._entries.get(method)
+            if precomputations.waits:
+                is_ready = self.triangles is not None or (entry is not None and entry.made is not None)
+            else:
+                is_ready = entry is not None and entry.made is not None
+            if not is_ready:
+                self.missed.add(method)
+            return is_ready
+
+    def has(self, method: str) -> bool:
+        """Whether the data is there, be it outdated; true for a method that keeps nothing."""
+        if method not in PROVIDERS:
+            return True
+        with self._lock:
+            entry = self._entries.get(method)
+            return entry is not None and entry.made is not None
+
+    def is_current(self, method: str) -> bool:
+        """Whether the data is there, and of this mesh."""
+        with self._lock:
+            entry = self._entries.get(method)
+            return entry is not None and entry.made is not None and not entry.is_outdated
+
+    def running(self, method: str) -> Precomputation | None:
+        """What makes the data now."""
+        with self._lock:
+            entry = self._entries.get(method)
+            return None if entry is None else entry.run
+
+    def is_stopped(self, method: str) -> bool:
+        """Whether the artist stopped what makes the data."""
+        with self._lock:
+            entry = self._entries.get(method)
+            return entry is not None and bool(entry.key) and entry.key in precomputations.stopped
 
     def of(self, method: str, bones_from_model: np.ndarray) -> np.ndarray | None:
-        """float32 [vertices, Method.vertex_floats], object space; None for a method that keeps nothing.
+        """float32 [vertices, Method.vertex_floats], object space; None for a method that keeps nothing. Made
+        here where there is none.
 
         bones_from_model  float64 [4, 4], where weights depend on where vertices are: the first call decides
         """
-        if method in self._given:
-            return self._given[method]
-        provider = PROVIDERS.get(method)
-        if provider is None:
-            return None
+        if method not in PROVIDERS:
+            return self._given.get(method)
         with self._lock:
-            if method not in self._made:
-                self._made[method] = self._make(provider, bones_from_model)
-            return self._made[method]
+            entry = self._entries.setdefault(method, _Entry())
+            if entry.made is not None and not (entry.is_outdated and precomputations.waits):
+                return entry.made
+            make = self._prepare(entry, method, bones_from_model)
+            if entry.made is not None and not entry.is_outdated:
+                return entry.made
+        made = precomputations.make_now(entry.key, make)
+        with self._lock:
+            self._put(entry, made)
+        return made
 
-    def _make(self, provider: Callable[..., np.ndarray | None], bones_from_model: np.ndarray) -> np.ndarray:
+    def request(self, method: str, bones_from_model: np.ndarray) -> None:
+        """Has the data found or, where precomputations are waited for, made; else its making starts on a
+        thread, unless the artist stopped it. Raises what the making raises."""
+        if method not in PROVIDERS or self.is_current(method):
+            return
+        if precomputations.waits:
+            self.of(method, bones_from_model)
+            return
+        with self._lock:
+            entry = self._entries.setdefault(method, _Entry())
+            if entry.run is not None:
+                return
+            make = self._prepare(entry, method, bones_from_model)
+            if (entry.made is None or entry.is_outdated) and entry.key not in precomputations.stopped:
+                entry.run = precomputations.start(entry.key, make)
+
+    def take_result(self, method: str) -> bool:
+        """Whether what made the data has ended since; its result is the data from now on. Raises what the
+        making raised."""
+        with self._lock:
+            entry = self._entries.get(method)
+            if entry is None or entry.run is None or not entry.run.has_ended:
+                return False
+            run, entry.run = entry.run, None
+            if run.error is not None:
+                raise run.error
+            if run.result is not None and entry.key == run.key:
+                self._put(entry, run.result)
+            return True
+
+    def _prepare(self, entry: _Entry, method: str, bones_from_model: np.ndarray) -> Make:
+        """Finds what was made before; else what makes it. Under the lock."""
+        if entry.make is not None:
+            return entry.make
+        if self.triangles is None:
+            raise RuntimeError(f"{method}: the mesh's triangles were not read")
         points = self.points
         if self.weighting.depends_on_points:
             points = transformed(points, bones_from_model)
         influences = self.weighting.influences_over_joints(points)
-        made = provider(self.points, influences.offsets, influences.bones, influences.weights, self.triangles)
-        assert made is not None, "nothing cancels it"
-        return made
+        provider = PROVIDERS[method]
+        entry.key = _key(method, provider.version, self.points, influences, self.triangles)
+        entry.make = partial(provider.make, self.points, influences, self.triangles)
+        found = self._stored.get(entry.key)
+        if found is None:
+            found = precomputations.find(entry.key)
+        if found is not None and self._fits(method, found):
+            self._put(entry, found)
+        return entry.make
+
+    def _fits(self, method: str, found: np.ndarray) -> bool:
+        wanted = (len(self.points), METHODS[method].vertex_floats)
+        return found.shape == wanted and found.dtype == np.float32 and bool(np.isfinite(found).all())
+
+    def _put(self, entry: _Entry, made: np.ndarray) -> None:
+        entry.made, entry.is_outdated = made, False
+        self.version = next(_versions)
+
+
+def _key(method: str, version: int, points: np.ndarray, influences: Influences, triangles: np.ndarray) -> str:
+    """The hash of all that the data of a method is made from."""
+    digest = hashlib.blake2b(f"{method} {version}".encode(), digest_size=16)
+    for array in (points, influences.offsets, influences.bones, influences.weights, triangles):
+        digest.update(f" {array.dtype.str} {array.shape} ".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()

@@ -16,15 +16,16 @@ from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
 log = logging.getLogger("sinew")
 
 
-def plan_of(obj: bpy.types.Object, failure: str = "") -> Plan:
+def plan_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> Plan:
     """What is to become of a skinned object as it is now.
 
-    failure  what failed when Sinew deformed it within Blender's evaluation
+    failure    what failed when Sinew deformed it within Blender's evaluation
+    waits_for  what its method needs and is not computed yet
     """
-    return plan(facts_of(obj, failure))
+    return plan(facts_of(obj, failure, waits_for))
 
 
-def facts_of(obj: bpy.types.Object, failure: str = "") -> ObjectFacts:
+def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> ObjectFacts:
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
     # While Sinew is off, the modifiers have the flags that it would keep.
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
@@ -43,6 +44,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "") -> ObjectFacts:
         views_differ=any(each.show_viewport != each.show_render for each in flags),
         safe_mode=safe_mode.is_on(),
         failure=failure,
+        waits_for=waits_for,
     )
 
 
@@ -120,8 +122,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         properties.of(origin).scale_rule,
         properties.of(origin).leave_small,
     )
-    for group in (*properties.STAGE_GROUPS, "replaced_smooth"):
-        properties.copy(getattr(properties.of(origin), group), getattr(settings, group))
+    groups = (*properties.STAGE_GROUPS, *properties.METHOD_GROUPS, "replaced_smooth")
+    properties.copy_groups(properties.of(origin), settings, groups)
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
     return True

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,7 @@ from ..core.stage_mesh import StageMesh
 from ..core.stages import StagesAfter
 from ..core.vertex_data import VertexData
 from ..io import armature_io
-from . import source, survey
+from . import method_needs, source, survey
 from .changes import Changes
 from .source import Source
 
@@ -46,6 +47,12 @@ class Bound:
         """Whether modifiers, bones or weights differ from the other's: more than the rest points."""
         return other is None or self.skin_stack is not other.skin_stack
 
+    @property
+    def data_versions(self) -> list[int]:
+        """Of what methods keep of vertices, for each Armature modifier."""
+        data = (stage.binding.vertex_data for stage in self.skin_stack.skin_stages)
+        return [0 if each is None else each.version for each in data]
+
     def lacks(self, methods: Iterable[str]) -> list[str]:
         """A sentence for each of the methods that does without something which the mesh lacks."""
         lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
@@ -62,14 +69,14 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
 
     old  where neither modifiers nor their options changed since. Requires source.is_ready().
     """
-    read_now = source.read(obj, depsgraph)
+    read_now = source.read(obj, depsgraph, method_needs.needs_surface(obj))
     pairs = attach.replaced_modifiers(obj)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     groups = stage_settings.vertex_groups(properties.of(obj))
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
-                stage.binding.replace_vertex_data(_vertex_data(stage.binding.weighting, read_now))
+                stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
         if np.array_equal(read_now.points, old.source.points):
             # The same array tells that nothing moved.
             read_now.points = old.source.points
@@ -78,15 +85,35 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     options = [ModifierOptions.read(modifier) for modifier, _replaced in pairs]
     masks = _masks(obj, read_now, groups)
     stages = []
-    for option, its_bones in zip(options, bones, strict=True):
+    before = () if old is None else old.skin_stack.skin_stages
+    for option, its_bones, its_old in itertools.zip_longest(options, bones, before):
+        if option is None:
+            break
         weighting = option.weighting(obj, read_now.weights, its_bones)
-        binding = Binding(weighting, masks.get("mix"), _vertex_data(weighting, read_now))
+        binding = Binding(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
         stages.append(SkinStage(binding, option.mask_weights(obj, read_now.weights), option.multi))
     weighting = stages[0].binding.weighting
     facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
     skin_stack = SkinStack(stages, StagesAfter(_stage_mesh(read_now, stages), masks))
     return Bound(armatures, options, read_now, skin_stack, facts, groups)
+
+
+def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
+    """before  of the same modifier as it was"""
+    old = None if before is None else before.binding.vertex_data
+    given = {}
+    if read_now.sdef_keys is not None:
+        basis, *keys = read_now.sdef_keys
+        groups = sdef.group_of_bone(weighting.bones.names, read_now.group_names)
+        influences = weighting.entries.influences()
+        given[sdef.METHOD] = sdef.vertex_data(basis, np.array(keys), influences, groups)
+    return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old, given)
+
+
+def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
+    """Whether a method was chosen since that needs the mesh's triangles."""
+    return bound.source.triangles is None and method_needs.needs_surface(obj)
 
 
 def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
@@ -129,16 +156,6 @@ def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> 
     return read_now.equals_but_for_points(old.source) and all(
         now.equals(before) for now, before in zip(bones, known, strict=False)
     )
-
-
-def _vertex_data(weighting: Weighting, read_now: Source) -> VertexData:
-    given = {}
-    if read_now.sdef_keys is not None:
-        basis, *keys = read_now.sdef_keys
-        groups = sdef.group_of_bone(weighting.bones.names, read_now.group_names)
-        influences = weighting.entries.influences()
-        given[sdef.METHOD] = sdef.vertex_data(basis, np.array(keys), influences, groups)
-    return VertexData(weighting, read_now.points, read_now.triangles, given)
 
 
 def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:

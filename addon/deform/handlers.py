@@ -12,8 +12,9 @@ from bpy.app.handlers import persistent
 from ..attach import note, overrides, properties
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_rendering_in_window, reaction
+from ..core.precompute import precomputations
 from ..io.animation_paths import animated_paths
-from . import events, session
+from . import events, precompute_watch, precomputing, session
 from .changes import Changes, names_of_changed_meshes
 from .session import current
 
@@ -181,6 +182,12 @@ def _check_unannounced_changes() -> float:
 
 
 @persistent
+def before_loading(*_args: object) -> None:
+    precomputing.end()
+    on_data_replaced()
+
+
+@persistent
 def on_data_replaced(*_args: object) -> None:
     """Undo, redo and loading: every reference is void and what holds points has others."""
     with reaction():
@@ -255,6 +262,7 @@ def end_export() -> None:
 @persistent
 def on_render_start(*_args: object) -> None:
     current.is_rendering = True
+    precomputations.waits = True
 
 
 @persistent
@@ -262,6 +270,7 @@ def on_render_end(*_args: object) -> None:
     """In the render's thread, where it has one: what waited for its end is for the main one."""
     with reaction():
         current.is_rendering = False
+        precomputations.waits = bpy.app.background
         current.gate.restore()
     if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
         bpy.app.timers.register(_after_render, first_interval=0.05)
@@ -288,7 +297,7 @@ _HANDLERS = {
     "undo_post": on_data_replaced,
     "redo_pre": on_data_replaced,
     "redo_post": on_data_replaced,
-    "load_pre": on_data_replaced,
+    "load_pre": before_loading,
     "load_post": on_loaded,
     "save_pre": on_save,
     "save_post": on_saved,
@@ -302,6 +311,8 @@ if events.IMPORTS_ARE_ANNOUNCED:
 
 
 def register() -> None:
+    precomputing.begin()
+    subscribers.precomputation_asked.append(precompute_watch.begin)
     session.forget()
     properties.listeners.method_changed = session.setting_changed
     properties.listeners.enabled_changed = session.enabled_changed
@@ -325,6 +336,10 @@ def adopt_open_file() -> None:
 
 
 def unregister() -> None:
+    precomputing.end()
+    subscribers.precomputation_asked.remove(precompute_watch.begin)
+    if bpy.app.timers.is_registered(precompute_watch.look):
+        bpy.app.timers.unregister(precompute_watch.look)
     session.forget()
     if bpy.app.timers.is_registered(_check_unannounced_changes):
         bpy.app.timers.unregister(_check_unannounced_changes)

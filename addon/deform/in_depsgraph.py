@@ -71,16 +71,16 @@ def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedOb
 
     Does nothing where something is out of the ordinary, and notes why: that is for update().
     """
-    if skinned.plan.state is not State.IN_DEPSGRAPH:
+    if not skinned.plan.is_in_depsgraph:
         return
     with skinned.lock:
         reason = _deform(evaluated, mesh, skinned)
         if reason:
-            skinned.evaluation.skip_reason = reason
+            skinned.evaluation.skip_reason, skinned.evaluation.mesh = reason, 0
 
 
 def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> str:
-    """Why it did nothing; empty where it wrote the points."""
+    """Why it is for update() to see to; empty where the points are written."""
     started, settings, bound = time.perf_counter(), evaluated.sinew, skinned.bound
     # Evaluated ones, as the driver reads them.
     armatures = [replaced.armature for replaced in settings.replaced_modifiers]
@@ -111,7 +111,9 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     shown.first_point = out[0].tobytes()
     skinned.evaluation.succeed(mesh)
     shown.milliseconds = 1000.0 * (time.perf_counter() - started)
-    return ""
+    # Asked for only once an animation chooses the method.
+    is_new_need = skinned.plan.state is not State.WAITING and pose.lacks_data(bound, frames)
+    return "what its method needs is not computed" if is_new_need else ""
 
 
 def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:

@@ -15,23 +15,33 @@ class State(Enum):
 
     OFF = "off"  # the user switched Sinew off, or it failed
     BUILT_IN = "built-in"  # the Armature modifier deforms, while Sinew is on
+    WAITING = (
+        "waiting"  # Sinew, by the Armature modifier's method until what the chosen one needs is computed
+    )
     IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the rule
     AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
 
 
 @dataclass(frozen=True)
 class Plan:
-    """reason     one clause for the panel; empty for the rule and for what the user chose
-    in_buffer  an object of their own stores the points (point_buffer.py), not an attribute of the mesh
+    """reason        one clause for the panel; empty for the rule and for what the user chose
+    in_buffer     an object of their own stores the points (point_buffer.py), not an attribute of the mesh
+    after_update  where Sinew deforms: not within Blender's evaluation
     """
 
     state: State
     reason: str = ""
     in_buffer: bool = False
+    after_update: bool = False
 
     @property
     def uses_builtin(self) -> bool:
         return self.state in (State.OFF, State.BUILT_IN)
+
+    @property
+    def is_in_depsgraph(self) -> bool:
+        """Whether Sinew deforms within Blender's evaluation."""
+        return not (self.uses_builtin or self.after_update)
 
 
 @dataclass(frozen=True)
@@ -49,6 +59,7 @@ class ObjectFacts:
     views_differ         one of them is on in the viewport alone or in renders alone
     safe_mode            nothing of Sinew may run within Blender's evaluation
     failure              what failed there; empty where nothing did
+    waits_for            what its method needs and is not computed yet, as a clause; empty where nothing is
     """
 
     enabled: bool = True
@@ -65,6 +76,7 @@ class ObjectFacts:
     views_differ: bool = False
     safe_mode: bool = False
     failure: str = ""
+    waits_for: str = ""
 
 
 def plan(facts: ObjectFacts) -> Plan:
@@ -81,10 +93,13 @@ def plan(facts: ObjectFacts) -> Plan:
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
         return Plan(State.BUILT_IN, reason)
     reason = _why_not_in_depsgraph(facts)
-    if reason:
-        return Plan(State.AFTER_UPDATE, reason, in_buffer=True)
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
-    return Plan(State.IN_DEPSGRAPH, in_buffer=facts.has_upstream or not has_own_mesh)
+    in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
+    # The route stays while it waits: when that ends, its method is all that changes.
+    if facts.waits_for:
+        return Plan(State.WAITING, facts.waits_for, in_buffer, after_update=bool(reason))
+    state = State.AFTER_UPDATE if reason else State.IN_DEPSGRAPH
+    return Plan(state, reason, in_buffer, after_update=bool(reason))
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

@@ -6,11 +6,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..attach import properties, stage_settings
+from ..attach import attach, properties, stage_settings
+from ..core import parameters
 from ..core.errors import SinewError
 from ..core.session import SkinStageFrame
 from ..core.stages import STAGES, StageValues
 from ..io import armature_io
+from .bound import Bound
 from .skinned_object import SkinnedObject
 
 Frames = list[SkinStageFrame | None]
@@ -56,8 +58,36 @@ def read(
         pose = armature_io.read_pose(armature, stage.binding.bones)
         own = properties.method_of_modifier(method, replaced.method, is_first=not frames)
         mix = settings.mixed_method if own == method else ""
-        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix))
+        data = stage.binding.vertex_data
+        if data is not None and not data.is_ready(own):
+            # As the modifier itself has it, until what the method needs is computed.
+            own, mix = attach.method_of(evaluated.modifiers[replaced.name]), ""
+        elif data is not None and mix and not data.is_ready(mix):
+            mix = ""
+        values = _parameters(evaluated, settings, own, mix)
+        frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values))
     return frames
+
+
+def _parameters(
+    evaluated: bpy.types.Object, settings: properties.SinewSettings, method: str, mix: str
+) -> dict[str, parameters.Value]:
+    values = stage_settings.method_values(settings, (method, mix))
+    for name, value in values.items():
+        if value == "":
+            raise SinewError(
+                f"{evaluated.name}: the driver of {name} gives a number that stands for no choice"
+            )
+    return values
+
+
+def lacks_data(bound: Bound, frames: Frames | None) -> bool:
+    """Whether one of the methods was asked for numbers of vertices that it does not have."""
+    data = (stage.binding.vertex_data for stage in bound.skin_stack.skin_stages)
+    return any(
+        frame is not None and each is not None and not all(map(each.has, each.missed))
+        for frame, each in zip(frames or (), data, strict=False)
+    )
 
 
 def stage_values(settings: properties.SinewSettings) -> StageValues:

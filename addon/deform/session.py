@@ -14,7 +14,7 @@ from ..attach import attach, note, overrides, point_store, properties, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
-from . import after_update, apply_plan, events
+from . import after_update, apply_plan, events, precomputing
 from .changes import Changes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
@@ -218,6 +218,7 @@ def enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     """Reads everything of the object anew: mesh, weights, bones. Switches it on again after an error."""
     current.skinned.pop(obj.session_uid, None)
+    precomputing.forget_stopped()
     settings = properties.of(obj)
     settings.error = ""
     if not settings.enabled:
@@ -243,6 +244,7 @@ def prepare_for_save() -> None:
             except Exception as error:
                 # The others are in the same file.
                 log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
+        precomputing.store_in_meshes([(obj, state_of(obj)) for obj in objects])
         note.write([obj for obj in objects if properties.of(obj).is_saved])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..attach import attach, properties, stack, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
-from ..core.session import SkinStageFrame
+from ..core.session import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
 from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
@@ -35,7 +35,7 @@ class Shown:
 
     frames: list[SkinStageFrame | None] | None = None
     rest_points: np.ndarray | None = None
-    stage_values: StageValues = field(default_factory=dict)
+    stage_values: StageValues = field(default_factory=lambda: NO_STAGES)
     first_point: bytes | None = None
     number: int = 0
     milliseconds: float = 0.0
@@ -102,6 +102,7 @@ class SkinnedObject:
     needs_recheck        the mesh may have changed since it was read: it is read with the next event, or when
                          somebody measures it
     dirtied_by_frames    the last change of frame moved the object or its rest points
+    data_versions        of what methods keep of vertices, for each Armature modifier
     """
 
     bound: Bound
@@ -123,6 +124,12 @@ class SkinnedObject:
     group_losses: int = 0
     needs_recheck: bool = False
     dirtied_by_frames: bool = False
+    data_versions: list[int] = field(default_factory=list)
+
+    @property
+    def has_new_data(self) -> bool:
+        """Whether methods keep other numbers of vertices than when the object was last seen to."""
+        return self.data_versions != self.bound.data_versions
 
     def bind(self, bound: Bound) -> None:
         """Another shape comes next where the stack of modifiers or its bones are others."""

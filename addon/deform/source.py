@@ -4,12 +4,12 @@ or from what the modifiers in front make of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
-from ..attach import properties, upstream_proxy
+from ..attach import properties, stored_vertex_data, upstream_proxy
 from ..core.influences import GroupWeights
 from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
@@ -22,7 +22,8 @@ class Source:
     """Read once, and again when it may be out of date.
 
     points            float32 [vertices, 3], object space, without shape keys
-    triangles         int32 [triangles, 3]
+    triangles         int32 [triangles, 3]; None where no method needs them: to read them takes long
+    stored            what the file has of numbers that methods keep of vertices, by its key; read with these
     topology          faces and edges
     own_points        float32 [vertices, 3], object space, the mesh's own, whatever stands in front; None
                       where that gives it other vertices
@@ -35,12 +36,13 @@ class Source:
     group_names: list[str]
     weights: GroupWeights
     points: np.ndarray
-    triangles: np.ndarray
+    triangles: np.ndarray | None
     topology: Topology
     own_points: np.ndarray | None
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     from_front: bool = False
+    stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
     known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
@@ -59,11 +61,9 @@ class Source:
 
     def has_same_surface(self, other: Source) -> bool:
         """Whether all that methods keep numbers of vertices from, but for weights, is the same."""
-        return (
-            np.array_equal(self.points, other.points)
-            and np.array_equal(self.triangles, other.triangles)
-            and (self.sdef_keys is None) == (other.sdef_keys is None)
-            and (self.sdef_keys is None or np.array_equal(self.sdef_keys, other.sdef_keys))
+        return np.array_equal(self.points, other.points) and all(
+            (mine is None) == (its is None) and (mine is None or np.array_equal(mine, its))
+            for mine, its in ((self.triangles, other.triangles), (self.sdef_keys, other.sdef_keys))
         )
 
 
@@ -75,26 +75,29 @@ def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool
     return was_on and upstream_proxy.evaluated_mesh(obj, depsgraph) is not None
 
 
-def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
-    """Requires is_ready."""
+def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bool = False) -> Source:
+    """Requires is_ready.
+
+    with_surface  with the triangles, and with what was made from them before
+    """
     names = [group.name for group in obj.vertex_groups]
+    from_front = properties.of(obj).upstream_proxy is not None
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_front else obj.data
+    weights = mesh_io.read_group_weights(mesh)
+    points = mesh_io.read_points(mesh)
+    triangles = mesh_io.read_triangles(mesh) if with_surface else None
+    keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
-    if properties.of(obj).upstream_proxy is not None:
-        mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
-        points = mesh_io.read_points(mesh)
-        triangles, topology = mesh_io.read_triangles(mesh), mesh_io.read_topology(mesh)
+    own_points = points
+    if from_front:
         own_points = mesh_io.read_points(obj.data) if len(obj.data.vertices) == len(points) else None
-        weights = mesh_io.read_group_weights(mesh)
-        if sdef_keys is not None and own_points is None:
-            sdef_keys = None
-        return Source(
-            names, weights, points, triangles, topology, own_points, None, sdef_keys, from_front=True
-        )
-    weights = mesh_io.read_group_weights(obj.data)
-    points = mesh_io.read_points(obj.data)
-    triangles, topology = mesh_io.read_triangles(obj.data), mesh_io.read_topology(obj.data)
-    keys = mesh_io.read_shape_keys(obj, weights)
-    return Source(names, weights, points, triangles, topology, points, keys, sdef_keys)
+    if sdef_keys is not None and own_points is None:
+        sdef_keys = None
+    stored = stored_vertex_data.read(obj.data) if with_surface else {}
+    topology = mesh_io.read_topology(mesh)
+    return Source(
+        names, weights, points, triangles, topology, own_points, keys, sdef_keys, from_front, stored
+    )
 
 
 def has_changed(

@@ -9,7 +9,7 @@ from ..attach import attach, point_store, pose_driver, properties, stack
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..io import armature_io
-from . import after_update, apply_plan, bound, source
+from . import after_update, apply_plan, bound, precomputing, source
 from .changes import Changes
 from .plan import MODES_OF_THE_MODIFIER, Plan, State
 from .skinned_object import SkinnedObject, object_state_of
@@ -59,17 +59,21 @@ def update(
         return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
     known = None if skinned is None else skinned.bound
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
+    plan = _with_data(obj, skinned, plan, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
         skinned.note_object(obj, plan)
         if not plan.uses_builtin:
             keep_poses_evaluated(obj, skinned)
+    skinned.plan = plan
     # A render lists all as new with each frame; to tag the object has Blender (4.2 to 5.2) copy it anew,
     # without what animation had set.
     is_same = not skinned.bound.is_of_another_stack(known) and skinned.bound.source.equals(known.source)
-    if skinned.plan.state is State.IN_DEPSGRAPH:
+    is_same &= not skinned.has_new_data
+    skinned.data_versions = skinned.bound.data_versions
+    if plan.is_in_depsgraph:
         _request_points(obj, skinned, changes, is_new_plan=plan != before, is_same=is_same)
-    elif skinned.plan.state is State.AFTER_UPDATE:
-        is_first = before is None or before.state is not State.AFTER_UPDATE
+    elif plan.after_update:
+        is_first = before is None or not before.after_update
         with skinned.lock:
             after_update.deform(obj, skinned, depsgraph, changes, inspect, is_first)
     else:
@@ -128,7 +132,7 @@ def _needs_inspection(
     if not (is_touched or changes.armatures):
         return False
     # To request points touches the object by itself.
-    explains_touch = skinned.plan.state is State.IN_DEPSGRAPH or skinned.was_deformed(obj, depsgraph)
+    explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)
     return not explains_touch or object_state_of(obj) != skinned.object_state
 
 
@@ -150,12 +154,30 @@ def _has_shape(
 def _apply_plan(obj: bpy.types.Object, skinned: SkinnedObject | None, changes: Changes) -> Plan:
     """Raises SinewError where the modifiers that Sinew works with are gone."""
     _check_modifiers(obj, changes)
-    failure = ""
-    if skinned is not None and skinned.evaluation.failures_in_a_row > MAX_FAILURES_IN_A_ROW:
-        failure = skinned.evaluation.failure
-    plan = apply_plan.plan_of(obj, failure)
+    plan = apply_plan.plan_of(obj, _failure_of(skinned), precomputing.waits_for(obj, skinned))
     apply_plan.apply(obj, plan)
     return plan
+
+
+def _failure_of(skinned: SkinnedObject | None) -> str:
+    """What keeps Sinew from deforming it within Blender's evaluation; empty where nothing does."""
+    if skinned is None or skinned.evaluation.failures_in_a_row <= MAX_FAILURES_IN_A_ROW:
+        return ""
+    return skinned.evaluation.failure
+
+
+def _with_data(
+    obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan, depsgraph: bpy.types.Depsgraph
+) -> Plan:
+    """The plan once what the methods need is asked for. One that waits needs the same of the object as one
+    that does not."""
+    if plan.uses_builtin:
+        return plan
+    precomputing.request(obj, skinned, depsgraph)
+    waits_for = precomputing.waits_for(obj, skinned)
+    if waits_for == (plan.reason if plan.state is State.WAITING else ""):
+        return plan
+    return apply_plan.plan_of(obj, _failure_of(skinned), waits_for)
 
 
 def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
@@ -208,8 +230,10 @@ def _bind(
     )
     if inspect and bound.is_of_other_modifiers(obj, skinned.bound):
         skinned.bind(bound.read(obj, depsgraph))
-    elif bones_changed or (
-        not reads_later and source.has_changed(obj, skinned.bound.source, depsgraph, changes, inspect)
+    elif (
+        bones_changed
+        or bound.lacks_surface(obj, skinned.bound)
+        or (not reads_later and source.has_changed(obj, skinned.bound.source, depsgraph, changes, inspect))
     ):
         skinned.bind(bound.read(obj, depsgraph, skinned.bound))
     skinned.needs_recheck, skinned.evaluation.changed_unannounced = reads_later, False
@@ -241,4 +265,4 @@ def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
         if replaced.armature is not None
         for path in armature_io.paths_to_wait_for(replaced.armature, stage.binding.moving_bones)
     ]
-    pose_driver.ensure(obj, list(dict.fromkeys(poses)), skinned.plan.state is State.IN_DEPSGRAPH)
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), skinned.plan.is_in_depsgraph)

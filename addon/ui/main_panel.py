@@ -7,9 +7,9 @@ import bpy
 import sinew
 
 from ..attach import attach, corrective_smooth, properties, stage_settings
-from ..deform import session, small_meshes
+from ..deform import method_needs, session, small_meshes
 from ..deform.plan import ObjectFacts, plan
-from . import operators
+from . import operators, precomputing
 from .sidebar import Sidebar, draw_text
 
 
@@ -52,6 +52,24 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
 
 
 def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    settings = properties.of(obj)
+    _draw_state(layout, context, obj)
+    _draw_method(layout, context, obj)
+    _draw_mix(layout, context, obj)
+    state = session.state_of(obj)
+    for sentence in [] if state is None else state.bound.lacks((settings.method, settings.mix.method)):
+        draw_text(layout, context, sentence, icon="INFO")
+    for stage in stage_settings.STAGES.values():
+        if stage.name != "mix":
+            _draw_stage(layout, context, obj, stage)
+    _draw_take_over(layout, context, obj)
+    layout.prop(settings, "scale_rule")
+    if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
+        layout.prop(settings, "leave_small")
+
+
+def _draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """On or off, and who deforms the object for what reason."""
     settings, state = properties.of(obj), session.state_of(obj)
     row = layout.row(align=True)
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
@@ -63,12 +81,18 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
         reason = plan(facts).reason or (state.plan.reason if state is not None else "")
         if reason:
             draw_text(layout, context, reason, icon="INFO")
+        precomputing.draw(layout, obj, state)
     if state is not None and state.evaluation.failures:
         text = (
             f"{state.evaluation.failures} times not deformed within Blender's evaluation; last: "
             f"{state.evaluation.failure}"
         )
         draw_text(layout, context, text, icon="ERROR")
+
+
+def _draw_method(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """Of the object, and of its further Armature modifiers; then the methods' parameters."""
+    settings = properties.of(obj)
     layout.prop(settings, "method", text="")
     draw_text(layout, context, properties.METHODS[settings.method].description)
     if len(settings.armatures) > 1 or any(
@@ -76,16 +100,9 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
     ):
         for replaced in list(settings.replaced_modifiers)[1:]:
             layout.prop(replaced, "method", text=replaced.name)
-    _draw_mix(layout, context, obj)
-    for sentence in [] if state is None else state.bound.lacks((settings.method, settings.mix.method)):
-        draw_text(layout, context, sentence, icon="INFO")
-    for stage in stage_settings.STAGES.values():
-        if stage.name != "mix":
-            _draw_stage(layout, context, obj, stage)
-    _draw_take_over(layout, context, obj)
-    layout.prop(settings, "scale_rule")
-    if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
-        layout.prop(settings, "leave_small")
+    for name in method_needs.methods_of(obj):
+        for parameter in properties.METHODS[name].parameters:
+            layout.prop(getattr(settings, name), parameter.id)
 
 
 def _draw_mix(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..core.errors import SinewError
-from ..deform import evaluate, session
+from ..deform import evaluate, precompute_watch, session
 from ..io import pose_io
 
 # The window draws in between: rarely enough to cost little, often enough for Esc.
@@ -39,6 +39,7 @@ class Stepped:
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        precompute_watch.finish(context)
         try:
             for _share in self.steps(context):
                 pass
@@ -49,6 +50,7 @@ class Stepped:
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
             return self.execute(context)
+        precompute_watch.finish(context)
         self._left = self.steps(context)
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.0, window=context.window)

@@ -105,6 +105,9 @@ void bind_methods(py::module_& m) {
             "number", [](const MethodInfo& row) { return row.number; },
             "Number that .blend files store; never changes.")
         .def_property_readonly(
+            "group", [](const MethodInfo& row) { return text(label_of(row.group)); },
+            "The heading below which menus show it, with those that are for the same.")
+        .def_property_readonly(
             "needs", [](const MethodInfo& row) { return names_of(row.needs); },
             "What it takes besides points, influences and bone transforms: \"rest_bones\", their axes where "
             "bones\n"

@@ -447,7 +447,7 @@ def test_keys_of_the_method_are_the_originals_own():
     before = content()
     compare(obj, {"qv", "dq"})
     bpy.context.scene.frame_set(11)
-    got = without_offset(copies(obj)["dq"], 2)
+    got = without_offset(copies(obj)["dq"], 1)
     bpy.context.scene.frame_set(1)
     assert_ends_without_trace(before)
     attach.remove(obj)
@@ -507,7 +507,7 @@ def test_eyes_on_a_bone_stand_with_their_body():
 def test_overlay_and_flip():
     obj, _armature = scenes.make_arm()
     compare(obj, {"lbs", "qv", "dq"})
-    lbs, qv, dq = copies(obj).values()
+    lbs, qv, dq = (copies(obj)[name] for name in ("lbs", "qv", "dq"))
     state().arrangement = comparison_state.OVERLAID
     assert all(copy.visible_get() for copy in (lbs, qv, dq))
     for copy in (lbs, qv, dq):
@@ -515,12 +515,12 @@ def test_overlay_and_flip():
     bpy.ops.sinew.flip_comparison()
     assert [copy.visible_get() for copy in (lbs, qv, dq)] == [True, False, False]
     bpy.ops.sinew.flip_comparison()
-    assert [copy.visible_get() for copy in (lbs, qv, dq)] == [False, False, True]
-    bpy.context.scene.frame_set(11)
-    turned = without_offset(dq, 1)
-    state().second = "qv"
     assert [copy.visible_get() for copy in (lbs, qv, dq)] == [False, True, False]
-    assert scenes.worst(without_offset(qv, 1), turned) > 0.01
+    bpy.context.scene.frame_set(11)
+    turned = without_offset(qv, 1)
+    state().second = "dq"
+    assert [copy.visible_get() for copy in (lbs, qv, dq)] == [False, False, True]
+    assert scenes.worst(without_offset(dq, 1), turned) > 0.01
     # One that was hidden while the frame changed.
     bpy.ops.sinew.flip_comparison()
     assert [copy.visible_get() for copy in (lbs, qv, dq)] == [True, False, False]
@@ -528,7 +528,7 @@ def test_overlay_and_flip():
     state().arrangement = comparison_state.SIDE_BY_SIDE
     assert all(copy.visible_get() for copy in (lbs, qv, dq))
     state().spacing = 7.0
-    assert scenes.worst(without_offset(dq, 3), turned) <= 1e-5
+    assert scenes.worst(without_offset(qv, 3), turned) <= 1e-5
     assert obj.visible_get()
 
 

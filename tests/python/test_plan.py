@@ -38,6 +38,10 @@ TABLE = [
     ({"has_heat_map": True}, State.AFTER_UPDATE, "heat map"),
     ({"visibility_is_keyed": True}, State.AFTER_UPDATE, "animated"),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
+    ({"waits_for": "until found"}, State.WAITING, "until found"),
+    ({"waits_for": "until found", "safe_mode": True}, State.WAITING, "until found"),
+    ({"waits_for": "until found", "mode": "EDIT"}, State.BUILT_IN, "In this mode"),
+    ({"waits_for": "until found", "enabled": False}, State.OFF, ""),
 ]
 
 
@@ -60,6 +64,15 @@ def test_points_of_a_mesh_that_is_not_its_own_are_in_a_buffer(fact, value):
 @pytest.mark.parametrize("facts", [facts for facts, state, _reason in TABLE if state is State.AFTER_UPDATE])
 def test_what_is_written_after_the_update_is_in_a_buffer(facts):
     assert plan(ObjectFacts(**facts)).in_buffer
+
+
+@pytest.mark.parametrize("route", [{}, {"safe_mode": True}, {"has_upstream": True}, {"mesh_is_shared": True}])
+def test_who_waits_keeps_its_route(route):
+    """So nothing but the method changes when it ends."""
+    waiting, after = plan(ObjectFacts(**route, waits_for="until found")), plan(ObjectFacts(**route))
+    assert (waiting.in_buffer, waiting.after_update) == (after.in_buffer, after.after_update)
+    assert waiting.is_in_depsgraph == after.is_in_depsgraph == (after.state is State.IN_DEPSGRAPH)
+    assert not waiting.uses_builtin
 
 
 def test_every_fact_matters():

@@ -181,7 +181,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
     copy.name = f"{obj.name} {properties.method_label(method)}"
-    scale_rule = properties.of(obj).scale_rule if properties.has_sinew(obj) else None
+    original = properties.of(obj) if properties.has_sinew(obj) else None
     _take_sinew_off(copy)
     for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
         copy.modifiers.remove(modifier)
@@ -197,8 +197,9 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     settings.copied, settings.copied_for = obj, method
     if method != evaluate.BLENDER and attach.armature_of(copy) is not None:
         attach.add(copy, method)
-        if scale_rule is not None:
-            settings.scale_rule = scale_rule
+        if original is not None:
+            settings.scale_rule = original.scale_rule
+            properties.copy_groups(original, settings, properties.METHOD_GROUPS)
     offset_nodes.add(copy)
     return copy
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...attach import attach, corrective_smooth, properties, upstream_proxy
+from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
 from ...core.scale_rule import BLENDER_4
@@ -129,13 +129,18 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         if mesh is None or shown.frames is None or len(mesh.vertices) != len(shown.rest_points):
             return None
         known = [(stage, stage.binding) for stage in skinned.bound.skin_stack.skin_stages]
+        surface = mesh_io.read_surface(mesh)
+        for _stage, binding in known:
+            if binding.vertex_data is not None:
+                # Distances may be measured to a method that needs them.
+                binding.vertex_data.add_triangles(surface.triangles)
         stages = [
             SkinStage(Binding(b.weighting, b.mix_weights, b.vertex_data), stage.mask, stage.multi)
             for stage, b in known
         ]
         after = skinned.bound.skin_stack.stages_after
         own_stack = SkinStack(stages, None if after is None else after.another())
-        parts.append(Part(obj, skinned, skinned.bound, mesh_io.read_surface(mesh), own_stack))
+        parts.append(Part(obj, skinned, skinned.bound, surface, own_stack))
     if not parts:
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
@@ -192,10 +197,12 @@ class _Other:
     @classmethod
     def of(cls, part: Part, other: str) -> _Other:
         shown, methods = part.skinned.shown, _modifiers_methods(part.obj, other)
+        values = stage_settings.method_values(properties.of(part.obj), (other,))
         frames: list[SkinStageFrame | None] = []
         for number, frame in enumerate(shown.frames):
             if frame is not None:
-                frame = replace(frame, method=methods[number] if methods else other, mix="")
+                method = methods[number] if methods else other
+                frame = replace(frame, method=method, mix="", parameters=values)
                 if methods:
                     frame.scale_rule = BLENDER_4.name
             frames.append(frame)

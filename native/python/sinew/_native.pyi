@@ -67,6 +67,9 @@ class Method:
     def source(self) -> str:
         """The papers."""
     @property
+    def group(self) -> str:
+        """The heading below which menus show it, with those that are for the same."""
+    @property
     def needs(self) -> tuple[str, ...]:
         """What it takes besides points, influences and bone transforms: "rest_bones", their axes where bones
         are scaled; "vertex_data", numbers of each vertex that Binding takes; "topology", triangles that

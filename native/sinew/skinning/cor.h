@@ -17,6 +17,7 @@ struct Cor {
         5,
         "cor",
         "Centres of Rotation",
+        MethodGroup::volume,
         "Keeps the volume of twisted joints and bulges half as much as dual "
         "quaternions where they bend; large meshes are bound a second longer",
         "Le, Hodgins 2016",

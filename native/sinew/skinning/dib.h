@@ -23,6 +23,7 @@ struct IterativeDq {
         7,
         "dib",
         "Iterative Dual Quaternion",
+        MethodGroup::report,
         "Dual quaternions with twists spread evenly along the limb; bulges as they do, at "
         "several times the cost",
         "Kavan, Collins, Zara, O'Sullivan 2008",

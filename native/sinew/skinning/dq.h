@@ -16,6 +16,7 @@ struct Dq {
         3,
         "dq",
         "Dual Quaternion",
+        MethodGroup::blender,
         "Keeps the volume of twisted joints anywhere on the body; strong bends bulge outwards",
         "Kavan, Collins, Zara, O'Sullivan 2008",
         Needs::rest_bones};

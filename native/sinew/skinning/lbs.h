@@ -16,6 +16,7 @@ struct Lbs {
         1,
         "lbs",
         "Linear Blend",
+        MethodGroup::blender,
         "Fast, smooth and what every engine plays; twisted and strongly bent joints lose volume",
         "Magnenat-Thalmann, Laperriere, Thalmann 1988",
         Needs::nothing};

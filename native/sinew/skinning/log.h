@@ -21,6 +21,7 @@ struct Log {
     static constexpr MethodInfo info{4,
                                      "log",
                                      "Log-Matrix",
+                                     MethodGroup::report,
                                      "Spreads a twist evenly along limbs near their rest pose; flips where a "
                                      "bone passes 180 degrees from rest",
                                      "Alexa 2002; Cordier, Magnenat-Thalmann 2005",

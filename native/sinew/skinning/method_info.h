@@ -79,11 +79,28 @@ enum class Needs : unsigned {
     return (static_cast<unsigned>(needs) & static_cast<unsigned>(of)) == static_cast<unsigned>(of);
 }
 
+/// What methods are for, in the order in which menus show it.
+enum class MethodGroup {
+    blender,        // those that Blender's own Armature modifier has
+    volume,         // joints that twist and bend keep their volume
+    crude_weights,  // good shapes from weights that nobody painted
+    mmd,            // models of MikuMikuDance
+    report,         // what Smith 2013 compares, and its candidates
+};
+
+/// The heading of a group, for people.
+[[nodiscard]] constexpr std::string_view label_of(MethodGroup group) noexcept {
+    constexpr std::string_view kLabels[] = {"Blender's", "Volume Keeping", "For Crude Weights", "For MMD",
+                                            "From the Report"};
+    return kLabels[static_cast<std::size_t>(group)];
+}
+
 /// Facts of a method. Each method has its own, as `info`.
 struct MethodInfo {
-    int number;                    // stored in .blend files: never changed, never used again
-    std::string_view name;         // what programs say
-    std::string_view label;        // what people read
+    int number;              // stored in .blend files: never changed, never used again
+    std::string_view name;   // what programs say
+    std::string_view label;  // what people read
+    MethodGroup group;
     std::string_view description;  // one sentence: when to use it
     std::string_view source;       // the papers
     Needs needs;

@@ -19,9 +19,9 @@
 
 namespace sinew {
 
-/// THE list of methods, in the order in which people see them. Dispatch, bindings, tests, measurements, command
-/// line and panel are made from it.
-using Methods = std::tuple<Lbs, Qv, Dq, Cor, Sdef, Sbs, Log, IterativeDq>;
+/// THE list of methods, group by group, in the order in which people see them. Dispatch, bindings, tests, measurements,
+/// command line and panel are made from it.
+using Methods = std::tuple<Lbs, Dq, Cor, Sdef, Qv, Sbs, Log, IterativeDq>;
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 
@@ -34,6 +34,9 @@ constexpr void for_each_method(const Call& call) {
 /// The facts of each method.
 inline constexpr std::array<MethodInfo, kMethodCount> kMethods =
     std::apply([](const auto&... methods) { return std::array{methods.info...}; }, Methods{});
+
+static_assert(std::ranges::is_sorted(kMethods, {}, &MethodInfo::group),
+              "methods of a group are one behind the other");
 
 /// The most parameters that a method has.
 inline constexpr std::size_t kMaxMethodParameters =

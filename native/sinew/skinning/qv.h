@@ -17,6 +17,7 @@ struct Qv {
         2,
         "qv",
         "Quaternion-Vector",
+        MethodGroup::report,
         "Keeps twisted limbs round near the armature's origin; joints far from it drift off their bones",
         "Hejl 2004",
         Needs::rest_bones};

@@ -33,6 +33,7 @@ struct Sbs {
         6,
         "sbs",
         "Spherical Blend",
+        MethodGroup::report,
         "Dual quaternions' shape where two bones share a joint; tears where sets of "
         "three or more bones change",
         "Kavan, Zara 2005",

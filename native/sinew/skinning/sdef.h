@@ -33,6 +33,7 @@ struct Sdef {
         8,
         "sdef",
         "Spherical Deform",
+        MethodGroup::mmd,
         "The shape that MikuMikuDance gives its models; vertices without such data "
         "are blended linearly",
         "MikuMikuDance; as mmd_tools computes it",

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far precomputations are, in the panel and the status bar; Esc and buttons that stop them and go on."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach.subscribers import subscribers
+from ..core.precompute import precomputations
+from ..deform import precompute_watch, precomputing
+from ..deform.skinned_object import SkinnedObject
+
+# Seconds between looks at whether there is still something to stop.
+INTERVAL = 0.2
+
+
+class SINEW_OT_watch_precomputation(bpy.types.Operator):
+    bl_idname = "sinew.watch_precomputation"
+    bl_label = "Watch Precomputation"
+    bl_description = "Show in the status bar how far precomputations are; Esc stops them"
+    bl_options = {"INTERNAL"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        self._timer = context.window_manager.event_timer_add(INTERVAL, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not precomputations.running:
+            self._end(context)
+            return {"FINISHED", "PASS_THROUGH"}
+        if event.type == "ESC" and event.value == "PRESS":
+            self._end(context)
+            precompute_watch.stop()
+            self.report({"WARNING"}, "Stopped; the Sinew tab has a button to go on")
+            return {"CANCELLED"}
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """The window closes, or another file is loaded."""
+        self._end(context)
+
+    def _end(self, context: bpy.types.Context) -> None:
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+
+
+class SINEW_OT_stop_precomputation(bpy.types.Operator):
+    bl_idname = "sinew.stop_precomputation"
+    bl_label = "Stop"
+    bl_description = "Stop computing what the method needs; the Armature modifier's shape stays"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        precompute_watch.stop()
+        return {"FINISHED"}
+
+
+class SINEW_OT_precompute(bpy.types.Operator):
+    bl_idname = "sinew.precompute"
+    bl_label = "Compute"
+    bl_description = "Compute what the method needs of this mesh"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        precompute_watch.go_on()
+        return {"FINISHED"}
+
+
+def draw(layout: bpy.types.UILayout, obj: bpy.types.Object, skinned: SkinnedObject | None) -> None:
+    """Of one object: progress and a button that stops it, or one that starts it again."""
+    if skinned is None:
+        return
+    for what, run in precomputing.running(obj, skinned).items():
+        row = layout.row(align=True)
+        row.progress(factor=run.progress, text=f"Finding {what}: {run.progress:.0%}")
+        row.operator("sinew.stop_precomputation", text="", icon="X")
+    for what in precomputing.stopped(obj, skinned):
+        layout.operator("sinew.precompute", text=f"Find {what.capitalize()}", icon="PLAY")
+
+
+def _show() -> None:
+    """Redraws the panels, and has an operator in the window that hears Esc."""
+    runs = precomputations.running
+    if runs:
+        _watch()
+    share = min((run.progress for run in runs), default=1.0)
+    for window in bpy.context.window_manager.windows:
+        if _watcher_of(window) is not None:
+            text = f"Sinew computes what its methods need: {share:.0%} (Esc stops)" if runs else None
+            window.workspace.status_text_set(text)
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()
+
+
+def _watch() -> None:
+    windows = bpy.context.window_manager.windows
+    if bpy.app.background or not windows or any(_watcher_of(window) for window in windows):
+        return
+    with bpy.context.temp_override(window=windows[0], screen=windows[0].screen, area=None, region=None):
+        bpy.ops.sinew.watch_precomputation("INVOKE_DEFAULT")
+
+
+def _watcher_of(window: bpy.types.Window) -> bpy.types.Operator | None:
+    own = SINEW_OT_watch_precomputation.__name__
+    return next((each for each in window.modal_operators if each.bl_idname == own), None)
+
+
+def register() -> None:
+    subscribers.precomputation_shown.append(_show)
+
+
+def unregister() -> None:
+    subscribers.precomputation_shown.remove(_show)
+
+
+CLASSES = (SINEW_OT_watch_precomputation, SINEW_OT_stop_precomputation, SINEW_OT_precompute)

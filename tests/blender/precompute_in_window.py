@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In Blender's window, with Sinew's zip: centres of rotation are found while the window goes on, Esc stops
+that, a button goes on, and a render waits. Prints "FACTS" and a line of JSON.
+
+    blender --factory-startup --enable-event-simulate --python precompute_in_window.py -- sinew.zip FOLDER
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import time
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+import window
+import window_scene
+
+ZIP, FOLDER = window.arguments()
+VERTICES, TICK = 120_000, 0.05
+facts: dict[str, object] = {}
+
+
+def sinew(name: str):
+    """A module of the extension."""
+    return importlib.import_module(f"bl_ext.user_default.sinew.{name}")
+
+
+def hero() -> bpy.types.Object:
+    return bpy.data.objects["Hero"]
+
+
+def plan() -> str:
+    state = sinew("deform.session").state_of(hero())
+    return "none" if state is None else state.plan.state.value
+
+
+def until(wanted: Callable[[], bool], seconds: float = 60.0) -> Iterator[None]:
+    end = time.monotonic() + seconds
+    while not wanted():
+        if time.monotonic() > end:
+            raise AssertionError(f"it did not come: {plan()}")
+        yield
+
+
+def press(key: str) -> None:
+    main = bpy.context.window_manager.windows[0]
+    area = next(area for area in main.screen.areas if area.type == "VIEW_3D")
+    x, y = area.x + area.width // 2, area.y + area.height // 2
+    for value in ("PRESS", "RELEASE"):
+        main.event_simulate(type=key, value=value, x=x, y=y)
+
+
+def off_modifier(method: str = "lbs") -> float:
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    rig = bpy.data.objects["Hero Rig"]
+    expected = window_scene.blender_points(hero(), rig, method, depsgraph)
+    return window_scene.worst(window_scene.shown_points(hero(), depsgraph), expected)
+
+
+class KeepingEngine(bpy.types.RenderEngine):
+    """Draws nothing, and keeps what it is given."""
+
+    bl_idname, bl_label = "SINEW_KEEPING", "Keeping"
+    points: np.ndarray | None = None
+
+    def render(self, depsgraph):
+        for obj in depsgraph.objects:
+            if obj.name == "Hero":
+                points = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+                obj.data.vertices.foreach_get("co", points.ravel())
+                KeepingEngine.points = points
+        self.end_result(self.begin_result(0, 0, 4, 4))
+
+
+def make_hero() -> None:
+    """Its weights are all different, so that there is much to find."""
+    window_scene.make_character("Hero", VERTICES, (0.0, 0.0, 0.0))
+    weights = np.random.default_rng(1).uniform(0.05, 0.6, (len(hero().vertex_groups), VERTICES))
+    for group, own in zip(hero().vertex_groups, weights, strict=True):
+        for vertex, weight in enumerate(own.tolist()):
+            group.add([vertex], weight, "ADD")
+
+
+def forget() -> None:
+    """As if nothing had been found before."""
+    precomputations = sinew("core.precompute").precomputations
+    precomputations._made.clear()
+    precomputations.cache = None
+    with window.in_view3d():
+        bpy.ops.sinew.rebind("EXEC_DEFAULT")
+
+
+def steps() -> Iterator[None]:
+    yield from add_sinew()
+    found = yield from see_it_found()
+    yield from stop_and_go_on()
+    yield from render(found)
+    yield from end_while_it_runs()
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+def add_sinew() -> Iterator[None]:
+    window.install(ZIP)
+    bpy.context.preferences.filepaths.temporary_directory = str(FOLDER)
+    scene = bpy.context.window.scene
+    make_hero()
+    scene.frame_set(12)
+    window.select_only(hero())
+    window.open_sidebar()
+    yield
+    window.choose_tab()
+    with window.in_view3d():
+        bpy.ops.sinew.add("INVOKE_DEFAULT")
+    yield
+
+
+def see_it_found() -> Generator[None, None, np.ndarray]:
+    sinew("core.precompute").precomputations.cache = None
+    started = time.monotonic()
+    hero().sinew.method = "cor"
+    facts["seconds_to_set"] = time.monotonic() - started
+    facts["plan_at_first"] = plan()
+    ticks = 0
+    while plan() == "waiting" and ticks < 2000:
+        ticks += 1
+        if ticks == 3:
+            facts["off_modifier_meanwhile"] = off_modifier()
+            facts["watched"] = [op.bl_idname for op in bpy.context.window_manager.windows[0].modal_operators]
+            window.photograph(FOLDER / "waiting.png")
+        yield
+    facts["ticks_meanwhile"] = ticks
+    facts["plan_then"] = plan()
+    yield
+    facts["off_modifier_then"] = off_modifier()
+    return window_scene.shown_points(hero(), bpy.context.window_manager.windows[0].view_layer.depsgraph)
+
+
+def stop_and_go_on() -> Iterator[None]:
+    forget()
+    yield from until(lambda: any(bpy.context.window_manager.windows[0].modal_operators))
+    press("ESC")
+    yield from until(lambda: not sinew("core.precompute").precomputations.running)
+    yield
+    yield
+    facts["plan_stopped"] = plan()
+    facts["reason_stopped"] = sinew("deform.session").state_of(hero()).plan.reason
+    window.photograph(FOLDER / "stopped.png")
+    with window.in_view3d():
+        bpy.ops.sinew.precompute("INVOKE_DEFAULT")
+    yield from until(lambda: plan() == "in depsgraph")
+    facts["plan_after_button"] = plan()
+
+
+def render(found: np.ndarray) -> Iterator[None]:
+    scene = bpy.context.window_manager.windows[0].scene
+    bpy.utils.register_class(KeepingEngine)
+    scene.render.engine = "SINEW_KEEPING"
+    scene.render.resolution_x = scene.render.resolution_y = 4
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    yield
+    for locked in (True, False):
+        scene.render.use_lock_interface = locked
+        KeepingEngine.points = None
+        forget()
+        facts.setdefault("plan_before_render", []).append(plan())
+        with window.in_view3d():
+            bpy.ops.render.render("INVOKE_DEFAULT")
+        yield from until(lambda: KeepingEngine.points is not None)
+        yield from until(lambda: not bpy.app.is_job_running("RENDER"))
+        facts.setdefault("render_off", []).append(window_scene.worst(KeepingEngine.points, found))
+        yield from until(lambda: plan() == "in depsgraph")
+
+
+def end_while_it_runs() -> Iterator[None]:
+    """Undo, another file, and the end of Blender."""
+    forget()
+    bpy.ops.ed.undo_push(message="one")
+    bpy.ops.ed.undo_push(message="two")
+    bpy.ops.ed.undo()
+    yield
+    forget()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    facts["running_after_load"] = len(sinew("core.precompute").precomputations.running)
+    yield
+    make_hero()
+    sinew("attach.attach").add(hero(), "cor")
+    sinew("deform.session").refresh(bpy.context)
+    facts["plan_at_the_end"] = plan()
+
+
+window.run(steps(), TICK)

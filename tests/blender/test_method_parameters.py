@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parameters of methods, by sdef's interpolation: keyed, saved, copied, compared, and named in commands."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+import sinew
+from program import run_sinew
+from sinew_addon.attach import method_items, properties, stage_settings
+from sinew_addon.core.parameters import parse
+from sinew_addon.deform import evaluate, session
+from test_sdef import make_model
+
+FRAME = 9
+CHOICES = ("nlerp", "slerp")
+
+
+@pytest.fixture(params=routes.ROUTES)
+def route(request):
+    routes.force(request.param)
+    yield request.param
+    routes.release()
+
+
+def skinned_model() -> bpy.types.Object:
+    obj, _armature = make_model()
+    scenes.add_sinew(obj, "sdef")
+    bpy.context.scene.frame_set(FRAME)
+    return obj
+
+
+def shape_of_each(obj: bpy.types.Object) -> dict[str, np.ndarray]:
+    found = {}
+    for choice in CHOICES:
+        obj.sinew.sdef.interpolation = choice
+        bpy.context.view_layer.update()
+        found[choice] = scenes.final_points(obj)
+    obj.sinew.sdef.interpolation = CHOICES[0]
+    bpy.context.view_layer.update()
+    assert scenes.worst(*found.values()) > 1e-3
+    return found
+
+
+def test_the_library_decides_what_there_is():
+    for method in sinew.methods():
+        group = getattr(properties.SinewSettings.bl_rna.properties.get(method.name), "fixed_type", None)
+        assert (group is not None) == bool(method.parameters), method.name
+        for parameter in method.parameters:
+            assert group.properties[parameter.id].is_overridable
+            assert group.properties[parameter.id].name == parameter.label
+    obj, _armature = scenes.make_arm()
+    values = stage_settings.method_values(properties.of(obj), ("sdef", "dq", ""))
+    assert values == {"sdef.interpolation": sinew.methods()[3].parameters[0].default}
+
+
+def test_the_menu_has_the_groups_of_the_list():
+    items = method_items.method_items()
+    headings = [label for name, label, _text, _number in items if not name]
+    assert headings == list(dict.fromkeys(m.group for m in sinew.methods()))
+    shown = properties.SinewSettings.bl_rna.properties["method"].enum_items
+    assert [i.identifier for i in shown if i.identifier] == [m.name for m in sinew.methods()]
+    assert [i.description for i in shown if i.identifier] == [m.description for m in sinew.methods()]
+    # What files have stored.
+    assert {i.identifier: i.value for i in shown if i.identifier} == {
+        m.name: m.number for m in sinew.methods()
+    }
+    obj, _armature = scenes.make_arm()
+    assert properties.of(obj).method == "lbs"
+    assert properties.of(obj).mix.method == properties.OFF
+
+
+def test_setting_one_deforms_by_it(route):
+    obj = skinned_model()
+    found = shape_of_each(obj)
+    motions = session.state_of(obj).shown.frames[0]
+    assert motions.parameters == {"sdef.interpolation": "nlerp"}
+    assert scenes.worst(scenes.final_points(obj), found["nlerp"]) == 0.0
+
+
+def test_keys_and_drivers_set_it(route):
+    obj = skinned_model()
+    found = shape_of_each(obj)
+    for frame, choice in ((FRAME - 1, "nlerp"), (FRAME, "slerp"), (FRAME + 1, "nlerp")):
+        obj.sinew.sdef.interpolation = choice
+        obj.sinew.sdef.keyframe_insert("interpolation", frame=frame)
+    for frame in (FRAME - 1, FRAME + 1, FRAME):
+        bpy.context.scene.frame_set(frame)
+    assert scenes.worst(scenes.final_points(obj), found["slerp"]) == 0.0
+    obj.animation_data.action = None
+    obj.sinew.sdef.driver_add("interpolation").driver.expression = "0"
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(FRAME)
+    assert scenes.worst(scenes.final_points(obj), found["nlerp"]) == 0.0
+
+
+def test_it_is_mixed_in_with_its_parameters(route):
+    obj = skinned_model()
+    found = shape_of_each(obj)
+    obj.vertex_groups.new(name="All").add(range(len(obj.data.vertices)), 1.0, "REPLACE")
+    obj.sinew.method, obj.sinew.mix.group, obj.sinew.mix.method = "dq", "All", "sdef"
+    for choice in CHOICES:
+        obj.sinew.sdef.interpolation = choice
+        bpy.context.view_layer.update()
+        tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+        assert scenes.worst(scenes.final_points(obj), found[choice]) <= tolerance
+
+
+def test_files_and_copies_carry_it(tmp_path):
+    obj = skinned_model()
+    found = shape_of_each(obj)
+    obj.sinew.sdef.interpolation = "slerp"
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    session.refresh(bpy.context)
+    assert scenes.worst(scenes.final_points(copy), found["slerp"]) == 0.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "model.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "model.blend"))
+    obj = bpy.data.objects["Arm"]
+    assert obj.sinew.sdef.interpolation == "slerp"
+    assert scenes.worst(scenes.final_points(obj), found["slerp"]) == 0.0
+
+
+def test_a_comparison_has_it():
+    obj = skinned_model()
+    found = shape_of_each(obj)
+    obj.sinew.sdef.interpolation = "slerp"
+    bpy.ops.sinew.compare(methods={"lbs", "sdef"})
+    bpy.context.view_layer.update()
+    copy = next(each for each in bpy.context.scene.objects if properties.of(each).copied_for == "sdef")
+    tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+    # It stands beside the original.
+    moved = scenes.final_points(copy) - found["slerp"]
+    assert scenes.worst(moved, np.broadcast_to(moved[0], moved.shape)) <= tolerance
+    bpy.ops.sinew.end_comparison()
+
+
+def test_commands_take_it_by_its_full_name(tmp_path):
+    listed = json.loads(run_sinew("methods", "--json").stdout)["methods"]
+    (name,) = next(row["parameters"] for row in listed if row["name"] == "sdef")
+    assert name == "sdef.interpolation"
+    obj, _armature = make_model()
+    path = tmp_path / "model.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.add_sinew(obj, "sdef")
+    bpy.context.scene.frame_set(FRAME)
+    found = shape_of_each(obj)
+    for choice in CHOICES:
+        run_sinew(
+            *("points", path, "--method", "sdef", "--frames", FRAME, "--set", f"{name}={choice}"),
+            *("--out", tmp_path / "points.npz"),
+        )
+        assert scenes.worst(np.load(tmp_path / "points.npz")["Arm"][0], found[choice]) == 0.0
+    (tmp_path / "job.toml").write_text(f'method = "sdef"\nset = "{name}=slerp"\n')
+    run_sinew("reskin", path, "--job", tmp_path / "job.toml", "--frames", "none", "--out", tmp_path / "out")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "model.blend"))
+    bpy.context.scene.frame_set(FRAME)
+    obj = bpy.data.objects["Arm"]
+    assert obj.sinew.sdef.interpolation == "slerp"
+    assert scenes.worst(scenes.final_points(obj), found["slerp"]) == 0.0
+    run_sinew(
+        "points", path, "--method", "sdef", "--frames", 1, "--set", f"{name}=x", "--out", path, status=2
+    )
+
+
+def test_scripts_set_it_for_all():
+    obj, _armature = make_model()
+    evaluate.set_parameters(parse(["sdef.interpolation=slerp"]))
+    try:
+        evaluate.use_method(obj, "sdef")
+    finally:
+        evaluate.set_parameters({})
+    assert obj.sinew.sdef.interpolation == "slerp"

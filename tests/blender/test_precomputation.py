@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What cor needs computed: on a thread while the artist works, at once for who can not look later; kept."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+from program import run_sinew
+from sinew_addon.attach import attach, properties, stored_vertex_data
+from sinew_addon.core import vertex_data
+from sinew_addon.core.file_cache import FileCache
+from sinew_addon.core.precompute import precomputations
+from sinew_addon.deform import precompute_watch, precomputing, session
+from sinew_addon.deform.plan import State
+
+FRAME = 8
+
+
+class Gate:
+    """Lets the centres be found, and counts how often; while it is closed they are waited for."""
+
+    def __init__(self, make) -> None:
+        self.count, self.threads = 0, []
+        self._make, self._open, self.is_begun = make, threading.Event(), threading.Event()
+        self._open.set()
+
+    def close(self) -> None:
+        self._open.clear()
+
+    def open(self) -> None:
+        self._open.set()
+
+    def __call__(self, points, influences, triangles, progress):
+        self.count += 1
+        self.threads.append(threading.current_thread())
+        self.is_begun.set()
+        while not self._open.wait(0.002):
+            if not progress(0.0):
+                return None
+        return self._make(points, influences, triangles, progress)
+
+
+@pytest.fixture(autouse=True)
+def gate(monkeypatch, tmp_path):
+    """Nothing is known of earlier tests, and nothing runs after one."""
+    provider = vertex_data.PROVIDERS["cor"]
+    gate = Gate(provider.make)
+    monkeypatch.setitem(vertex_data.PROVIDERS, "cor", dataclasses.replace(provider, make=gate))
+    monkeypatch.setattr(precomputations, "cache", FileCache(tmp_path / "cache", 10**8))
+    monkeypatch.setattr(precomputations, "_made", type(precomputations._made)())
+    yield gate
+    gate.open()
+    precomputations.cancel_all()
+    precomputations.waits = True
+    precomputations.stopped.clear()
+
+
+@pytest.fixture
+def in_window():
+    """As where somebody watches: nobody waits."""
+    precomputations.waits = False
+
+
+@pytest.fixture(params=routes.ROUTES)
+def route(request):
+    routes.force(request.param)
+    yield request.param
+    routes.release()
+
+
+def forget_made() -> None:
+    precomputations._made.clear()
+
+
+def look_until_done() -> None:
+    for _ in range(200):
+        if precompute_watch.look() is None:
+            return
+        time.sleep(0.01)
+    raise AssertionError("it goes on and on")
+
+
+def shapes_by_modifier(preserve_volume: bool) -> np.ndarray:
+    """The arm's by its Armature modifier, of an arm in a file of its own."""
+    obj, _armature = scenes.make_arm(bones=3)
+    found = scenes.modifier_shapes(obj, [FRAME], preserve_volume)[0]
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return found
+
+
+def shape_by_cor() -> np.ndarray:
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "cor")
+    found = scenes.shapes(obj, [FRAME])[0]
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    forget_made()
+    return found
+
+
+def plan_of(obj: bpy.types.Object):
+    return session.state_of(obj).plan
+
+
+def test_a_script_has_it_at_once(gate):
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "cor")
+    assert plan_of(obj).state is State.IN_DEPSGRAPH
+    assert gate.threads == [threading.main_thread()]
+
+
+@pytest.mark.parametrize("preserve_volume", [False, True])
+def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
+    expected, by_modifier = shape_by_cor(), shapes_by_modifier(preserve_volume)
+    precomputations.waits = False
+    gate.count, gate.threads = 0, []
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    obj.modifiers["Armature"].use_deform_preserve_volume = preserve_volume
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "cor")
+    tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
+    assert gate.is_begun.wait(10)
+    assert gate.threads[0] is not threading.main_thread()
+    assert plan_of(obj).state is State.WAITING
+    assert "centres of rotation" in plan_of(obj).reason
+    assert precomputing.running(obj, session.state_of(obj)).keys() == {"centres of rotation"}
+    assert scenes.worst(scenes.final_points(obj), by_modifier) <= tolerance
+    assert precompute_watch.look() is not None
+    gate.open()
+    look_until_done()
+    assert plan_of(obj).state is not State.WAITING
+    assert scenes.worst(scenes.final_points(obj), expected) <= tolerance
+    assert scenes.worst(expected, by_modifier) > 100 * tolerance
+    assert gate.count == 1
+
+
+def test_stopped_it_waits_for_the_button(gate, in_window):
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "cor")
+    assert gate.is_begun.wait(10)
+    bpy.ops.sinew.stop_precomputation()
+    assert not precomputations.running
+    assert plan_of(obj).state is State.WAITING
+    assert "stopped" in plan_of(obj).reason
+    gate.open()
+    bpy.context.scene.frame_set(FRAME)
+    session.refresh(bpy.context)
+    look_until_done()
+    assert gate.count == 1
+    assert precomputing.stopped(obj, session.state_of(obj)) == ["centres of rotation"]
+    bpy.ops.sinew.precompute()
+    look_until_done()
+    assert plan_of(obj).state is State.IN_DEPSGRAPH
+    assert gate.count == 2
+
+
+def test_a_render_waits(gate, route, rendered_points):
+    expected = shape_by_cor()
+    precomputations.waits = False
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "cor")
+    assert plan_of(obj).state is State.WAITING
+    threading.Timer(0.2, gate.open).start()
+    points = rendered_points(obj)
+    assert scenes.worst(points, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_a_render_waits_also_for_what_was_stopped(gate, in_window, rendered_points):
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "cor")
+    bpy.ops.sinew.stop_precomputation()
+    gate.open()
+    bpy.context.scene.frame_set(FRAME)
+    points = rendered_points(obj)
+    forget_made()
+    precomputations.waits = True
+    session.rebind(obj, bpy.context)
+    assert scenes.worst(points, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def move_weights(obj: bpy.types.Object) -> None:
+    obj.vertex_groups["bone.1"].add(list(range(40, 140)), 0.35, "ADD")
+    obj.data.update()
+    obj.update_tag()
+    bpy.context.view_layer.update()
+
+
+def test_while_weights_are_painted_the_old_centres_serve(gate, route):
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "cor")
+    assert gate.count == 1
+    precomputations.waits = False
+    for _ in range(3):
+        move_weights(obj)
+        # Another stroke comes before the artist has paused.
+        assert precompute_watch.look() is not None
+        assert gate.count == 1
+        assert plan_of(obj).state is not State.WAITING
+    by_old = scenes.final_points(obj)
+    time.sleep(precompute_watch.PAUSE)
+    look_until_done()
+    assert gate.count == 2
+    by_new = scenes.final_points(obj)
+    assert scenes.worst(by_old, by_new) > 1e-4
+    forget_made()
+    precomputations.waits = True
+    session.rebind(obj, bpy.context)
+    assert scenes.worst(by_new, scenes.final_points(obj)) == 0.0
+
+
+def test_undo_and_redo_find_what_was_made(gate):
+    bpy.context.preferences.edit.use_global_undo = True
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.ops.ed.undo_push(message="made")
+    bpy.ops.sinew.add()
+    obj.sinew.method = "cor"
+    bpy.ops.ed.undo_push(message="cor")
+    bpy.context.scene.frame_set(FRAME)
+    expected = scenes.final_points(obj)
+    bpy.ops.ed.undo_push(message="frame")
+    bpy.ops.ed.undo()
+    bpy.ops.ed.redo()
+    obj = bpy.data.objects["Arm"]
+    bpy.context.scene.frame_set(FRAME)
+    assert scenes.worst(scenes.final_points(obj), expected) == 0.0
+    assert gate.count == 1
+
+
+@pytest.mark.parametrize("event", ["undo", "delete", "load", "remove", "edit"])
+def test_what_happens_meanwhile_does_no_harm(gate, in_window, event):
+    bpy.context.preferences.edit.use_global_undo = True
+    gate.close()
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.ops.ed.undo_push(message="made")
+    scenes.add_sinew(obj, "cor")
+    bpy.ops.ed.undo_push(message="cor")
+    assert gate.is_begun.wait(10)
+    if event == "undo":
+        bpy.ops.ed.undo()
+    elif event == "delete":
+        bpy.data.meshes.remove(obj.data)
+    elif event == "load":
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        assert not precomputations.running
+        assert not [t for t in threading.enumerate() if t.name == "Sinew precomputation"]
+    elif event == "remove":
+        attach.remove(obj)
+    else:
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.mesh.subdivide()
+        bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    precompute_watch.look()
+    gate.open()
+    look_until_done()
+    if event == "edit":
+        bpy.context.scene.frame_set(FRAME)
+        assert plan_of(obj).state is State.IN_DEPSGRAPH
+        assert len(scenes.final_points(obj)) == len(obj.data.vertices)
+
+
+def test_a_keyed_method_is_asked_for_when_it_comes(gate, route):
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "dq")
+    for frame, method in ((1, "dq"), (FRAME - 1, "cor"), (FRAME + 2, "dq")):
+        obj.sinew.method = method
+        obj.sinew.keyframe_insert("method", frame=frame)
+    bpy.context.scene.frame_set(1)
+    session.refresh(bpy.context)
+    gate.count = 0
+    forget_made()
+    session.rebind(obj, bpy.context)
+    precomputations.waits = False
+    bpy.context.scene.frame_set(FRAME)
+    look_until_done()
+    found = scenes.final_points(obj)
+    assert gate.count == 1
+    assert not precomputing.waits_for(obj, session.state_of(obj))
+    obj.animation_data_clear()
+    precomputations.waits = True
+    obj.sinew.method = "cor"
+    assert scenes.worst(scenes.final_points(obj), found) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_triangles_are_read_where_a_method_needs_them():
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "dq")
+    assert session.state_of(obj).bound.source.triangles is None
+    obj.sinew.method = "cor"
+    assert session.state_of(obj).bound.source.triangles is not None
+    bpy.context.scene.frame_set(FRAME)
+    assert not obj.sinew.error
+
+
+# --- Kept
+
+
+def saved(tmp_path) -> tuple[np.ndarray, str]:
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "cor")
+    bpy.context.scene.frame_set(FRAME)
+    points, path = scenes.final_points(obj), str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    return points, path
+
+
+def test_a_file_has_it(gate, tmp_path):
+    points, path = saved(tmp_path)
+    for waits in (True, False):
+        precomputations.waits = waits
+        forget_made()
+        bpy.ops.wm.open_mainfile(filepath=path)
+        obj = bpy.data.objects["Arm"]
+        assert plan_of(obj).state is State.IN_DEPSGRAPH
+        assert scenes.worst(scenes.final_points(obj), points) == 0.0
+        assert gate.count == 1
+
+
+def test_copies_and_libraries_have_it(gate, tmp_path):
+    _points, path = saved(tmp_path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    forget_made()
+    with bpy.data.libraries.load(path, link=True) as (_there, wanted):
+        wanted.objects = ["Arm", "Arm Rig"]
+    for obj in wanted.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    rig = wanted.objects[1].override_create(remap_local_usages=True)
+    over = next(o for o in wanted.objects if o.type == "MESH").override_create(remap_local_usages=True)
+    assert rig is not None
+    bpy.context.view_layer.update()
+    assert session.state_of(over) is not None
+    assert "cor" in session.state_of(over).bound.binding.vertex_data.made
+    assert gate.count == 1
+    bpy.ops.wm.open_mainfile(filepath=path)
+    forget_made()
+    obj = bpy.data.objects["Arm"]
+    for linked in (True, False):
+        copy = obj.copy()
+        if not linked:
+            copy.data = obj.data.copy()
+        bpy.context.scene.collection.objects.link(copy)
+        bpy.context.view_layer.update()
+        session.refresh(bpy.context)
+        assert "cor" in session.state_of(copy).bound.binding.vertex_data.made
+    assert gate.count == 1
+
+
+def test_remove_leaves_none_of_it(tmp_path):
+    _points, path = saved(tmp_path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    mesh = bpy.data.objects["Arm"].data
+    assert len(stored_vertex_data.read(mesh)) == 1
+    attach.remove(bpy.data.objects["Arm"])
+    assert not mesh.is_property_set(stored_vertex_data.NAME)
+
+
+def test_another_method_saves_none_of_it(tmp_path):
+    _points, path = saved(tmp_path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bpy.data.objects["Arm"].sinew.method = "dq"
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert stored_vertex_data.read(bpy.data.objects["Arm"].data) == {}
+
+
+def test_data_of_another_mesh_is_not_taken(gate, tmp_path):
+    _points, path = saved(tmp_path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = bpy.data.objects["Arm"]
+    attach.remove(obj)
+    session.forget()
+    other = {"0" * 32: np.zeros((len(obj.data.vertices), 3), np.float32)}
+    stored_vertex_data.write(obj.data, other)
+    forget_made()
+    scenes.add_sinew(obj, "cor")
+    assert gate.count == 2
+
+
+def test_reskin_puts_it_into_the_file(gate, tmp_path):
+    scenes.make_arm(bones=3)
+    path = tmp_path / "plain.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    run_sinew("reskin", path, "--method", "cor", "--frames", "none", "--out", tmp_path / "out")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "plain.blend"))
+    obj = bpy.data.objects["Arm"]
+    bpy.context.scene.frame_set(FRAME)
+    assert len(stored_vertex_data.read(obj.data)) == 1
+    assert plan_of(obj).state is State.IN_DEPSGRAPH
+    assert gate.count == 0
+
+
+def test_the_folder_has_what_no_file_has(gate, monkeypatch):
+    monkeypatch.setattr("sinew_addon.core.precompute.SECONDS_WORTH_A_FILE", 0.0)
+    for _ in range(2):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        forget_made()
+        obj, _armature = scenes.make_arm(bones=3)
+        scenes.add_sinew(obj, "cor")
+        assert "cor" in session.state_of(obj).bound.binding.vertex_data.made
+    assert gate.count == 1
+    assert properties.has_sinew(obj)
