@@ -197,9 +197,9 @@ private:
     }
 
     void sort_neighbours() {
-        for (std::size_t i = 0; i < mesh_.vertices.size(); ++i) {
+        for (const std::uint32_t vertex : mesh_.vertices) {
             first_sorted_.push_back(sorted_.size());
-            for (const std::int32_t neighbour : neighbours_.of(mesh_.vertices[i])) {
+            for (const std::int32_t neighbour : neighbours_.of(vertex)) {
                 sorted_.push_back(place_[index(neighbour)]);
             }
             std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
