@@ -26,7 +26,7 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.io import mesh_io
 
-SIDE, ROUNDS, FRAMES = 317, 6, range(2, 12)
+SIDE, ROUNDS, FRAMES = 317, 8, range(2, 12)
 ORDERS = ("rows", "random")
 CASES = [(kind, iterations) for kind in ("simple", "length_weighted") for iterations in (5, 20)]
 
@@ -139,7 +139,7 @@ def of_library(obj: bpy.types.Object) -> dict[str, float]:
             smooth_type=kind,
         )
         times = []
-        for _run in range(30):
+        for _run in range(100):
             started = time.perf_counter()
             mush.apply(points, out=out, threads=1)
             times.append(time.perf_counter() - started)

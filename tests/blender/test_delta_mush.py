@@ -12,6 +12,7 @@ import whole_file
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import safe_mode, session, small_meshes
 from sinew_addon.deform.plan import State
+from sinew_addon.features.heat import live
 
 FRAMES = [1, 6, 11]
 GROUP = "smooth here"
@@ -350,6 +351,19 @@ def test_a_saved_file_has_corrective_smooth_on(tmp_path):
     attach.remove(obj)
     assert obj.modifiers["Smooth"].show_viewport
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) < 1e-6
+
+
+def test_it_is_measured_against_the_modifier_that_was_taken_over():
+    obj, _expected = taken_over(iterations=9)
+    bpy.context.scene.frame_set(11)
+
+    def distance() -> float:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        return live.measure(scenes.states_of(obj), "blender", depsgraph).measured.entry("distance_max")
+
+    assert distance() < 1e-5
+    properties.of(obj).delta_mush.iterations = 30
+    assert distance() > 1e-3
 
 
 def test_nothing_of_what_was_taken_over_stays():

@@ -134,7 +134,7 @@ struct DeltaMush::State {
     std::size_t iterations = 0;
     std::vector<float> factors;        // as MushFrame has them, and room for a vector
     bool is_uniform = true;            // as of MushFrame
-    std::vector<MushDetails> details;  // of mesh.corners
+    std::vector<MushDetails> details;  // as MushBlock::first_detail
 
     // Of one call at a time. Those beyond the vertices stay 0.
     mutable std::mutex mutex;
@@ -147,7 +147,7 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
     Amount amount = amount_of(mesh, points, with);
     std::vector<Vec3<float>> own_points(points.begin(), points.end());
     std::vector<float> own_weights(with.weights.begin(), with.weights.end());
-    std::vector<MushDetails> own_details(mesh.corners.size());
+    std::vector<MushDetails> own_details(mesh.detail_count);
     for (float& weight : own_weights) weight = std::clamp(weight, 0.0f, 1.0f);
     const float by_type = with.type == SmoothType::length_weighted ? 2.0f : 1.0f;
     for (const MushRun& run : mesh.runs) {

@@ -119,10 +119,7 @@ HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& in
 /// Points of a block from `lane` on.
 template <class D>
 HWY_INLINE Points<D> points_at(D d, const Float4* points, const Lanes<std::int32_t>& indices,
-                               std::size_t lane, bool is_consecutive) {
-    if (is_consecutive) {
-        return consecutive_points(d, points, static_cast<std::size_t>(indices.lane[0]) + lane);
-    }
+                               std::size_t lane) {
     const std::int32_t* const of_lanes = indices.lane.data() + lane;
     return collected_points(d, points, [of_lanes](std::size_t i) HWY_ATTR { return of_lanes[i]; });
 }
@@ -201,15 +198,23 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& previous, const Points
     return {x, cross_of<D>(z, x), z, hn::IfThenElseZero(is_bent, angle(d, dot_of<D>(a, b)))};
 }
 
-/// Calls call(corner index, corner, lane) for each corner of the vertices of a block from `lane` on.
+/// Calls call(index of the details, corner) for each corner of the vertices of a block from `lane` on.
 template <class D, class Call>
 HWY_INLINE void for_each_corner(D d, const MushFrame& frame, const MushBlock& block, std::size_t lane,
                                 const Points<D>& current, const Call& call) {
-    for (std::size_t k = block.first_corner; k < block.first_corner + block.corners; ++k) {
-        const MushCorners& corners = frame.mesh->corners[k];
-        const Points<D> previous = points_at(d, frame.from, corners.previous, lane, block.is_consecutive);
-        const Points<D> next = points_at(d, frame.from, corners.next, lane, block.is_consecutive);
-        call(k, corner_of(d, previous, current, next));
+    for (std::size_t k = 0; k < block.corners; ++k) {
+        Points<D> previous;
+        Points<D> next;
+        if (block.is_consecutive) {
+            const FirstEnds& first = frame.mesh->first_ends[block.first_ends + k];
+            previous = consecutive_points(d, frame.from, static_cast<std::size_t>(first.previous) + lane);
+            next = consecutive_points(d, frame.from, static_cast<std::size_t>(first.next) + lane);
+        } else {
+            const MushEnds& ends = frame.mesh->ends[block.first_ends + k];
+            previous = points_at(d, frame.from, ends.previous, lane);
+            next = points_at(d, frame.from, ends.next, lane);
+        }
+        call(block.first_detail + k, corner_of(d, previous, current, next));
     }
 }
 

@@ -197,9 +197,9 @@ private:
     }
 
     void sort_neighbours() {
-        for (std::size_t i = 0; i < mesh_.vertices.size(); ++i) {
+        for (const std::uint32_t vertex : mesh_.vertices) {
             first_sorted_.push_back(sorted_.size());
-            for (const std::int32_t neighbour : neighbours_.of(mesh_.vertices[i])) {
+            for (const std::int32_t neighbour : neighbours_.of(vertex)) {
                 sorted_.push_back(place_[index(neighbour)]);
             }
             std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
@@ -257,13 +257,12 @@ private:
 
     void add_block(std::size_t begin, std::size_t end) {
         const std::size_t corner_count = corners(begin).size();
-        const std::size_t first = mesh_.corners.size();
-        mesh_.corners.resize(first + corner_count);
+        std::vector<MushEnds> made(corner_count);
         bool is_consecutive = true;
         for (std::size_t v = begin; v < end; ++v) {
             const auto ends = corner_ends(v);
             for (std::size_t k = 0; k < corner_count; ++k) {
-                MushCorners& corner = mesh_.corners[first + k];
+                MushEnds& corner = made[k];
                 // Lanes without a vertex repeat the last.
                 for (std::size_t lane = v - begin; lane < (v + 1 < end ? v - begin + 1 : kLanes); ++lane) {
                     corner.previous.lane[lane] = ends[k].first;
@@ -275,7 +274,17 @@ private:
             }
         }
         mesh_.blocks.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end - begin),
-                                static_cast<std::uint32_t>(corner_count), is_consecutive, first});
+                                static_cast<std::uint32_t>(corner_count), is_consecutive,
+                                is_consecutive ? mesh_.first_ends.size() : mesh_.ends.size(),
+                                mesh_.detail_count});
+        mesh_.detail_count += corner_count;
+        if (!is_consecutive) {
+            mesh_.ends.insert(mesh_.ends.end(), made.begin(), made.end());
+            return;
+        }
+        for (const MushEnds& corner : made) {
+            mesh_.first_ends.push_back({corner.previous.lane[0], corner.next.lane[0]});
+        }
     }
 
     [[nodiscard]] std::int32_t place_of(std::int32_t corner) const {

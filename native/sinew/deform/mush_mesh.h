@@ -27,14 +27,21 @@ struct MushBlock {
     std::uint32_t first_vertex;
     std::uint32_t vertices;
     std::uint32_t corners;
-    bool is_consecutive;       // as of MushRun, in each corner
-    std::size_t first_corner;  // of MushMesh::corners and of the details
+    bool is_consecutive;     // as of MushRun, in each corner
+    std::size_t first_ends;  // of MushMesh::first_ends where it is consecutive, else of MushMesh::ends
+    std::size_t first_detail;
 };
 
 /// The two other vertices of a corner of each vertex of a block.
-struct MushCorners {
+struct MushEnds {
     Lanes<std::int32_t> previous;
     Lanes<std::int32_t> next;
+};
+
+/// Those of its first vertex, where it is consecutive.
+struct FirstEnds {
+    std::int32_t previous;
+    std::int32_t next;
 };
 
 /// What the smoothing takes from a corner of each vertex of a block, in the corner's frame.
@@ -55,7 +62,9 @@ struct MushMesh {
     std::vector<std::int32_t> neighbours;
     std::vector<MushBlock> blocks;
     std::vector<std::uint32_t> first_blocks;  // [chunks + 1]
-    std::vector<MushCorners> corners;
+    std::vector<MushEnds> ends;
+    std::vector<FirstEnds> first_ends;
+    std::size_t detail_count = 0;           // of all blocks
     std::vector<std::uint8_t> on_boundary;  // [vertices] an edge of one face ends there
 
     [[nodiscard]] std::size_t chunk_count() const noexcept { return first_runs.size() - 1; }
