@@ -26,6 +26,9 @@ def make_model(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
     rng = np.random.default_rng(1)
     obj.shape_key_add(name="Basis")
     keys = [obj.shape_key_add(name=name) for name in sdef.KEYS]
+    for key in keys:
+        # They are no shapes: from 5.x on a new key has the value 1.
+        key.value = 0.0
     for vertex in obj.data.vertices:
         entries = [(entry.group, entry.weight) for entry in vertex.groups]
         if len(entries) == 2 and vertex.index % 7:
