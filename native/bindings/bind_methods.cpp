@@ -125,7 +125,8 @@ void bind_methods(py::module_& m) {
         "methods", [] { return tuple_of<MethodInfo>(kMethods); }, "Every skinning method, one Method each.");
     m.def(
         "stages", [] { return tuple_of<StageInfo>(kStages); },
-        "Every stage, one Stage each. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush.");
+        "Every stage, one Stage each. `mix` is an argument of Deformer, `bulge_limit` is BulgeLimit, "
+        "`delta_mush` is DeltaMush.");
 }
 
 }  // namespace sinew::bindings

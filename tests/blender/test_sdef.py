@@ -27,7 +27,7 @@ def make_model(bones: int = 3) -> tuple[bpy.types.Object, bpy.types.Object]:
     obj.shape_key_add(name="Basis")
     keys = [obj.shape_key_add(name=name) for name in sdef.KEYS]
     for key in keys:
-        # Blender 5.2 makes keys that are on.
+        # They are no shapes: in Blender 5.2 a new key has the value 1.
         key.value = 0.0
     for vertex in obj.data.vertices:
         entries = [(entry.group, entry.weight) for entry in vertex.groups]

@@ -41,15 +41,14 @@ struct LinearRows : CentreRows {
 struct Pair {
     std::int32_t bones[2];
     const float* rows[2];
-    float sign;           // by which the second quaternion is added
-    float squared_angle;  // between the quaternions; 0 where they are blended by their sum
+    float sign;                  // by which the second quaternion is added
+    float squared_angle = 0.0f;  // between the quaternions; 0 where they are blended by their sum
 
     HWY_INLINE Pair(const Frame& frame, const std::int32_t* of)
         : bones{of[0], of[1]},
           rows{row_of<CentreRows::kNumbers>(*frame.palette, of[0]),
                row_of<CentreRows::kNumbers>(*frame.palette, of[1])},
-          sign(dot(rows[0], rows[1]) < 0.0f ? -1.0f : 1.0f),
-          squared_angle(0.0f) {
+          sign(dot(rows[0], rows[1]) < 0.0f ? -1.0f : 1.0f) {
         const bool by_slerp = frame.parameters[0] == 1.0;
         if (!by_slerp) return;
         double difference = 0.0;
