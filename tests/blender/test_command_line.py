@@ -157,7 +157,7 @@ def test_parameters_are_set_by_name(tmp_path):
     [
         (("mix=dq", "mix.group=none such"), 1, "no mesh has a vertex group 'none such'"),
         (("mix=bulge",), 2, "mix: expected one of off, lbs"),
-        (("strength=1",), 2, "expected one of mix, mix.method, mix.group"),
+        (("strength=1",), 2, "expected one of mix, "),
     ],
 )
 def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):
