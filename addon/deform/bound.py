@@ -12,6 +12,7 @@ import numpy as np
 
 from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions
+from ..attach.properties import METHODS
 from ..core import sdef
 from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
@@ -56,7 +57,16 @@ class Bound:
     def lacks(self, methods: Iterable[str]) -> list[str]:
         """A sentence for each of the methods that does without something which the mesh lacks."""
         lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
-        return [sdef.MISSING] if lacks_keys else []
+        triangles = self.source.triangles
+        return [
+            *([sdef.MISSING] if lacks_keys else []),
+            *(
+                f"The mesh has no faces, which {METHODS[name].label} needs: its vertices are blended linearly"
+                for name in methods
+                if name in METHODS and "topology" in METHODS[name].needs
+                if triangles is not None and not len(triangles)
+            ),
+        ]
 
     @property
     def binding(self) -> Binding:
