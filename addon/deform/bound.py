@@ -121,6 +121,17 @@ def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | Non
     return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old, given)
 
 
+def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound) -> Bound:
+    """The same with the mesh's triangles, without reading its weights again: that takes far longer.
+
+    Requires that the mesh is the one that was read, and source.is_ready().
+    """
+    read_now = source.with_surface(obj, depsgraph, old.source)
+    for stage in old.skin_stack.skin_stages:
+        stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
+    return replace(old, source=read_now)
+
+
 def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
     """Whether a method was chosen since that needs the mesh's triangles."""
     return bound.source.triangles is None and method_needs.needs_surface(obj)
