@@ -12,6 +12,7 @@ import numpy as np
 
 from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions
+from ..attach.properties import METHODS
 from ..core import sdef
 from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
@@ -56,7 +57,16 @@ class Bound:
     def lacks(self, methods: Iterable[str]) -> list[str]:
         """A sentence for each of the methods that does without something which the mesh lacks."""
         lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
-        return [sdef.MISSING] if lacks_keys else []
+        triangles = self.source.triangles
+        return [
+            *([sdef.MISSING] if lacks_keys else []),
+            *(
+                f"The mesh has no faces, which {METHODS[name].label} needs: its vertices are blended linearly"
+                for name in methods
+                if name in METHODS and "topology" in METHODS[name].needs
+                if triangles is not None and not len(triangles)
+            ),
+        ]
 
     @property
     def binding(self) -> Binding:
@@ -109,6 +119,17 @@ def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | Non
         influences = weighting.entries.influences()
         given[sdef.METHOD] = sdef.vertex_data(basis, np.array(keys), influences, groups)
     return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old, given)
+
+
+def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound) -> Bound:
+    """The same with the mesh's triangles, without reading its weights again: that takes far longer.
+
+    Requires that the mesh is the one that was read, and source.is_ready().
+    """
+    read_now = source.with_surface(obj, depsgraph, old.source)
+    for stage in old.skin_stack.skin_stages:
+        stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
+    return replace(old, source=read_now)
 
 
 def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:

