@@ -118,7 +118,7 @@ def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | Non
         groups = sdef.group_of_bone(weighting.bones.names, read_now.group_names)
         influences = weighting.entries.influences()
         given[sdef.METHOD] = sdef.vertex_data(basis, np.array(keys), influences, groups)
-    return VertexData(weighting, read_now.points, read_now.triangles, read_now.stored, old, given)
+    return VertexData(weighting, read_now.surface_points, read_now.triangles, read_now.stored, old, given)
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound) -> Bound:

@@ -22,11 +22,11 @@ class Source:
     """Read once, and again when it may be out of date.
 
     points            float32 [vertices, 3], object space, without shape keys
-    triangles         int32 [triangles, 3]; None where no method needs them: to read them takes long
+    triangles         int32 [triangles, 3], of surface_points; None where no method needs them: to read them
+                      takes long
     stored            what the file has of numbers that methods keep of vertices, by its key; read with these
     topology          faces and edges
-    own_points        float32 [vertices, 3], object space, the mesh's own, whatever stands in front; None
-                      where that gives it other vertices
+    mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, whatever stands in front
     sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
     key_values        of the shape keys that are mixed in mixed_points
@@ -38,7 +38,7 @@ class Source:
     points: np.ndarray
     triangles: np.ndarray | None
     topology: Topology
-    own_points: np.ndarray | None
+    mesh_points: np.ndarray
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     from_front: bool = False
@@ -47,6 +47,17 @@ class Source:
     known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
 
+    @property
+    def own_points(self) -> np.ndarray | None:
+        """mesh_points, where what stands in front keeps the vertices."""
+        return self.mesh_points if len(self.mesh_points) == len(self.points) else None
+
+    @property
+    def surface_points(self) -> np.ndarray:
+        """float32 [vertices, 3]: what methods make numbers of vertices from. The mesh's own points, whatever
+        moves them in front; else those that what stands in front gave it when it was read."""
+        return self.points if self.own_points is None else self.own_points
+
     def equals(self, other: Source) -> bool:
         if self is other:
             return True
@@ -54,14 +65,15 @@ class Source:
         if (keys is None) != (known is None) or not self.equals_but_for_points(other):
             return False
         has_same_keys = keys is None or keys.equals(known)
-        return has_same_keys and self.has_same_surface(other)
+        return has_same_keys and self.has_same_surface(other) and np.array_equal(self.points, other.points)
 
     def equals_but_for_points(self, other: Source) -> bool:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
     def has_same_surface(self, other: Source) -> bool:
-        """Whether all that methods keep numbers of vertices from, but for weights, is the same."""
-        return np.array_equal(self.points, other.points) and all(
+        """Whether all that methods keep numbers of vertices from, but for weights, is the same; it is where
+        points only move in front."""
+        return np.array_equal(self.mesh_points, other.mesh_points) and all(
             (mine is None) == (its is None) and (mine is None or np.array_equal(mine, its))
             for mine, its in ((self.triangles, other.triangles), (self.sdef_keys, other.sdef_keys))
         )
@@ -85,26 +97,26 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_front else obj.data
     weights = mesh_io.read_group_weights(mesh)
     points = mesh_io.read_points(mesh)
-    triangles = mesh_io.read_triangles(mesh) if with_surface else None
+    mesh_points = mesh_io.read_points(obj.data) if from_front else points
     keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
-    own_points = points
-    if from_front:
-        own_points = mesh_io.read_points(obj.data) if len(obj.data.vertices) == len(points) else None
-    if sdef_keys is not None and own_points is None:
+    if len(mesh_points) != len(points):
         sdef_keys = None
-    stored = stored_vertex_data.read(obj.data) if with_surface else {}
     topology = mesh_io.read_topology(mesh)
-    return Source(
-        names, weights, points, triangles, topology, own_points, keys, sdef_keys, from_front, stored
-    )
+    source = Source(names, weights, points, None, topology, mesh_points, keys, sdef_keys, from_front)
+    return _with_surface(obj, mesh, source) if with_surface else source
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, known: Source) -> Source:
     """What is known, and what read() leaves out without `with_surface`. Requires is_ready."""
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_front else obj.data
-    triangles, stored = mesh_io.read_triangles(mesh), stored_vertex_data.read(obj.data)
-    return replace(known, triangles=triangles, stored=stored)
+    return _with_surface(obj, mesh, known)
+
+
+def _with_surface(obj: bpy.types.Object, mesh: bpy.types.Mesh, source: Source) -> Source:
+    """mesh  that comes to the Armature modifier: moved, Blender may divide its quads otherwise"""
+    triangles = mesh_io.read_triangles(mesh if source.own_points is None else obj.data)
+    return replace(source, triangles=triangles, stored=stored_vertex_data.read(obj.data))
 
 
 def has_changed(
