@@ -81,7 +81,9 @@ def unregister() -> None:
 def _end() -> None:
     """At the end of Python. Blender unregisters its extensions before; with bpy as a module nobody does, and
     a Python handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5."""
-    unregister()
+    # Where Blender did, its types are gone by now.
+    if _registered:
+        unregister()
     # Blender 4.2 keeps a reference to each class of property groups that was registered, which keeps the
     # names of its module. Blender as a module ends when `bpy` is freed, and crashes where it never is.
     for name, module in list(sys.modules.items()):
