@@ -174,7 +174,7 @@ TEST(Mix, refuses_what_it_can_not_mix) {
     std::string names;
     for (const MethodInfo& method : kMethods) names += (names.empty() ? "" : ", ") + std::string(method.name);
     const std::string message = ": expected one of " + names + ", got a method of number 1000";
-    const MethodInfo unknown{1000, "none", "", "", "", Needs::nothing};
+    const MethodInfo unknown{1000, "none", "", MethodGroup::blender, "", "", Needs::nothing};
     EXPECT_EQ(with(unknown, {0, 1, 0}), "mix" + message);
     EXPECT_EQ(refusal([&] { const Deformer deformer(binding, unknown); }), "method" + message);
 }
