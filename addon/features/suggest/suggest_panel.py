@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar's table of all methods: what each is worst by, which is best, and a click to use it."""
+"""The sidebar's list of all methods: the numbers of each, which is best at what, and a click to use it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import bpy
 
 from ...attach import attach, properties
-from ...core.suggestion import CRITERIA, Criterion, Suggestion, Worst
+from ...core.suggestion import CRITERIA, Criterion, Worst
 from ...deform import session
 from ...io import units
 from ...ui import operators, stepped
@@ -71,32 +71,22 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
             return
         count = len(suggestion.frames)
         draw_text(
-            layout, context, f"The worst of {count} frame{'s' if count > 1 else ''}; a dot marks the best"
+            layout, context, f"The worst of {count} frame{'s' if count > 1 else ''}, the best method marked"
         )
         used = {properties.of(obj).method for obj in operators.sinew_targets(context)}
-        _draw_table(layout, context.scene, suggestion, used)
+        best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
+        for name in suggestion.rank():
+            column = layout.column(align=True)
+            button = column.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
+            button.method = name
+            # Two columns: the sidebar is narrow.
+            values = column.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+            for criterion in CRITERIA:
+                value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
+                icon = "CHECKMARK" if name in best[criterion.name] else "BLANK1"
+                values.label(text=f"{criterion.label} {value}", icon=icon)
         for criterion in CRITERIA:
             draw_text(layout, context, f"{criterion.label}: {criterion.text}")
-
-
-def _draw_table(
-    layout: bpy.types.UILayout, scene: bpy.types.Scene, suggestion: Suggestion, used: set[str]
-) -> None:
-    best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
-    row = layout.row(align=True)
-    methods = row.column(align=True)
-    methods.label(text="")
-    ranked = suggestion.rank()
-    for name in ranked:
-        button = methods.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
-        button.method = name
-    for criterion in CRITERIA:
-        column = row.column(align=True)
-        column.label(text=criterion.label)
-        for name in ranked:
-            worst = suggestion.worst.get((name, criterion.name))
-            icon = "RADIOBUT_ON" if name in best[criterion.name] else "NONE"
-            column.label(text=value_text(scene, criterion, worst), icon=icon)
 
 
 def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
