@@ -17,9 +17,10 @@ def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
 
 
 def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
-    names = evaluate.method_names()
+    # What the file stores stays that of the method where the list gets others.
+    numbers = {name: method.number + 1 for name, method in properties.METHODS.items()}
     return [
-        (name, properties.method_label(name), "", "NONE", names.index(name)) for name in methods_of(state)
+        (name, properties.method_label(name), "", "NONE", numbers.get(name, 0)) for name in methods_of(state)
     ]
 
 
