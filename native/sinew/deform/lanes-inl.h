@@ -101,6 +101,25 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
     return {hn::MulAdd(scale, b.x, a.x), hn::MulAdd(scale, b.y, a.y), hn::MulAdd(scale, b.z, a.z)};
 }
 
+/// `v` rotated by the unit quaternion `q` (w, x, y, z).
+template <class D>
+HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
+    const Points<D> axis{hn::Set(d, q[1]), hn::Set(d, q[2]), hn::Set(d, q[3])};
+    const Points<D> inner = add_scaled<D>(cross<D>(axis, v), hn::Set(d, q[0]), v);
+    return add_scaled<D>(v, hn::Set(d, 2.0f), cross<D>(axis, inner));
+}
+
+/// `start`, and what the rotation by the quaternion `q` [4] of any length adds to `v`.
+template <class D>
+HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, const Points<D>& v) {
+    const Vec<D> squared_norm =
+        hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
+    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
+    const Points<D> axis{q[1], q[2], q[3]};
+    const Points<D> inner = add_scaled<D>(cross<D>(axis, v), q[0], v);
+    return add_scaled<D>(start, scale, cross<D>(axis, inner));
+}
+
 #if HWY_TARGET == HWY_AVX3
 
 /// x y z x y z ... of the points, in three vectors.

@@ -51,8 +51,7 @@ struct Sbs {
     template <class T>
     [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
                                          const Affine<T>& rest_bone) noexcept {
-        const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
-        return {{to_quat_vec(split.rigid), split.scale, split.has_scale}, rest_bone.translation};
+        return {scaled_rigid(posed_from_rest, rest_bone), rest_bone.translation};
     }
 
     /// The point r of least sum of |(R_a - R_b) r + t_a - t_b|^2 over all pairs of a set's motions; of several the

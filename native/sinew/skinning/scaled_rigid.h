@@ -22,6 +22,16 @@ struct ScaledRigid {
     }
 };
 
+/// A bone's motion with its rigid part as a quaternion-vector pair.
+///
+/// rest_bone  orthonormal; only read where the motion has scale
+template <class T>
+[[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid(const Affine<T>& posed_from_rest,
+                                                      const Affine<T>& rest_bone) noexcept {
+    const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
+    return {to_quat_vec(split.rigid), split.scale, split.has_scale};
+}
+
 /// The same motion in another scalar type.
 template <class To, template <class> class Rigid, class From>
 [[nodiscard]] ScaledRigid<Rigid<To>, To> cast(const ScaledRigid<Rigid<From>, From>& bone) noexcept {

@@ -49,8 +49,7 @@ struct Sdef {
     template <class T>
     [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
                                          const Affine<T>& rest_bone) noexcept {
-        const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
-        return {to_quat_vec(split.rigid), split.scale, split.has_scale};
+        return scaled_rigid(posed_from_rest, rest_bone);
     }
 
     /// The deformed vertex.

@@ -3,6 +3,7 @@
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/skinning/cor.h"
 
+#include "sinew/deform/centre_rows.h"
 #include "sinew/deform/rigid_bones.h"
 #include "sinew/deform/targets.h"
 
@@ -60,15 +61,7 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 namespace {
 
-constexpr Float4 kRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}, {{0, 0, 0, 0}}};
-
-void write_bone(const Cor::Bone<double>& bone, Float4* row, Float4* scale) {
-    row[0] = float4(bone.rigid.rotation);
-    write_displacement(to_affine(bone.rigid), row + 1);
-    write_displacement(bone.scale, scale);
-}
-
-constexpr Kernel kKernel{kRestRow, true, 0, prepare_rigid_method<Cor, write_bone>,
+constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<Cor, write_centre_bone>,
                          SINEW_TARGETS(deform_cor, prepare_cor)};
 
 }  // namespace

@@ -29,10 +29,7 @@ struct QvKernel {
                                      const Points<D>& rest, Sum<D>& sum) {
         Points<D> by;
         if (!scaled(d, palette, bone, rest, by)) return;
-        const float* const row = row_of(palette, bone);
-        const Points<D> axis{hn::Set(d, row[1]), hn::Set(d, row[2]), hn::Set(d, row[3])};
-        const Points<D> inner = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
-        const Points<D> rotated = add_scaled<D>(by, hn::Set(d, 2.0f), cross<D>(axis, inner));
+        const Points<D> rotated = rotated_by(d, row_of(palette, bone), by);
         sum.value[4] = hn::MulAdd(weight, rotated.x, sum.value[4]);
         sum.value[5] = hn::MulAdd(weight, rotated.y, sum.value[5]);
         sum.value[6] = hn::MulAdd(weight, rotated.z, sum.value[6]);
@@ -41,12 +38,7 @@ struct QvKernel {
     template <class D>
     static HWY_INLINE Points<D> finish(D d, const Sum<D>& sum, const Points<D>& p) {
         const Vec<D>* const q = sum.value;
-        const Vec<D> squared_norm =
-            hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
-        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
-        const Points<D> axis{q[1], q[2], q[3]};
-        const Points<D> inner = add_scaled<D>(cross<D>(axis, p), q[0], p);
-        const Points<D> rotated = add_scaled<D>(p, scale, cross<D>(axis, inner));
+        const Points<D> rotated = add_rotation<D>(d, p, q, p);
         return {hn::Add(rotated.x, q[4]), hn::Add(rotated.y, q[5]), hn::Add(rotated.z, q[6])};
     }
 

@@ -38,13 +38,8 @@ struct SbsKernel {
     template <class D>
     static HWY_INLINE Points<D> finish(D d, const Sum<D, kNumbers>& sum, const Points<D>& p) {
         const Vec<D>* const q = sum.value;
-        const Vec<D> squared_norm =
-            hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
-        const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), squared_norm);
         const Points<D> from_centre{hn::Sub(p.x, q[8]), hn::Sub(p.y, q[9]), hn::Sub(p.z, q[10])};
-        const Points<D> axis{q[1], q[2], q[3]};
-        const Points<D> inner = add_scaled<D>(cross<D>(axis, from_centre), q[0], from_centre);
-        return add<D>(p, add_scaled<D>({q[4], q[5], q[6]}, scale, cross<D>(axis, inner)));
+        return add<D>(p, add_rotation<D>(d, {q[4], q[5], q[6]}, q, from_centre));
     }
 };
 
