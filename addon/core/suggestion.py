@@ -47,7 +47,9 @@ class Worst:
 
 @dataclass
 class Suggestion:
-    """methods   name -> label, in order
+    """What methods are worst by.
+
+    methods   name -> label, in order
     frames    that were measured
     diagonal  of the rest shape: lengths are judged as parts of it
     worst     by method and criterion: the largest magnitude over the frames, and where it is; none of a

@@ -50,6 +50,27 @@ def armatures_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     return list(dict.fromkeys(a for obj in objects for a in properties.of(obj).armatures))
 
 
+def check_measurable(objects: Sequence[bpy.types.Object]) -> None:
+    """Raises SinewError for one that Sinew does not deform now."""
+    for obj in objects:
+        if not properties.of(obj).enabled or obj.mode == "EDIT":
+            raise SinewError(
+                f"{obj.name} is switched off or in edit mode: switch Sinew on in object mode first"
+            )
+
+
+def measure_at(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], other: str, frame: float
+) -> tuple[live.Subject, bpy.types.Depsgraph]:
+    """Goes to the frame and measures there, as live.measure(). Raises SinewError where nothing is."""
+    evaluate.set_frame(scene, frame)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    subject = live.measure(session.states_of(objects, depsgraph), other, depsgraph)
+    if subject is None:
+        raise SinewError(f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes")
+    return subject, depsgraph
+
+
 def scan(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], quantity: str, other: str, over: str
 ) -> Iterator[float]:
@@ -57,23 +78,13 @@ def scan(
 
     Raises SinewError where an object can not be measured.
     """
-    for obj in objects:
-        if not properties.of(obj).enabled or obj.mode == "EDIT":
-            raise SinewError(
-                f"{obj.name} is switched off or in edit mode: switch Sinew on in object mode first"
-            )
+    check_measurable(objects)
     armatures, metric, found = armatures_of(objects), METRICS[quantity], []
     extremes: list[float] = []
     frames = stepped.frames_over(scene, armatures, over)
     with stepped.kept_frame(scene, armatures):
         for number, frame in enumerate(frames):
-            evaluate.set_frame(scene, frame)
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            subject = live.measure(session.states_of(objects, depsgraph), other, depsgraph)
-            if subject is None:
-                raise SinewError(
-                    f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes"
-                )
+            subject, _depsgraph = measure_at(scene, objects, other, frame)
             measured = subject.measured
             values = measured.field(quantity)
             if len(values):

@@ -9,13 +9,11 @@ import bpy
 import numpy as np
 
 from ...attach import properties
-from ...core.errors import SinewError
 from ...core.metrics import Measured, Shape
 from ...core.suggestion import CRITERIA, Suggestion
-from ...deform import evaluate, session
 from ...ui import stepped
 from ..heat import live
-from ..heat.worst_frames import armatures_of
+from ..heat.worst_frames import armatures_of, check_measurable, measure_at
 from .crossings import crossing_triangles
 
 # Crossings take longer than all else together: they are counted at as many frames, evenly spread.
@@ -31,11 +29,7 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
 
     Raises SinewError where an object can not be measured.
     """
-    for obj in objects:
-        if not properties.of(obj).enabled or obj.mode == "EDIT":
-            raise SinewError(
-                f"{obj.name} is switched off or in edit mode: switch Sinew on in object mode first"
-            )
+    check_measurable(objects)
     armatures = armatures_of(objects)
     frames = stepped.frames_over(scene, armatures, over)
     places = np.linspace(0, len(frames) - 1, min(len(frames), CROSSING_FRAMES)).round().astype(int)
@@ -45,13 +39,7 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     done, of_all = 0, len(frames) * len(labels)
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
-            evaluate.set_frame(scene, frame)
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            subject = live.measure(session.states_of(objects, depsgraph), properties.BLENDER, depsgraph)
-            if subject is None:
-                raise SinewError(
-                    f"Nothing to measure at frame {frame}: Sinew deforms none of the chosen meshes"
-                )
+            subject, depsgraph = measure_at(scene, objects, properties.BLENDER, frame)
             at_rest = _crossings(subject.gauge.rest) if frame in counted else None
             suggestion.diagonal = subject.measured.rest.diagonal
             for method in labels:

@@ -5,7 +5,10 @@
 #include <cstdlib>
 #include <vector>
 
+#include "sinew/deform/bulge_limit.h"
+#include "sinew/deform/centres_of_rotation.h"
 #include "sinew/deform/deformer.h"
+#include "sinew/deform/delta_mush.h"
 #include "sinew/deform/simd.h"
 #include "sinew/deform/thread_pool.h"
 #include "sinew/interpolate/methods.h"
@@ -50,6 +53,36 @@ void deform() {
     expect(mixed.mixed_method()->name == "dq", "a mix says what it adds");
 }
 
+void smooth() {
+    const std::vector<sinew::Vec3<float>> rest{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    const std::vector<std::int32_t> face_offsets{0, 3}, corners{0, 1, 2}, edges{0, 1, 1, 2, 2, 0};
+    const sinew::DeltaMush mush({face_offsets, corners, edges}, rest, {});
+    std::vector<sinew::Vec3<float>> points = rest;
+    mush.apply(points);
+    expect(mush.vertex_count() == 3 && mush.iterations() == 5, "a DeltaMush says what it was made of");
+    for (std::size_t v = 0; v < rest.size(); ++v)
+        expect(glm::length(points[v] - rest[v]) < 1e-6f, "delta mush gives the rest shape its details back");
+}
+
+void limit_bulges() {
+    const std::vector<sinew::Vec3<float>> rest{{0, 1, 0}};
+    const std::vector<std::int32_t> offsets{0, 2}, bones{0, 1};
+    const std::vector<float> weights{0.5f, 0.5f};
+    const std::vector<sinew::BoneSegment<float>> segments{{{-1, 0, 0}, {0, 0, 0}}, {{0, 0, 0}, {1, 0, 0}}};
+    const sinew::BulgeLimit limit({{rest, offsets, bones, weights}, segments});
+    std::vector<sinew::Vec3<float>> points{{0, 3, 0}};
+    limit.apply(points, std::vector<sinew::Affine<float>>(2));
+    expect(glm::length(points[0] - rest[0]) < 1e-5f, "a vertex is no further from its bones than at rest");
+}
+
+void find_centres() {
+    const std::vector<sinew::Vec3<float>> rest{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    const std::vector<std::int32_t> offsets{0, 1, 2, 3}, bones{0, 0, 0}, triangles{0, 1, 2};
+    const std::vector<float> weights{1.0f, 1.0f, 1.0f};
+    const auto centres = sinew::centres_of_rotation({rest, offsets, bones, weights}, triangles);
+    expect(centres && centres->size() == 3, "a centre for each vertex");
+}
+
 void interpolate() {
     const sinew::DualQuat<float> from{};
     const auto onto = sinew::from_translation<sinew::DualQuat>(sinew::Vec3<float>(2, 4, 6));
@@ -62,6 +95,9 @@ void interpolate() {
 
 int main() {
     deform();
+    smooth();
+    limit_bulges();
+    find_centres();
     interpolate();
     const std::vector<std::int32_t> parents{-1, 0};
     expect(sinew::Skeleton(parents).bone_count() == 2, "a skeleton has its bones");
