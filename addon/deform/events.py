@@ -13,6 +13,8 @@ IMPORTS_ARE_ANNOUNCED = hasattr(bpy.app.handlers, "blend_import_post")
 
 # What Sinew does at a change of frame, by event (handlers.py): only where there is something to do.
 FRAME_HANDLERS: dict[str, Callable] = {}
+# What suspends modifiers after all other functions and restores them before any, where there are some.
+GATE_HANDLERS: dict[str, Callable] = {}
 
 _OURS = __package__.rpartition(".")[0]
 
@@ -51,6 +53,21 @@ def subscribe(event: str, function: Callable) -> None:
     functions = getattr(bpy.app.handlers, event)
     if function not in functions:
         functions.append(function)
+
+
+def call_first(event: str, function: Callable) -> None:
+    """Has Blender call it before all others. Not to be called while Blender goes through the functions."""
+    functions = getattr(bpy.app.handlers, event)
+    if not functions or functions[0] is not function:
+        unsubscribe(event, function)
+        functions.insert(0, function)
+
+
+def call_last(event: str, function: Callable) -> None:
+    """Has Blender call it after all others. Called from one of them, it holds at once."""
+    if not is_last(event, function):
+        unsubscribe(event, function)
+        subscribe(event, function)
 
 
 def is_last(event: str, function: Callable) -> bool:

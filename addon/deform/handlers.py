@@ -45,13 +45,29 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
 def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     _subscribe_behind_others("frame_change_post", on_frame_change)
     _begin_evaluation()
-    if not any(state.dirtied_by_frames for state in current.skinned.values()) or is_rendering_in_window():
+    if any(state.dirtied_by_frames for state in current.skinned.values()) and not is_rendering_in_window():
+        events.call_last("frame_change_pre", close_gate)
+        events.call_first("frame_change_post", open_gate)
+    else:
+        events.unsubscribe_all(events.GATE_HANDLERS)
+
+
+@persistent
+def close_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    """Called last, and open_gate() first, so that other add-ons meet no modifier that Sinew suspends."""
+    if is_rendering_in_window():
         return
     with reaction() as may_react, contextlib.suppress(ReferenceError):
         for obj in current.objects or () if may_react and not current.is_saving else ():
             state = session.state_of(obj)
             if state is not None and state.dirtied_by_frames:
                 current.gate.suspend(obj, current.is_rendering)
+
+
+@persistent
+def open_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    with reaction():
+        current.gate.restore()
 
 
 @persistent
@@ -290,6 +306,7 @@ def _after_render() -> float | None:
 
 _LAST = (after_others, after_others_again)
 events.FRAME_HANDLERS.update(frame_change_pre=before_frame_change, frame_change_post=on_frame_change)
+events.GATE_HANDLERS.update(frame_change_pre=close_gate, frame_change_post=open_gate)
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_depsgraph_update,
@@ -343,7 +360,8 @@ def unregister() -> None:
     session.forget()
     if bpy.app.timers.is_registered(_check_unannounced_changes):
         bpy.app.timers.unregister(_check_unannounced_changes)
-    events.unsubscribe_all({**_HANDLERS, **events.FRAME_HANDLERS})
+    for handlers in (_HANDLERS, events.FRAME_HANDLERS, events.GATE_HANDLERS):
+        events.unsubscribe_all(handlers)
     for event in ("frame_change_post", "depsgraph_update_post"):
         for function in _LAST:
             events.unsubscribe(event, function)

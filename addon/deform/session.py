@@ -132,7 +132,9 @@ def unsubscribe_from_frames() -> None:
     """Without what is not needed: a function of Python's takes 3 to 10 us of a frame in any case."""
     if current.is_idle and events.IMPORTS_ARE_ANNOUNCED:
         events.unsubscribe_all(events.FRAME_HANDLERS)
+        events.unsubscribe_all(events.GATE_HANDLERS)
     elif current.all_use_builtin:
+        events.unsubscribe_all(events.GATE_HANDLERS)
         events.unsubscribe("frame_change_pre", events.FRAME_HANDLERS["frame_change_pre"])
 
 

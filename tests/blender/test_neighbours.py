@@ -337,8 +337,9 @@ def test_sinews_modifier_removed_behind_sinews_handler(arm, neighbour, event):
     assert own.object is not None
 
 
-@pytest.mark.parametrize("what", ["rename", "delete", "add", "delete object", "throw"])
-def test_suspended_modifiers_come_back_whatever_a_neighbour_does(monkeypatch, neighbour, what):
+@pytest.fixture
+def gated(monkeypatch) -> bpy.types.Object:
+    """An arm whose modifiers behind Sinew's are suspended at each change of frame."""
     obj, armature = scenes.make_arm()
     for name in ("Behind", "Further"):
         obj.modifiers.new(name, "CAST").factor = 0.1
@@ -347,31 +348,62 @@ def test_suspended_modifiers_come_back_whatever_a_neighbour_does(monkeypatch, ne
     armature.location.x = 3.0
     armature.keyframe_insert("location", frame=11)
     monkeypatch.setattr(safe_mode, "is_on", lambda: True)
-    other, _rig = scenes.make_arm(name="Other")
     scenes.add_sinew(obj, "dq")
     scenes.shapes(obj, [2, 3, 4])
     assert session.state_of(obj).dirtied_by_frames
+    return obj
+
+
+@pytest.mark.parametrize("what", ["rename", "delete", "add", "delete object", "throw"])
+def test_suspended_modifiers_come_back_whatever_a_neighbour_does(gated, neighbour, what):
+    other, _rig = scenes.make_arm(name="Other")
     suspended = []
 
     def interfere() -> None:
-        suspended.append(not obj.modifiers[-1].show_viewport)
+        suspended.append(not gated.modifiers[-1].show_viewport)
         if what == "rename":
-            obj.modifiers["Behind"].name = "Renamed"
+            gated.modifiers["Behind"].name = "Renamed"
         elif what == "delete":
-            obj.modifiers.remove(obj.modifiers["Behind"])
+            gated.modifiers.remove(gated.modifiers["Behind"])
         elif what == "add":
-            obj.modifiers.new("Added", "CAST").factor = 0.0
+            gated.modifiers.new("Added", "CAST").factor = 0.0
         elif what == "delete object":
             bpy.data.objects.remove(other)
         else:
             raise RuntimeError("a neighbour's own fault")
 
-    take_off = neighbour("frame_change_pre", interfere)
+    take_off = []
+    # Behind what Sinew puts behind all others.
+    take_off.append(
+        neighbour("frame_change_pre", lambda: take_off.append(neighbour("frame_change_pre", interfere)))
+    )
     bpy.context.scene.frame_set(5)
     assert suspended == [True]
+    for each in take_off:
+        each()
+    assert all(m.show_viewport and m.show_render for m in gated.modifiers if m.type == "CAST")
+    assert_equals_modifier(gated)
+
+
+@pytest.mark.parametrize("ahead", [False, True], ids=["behind", "ahead"])
+@pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
+def test_a_neighbour_toggles_modifiers_that_are_suspended_otherwise(gated, neighbour, event, ahead):
+    seen = []
+
+    def toggle() -> None:
+        seen.append(gated.modifiers["Behind"].show_viewport)
+        gated.modifiers["Behind"].show_viewport = not seen[-1]
+
+    take_off = neighbour(event, toggle)
+    functions = getattr(bpy.app.handlers, event)
+    if ahead:
+        functions.insert(0, functions.pop())
+    for frame in (5, 6, 7):
+        bpy.context.scene.frame_set(frame)
+    assert seen == [True, False, True]
+    assert gated.modifiers["Behind"].show_render
     take_off()
-    assert all(m.show_viewport and m.show_render for m in obj.modifiers if m.type == "CAST")
-    assert_equals_modifier(obj)
+    assert_equals_modifier(gated)
 
 
 def test_an_artists_driver_stays(arm):
