@@ -26,9 +26,6 @@ from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
 
-# Tools of this mode find the armature by a modifier that is on.
-MODES_FOR_WEIGHTS = {"WEIGHT_PAINT"}
-
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     """The armature that deforms a mesh object, by Sinew, by its first Armature modifier or as its parent."""
@@ -355,7 +352,7 @@ def _is_chained_to_parent(obj: bpy.types.Object) -> bool:
 def keeps_modifiers_on(obj: bpy.types.Object) -> bool:
     """Whether the Armature modifiers stay on in the viewport, in front of Sinew's: tools for weights look
     there for the bones that deform."""
-    return obj.mode in MODES_FOR_WEIGHTS and not stack.visibility_is_animated(obj)
+    return obj.mode == "WEIGHT_PAINT" and not stack.visibility_is_animated(obj)
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:

@@ -89,6 +89,10 @@ def plan(facts: ObjectFacts) -> Plan:
         return Plan(State.BUILT_IN, reason)
     if facts.mode in MODES_OF_THE_MODIFIER:
         return Plan(State.BUILT_IN, "In this mode the Armature modifier shows its own shape")
+    # Its tools look for bones behind an Armature modifier that is on: which is not Sinew's to decide here.
+    if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:
+        reason = "The visibility of its Armature modifier is animated: in this mode that shows its own shape"
+        return Plan(State.BUILT_IN, reason)
     if facts.builtin_is_faster:
         reason = "Small: the Armature modifier has the same shape in less time, and deforms it"
         return Plan(State.BUILT_IN, reason)

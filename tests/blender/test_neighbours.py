@@ -510,6 +510,29 @@ def test_tools_for_weights_see_the_bones_that_deform(arm):
     assert arm.modifiers["Armature"].show_render
 
 
+def test_tools_for_weights_see_them_where_visibility_is_animated(arm):
+    modifier = arm.modifiers["Armature"]
+    for frame, is_on in ((1, False), (4, True)):
+        modifier.show_viewport = is_on
+        modifier.keyframe_insert("show_viewport", frame=frame)
+    bpy.context.scene.frame_set(6)
+    mask = arm.vertex_groups.new(name="mask")
+    mask.add(range(252), 0.3, "REPLACE")
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    bpy.context.view_layer.update()
+    state = session.state_of(arm)
+    assert state.plan.state is State.BUILT_IN
+    assert "animated" in state.plan.reason
+    arm.vertex_groups.active_index = 0
+    bpy.ops.object.vertex_group_normalize_all(group_select_mode="BONE_DEFORM", lock_active=False)
+    assert {round(mask.weight(vertex), 6) for vertex in range(252)} == {0.3}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    assert session.state_of(arm).plan.state is State.AFTER_UPDATE
+    assert_equals_modifier(arm)
+
+
 @pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
 def test_modifiers_renamed_at_every_frame(arm, neighbour, event):
     def rename() -> None:

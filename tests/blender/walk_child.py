@@ -176,7 +176,7 @@ class Child:
             found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
         # Renders show what is hidden here, and other view layers.
         for obj in self.walker.objects("MESH"):
-            in_its_mode = obj.data.is_editmode or obj.mode == "SCULPT"
+            in_its_mode = obj.data.is_editmode or self.sides.shows_own_shape_in_its_mode(obj)
             if in_its_mode or (not self.side.is_sinew and self.is_unknown(obj)):
                 skipped.append(obj.name_full)
         return found, skipped

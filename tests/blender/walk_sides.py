@@ -17,11 +17,22 @@ METHODS = ("lbs", "dq", "qv")
 # Bits of the pass index. ADOPTED: what Sinew makes of it, and when, is its own choice, until it is put on.
 # CHANGED: other settings differ from before, as Blender's undo looks whether anything does.
 DRIVEN, ON, DQ, QV, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16, 32, 64
-OBJECT_MODES_OF_THE_MODIFIER = {"EDIT", "SCULPT"}
 
 
 def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
+
+
+def shows_own_shape_in_its_mode(obj: bpy.types.Object) -> bool:
+    """Whether Sinew leaves the mode that the object is in to the Armature modifiers."""
+    if obj.mode != "WEIGHT_PAINT":
+        return obj.mode in {"EDIT", "SCULPT"}
+    keyed = {curve.data_path for curve in curves_of(obj)}
+    return any(
+        f'modifiers["{modifier.name}"].show_{where}' in keyed
+        for modifier in armature_modifiers(obj)
+        for where in ("viewport", "render")
+    )
 
 
 def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
@@ -231,7 +242,7 @@ class BlenderSide:
             run = claim["run"] if claim is not None else []
             if self.is_on(obj) and self.is_method_keyed(obj):
                 continue
-            on = self.has_sinew(obj) and self.is_on(obj) and obj.mode not in OBJECT_MODES_OF_THE_MODIFIER
+            on = self.has_sinew(obj) and self.is_on(obj) and not shows_own_shape_in_its_mode(obj)
             for modifier in armature_modifiers(obj):
                 replaced = on and modifier.name in run
                 wanted = self.method(obj) == "dq" if replaced else modifier.show_expanded

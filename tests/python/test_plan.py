@@ -37,6 +37,7 @@ TABLE = [
     ({"has_upstream": True, "upstream_changes_weights": True}, State.AFTER_UPDATE, "change weights"),
     ({"has_heat_map": True}, State.AFTER_UPDATE, "heat map"),
     ({"visibility_is_keyed": True}, State.AFTER_UPDATE, "animated"),
+    ({"visibility_is_keyed": True, "mode": "WEIGHT_PAINT"}, State.BUILT_IN, "animated"),
     ({"views_differ": True}, State.AFTER_UPDATE, "alone"),
     ({"waits_for": "until found"}, State.WAITING, "until found"),
     ({"waits_for": "until found", "safe_mode": True}, State.WAITING, "until found"),
