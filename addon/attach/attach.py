@@ -60,7 +60,7 @@ def not_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def check_can_add(obj: bpy.types.Object) -> None:
-    """Raises SinewError that says why Sinew can not drive a mesh object, and what to do."""
+    """Raises SinewError that says why Sinew can not deform a mesh object, and what to do."""
     if armature_of(obj) is None:
         raise SinewError(f"{obj.name}: no Armature modifier with an armature; parent the mesh to one first")
     if not obj.is_editable:

@@ -135,7 +135,7 @@ METHOD_GROUPS = stage_settings.method_groups(_method_changed)
 
 
 class SinewSettings(bpy.types.PropertyGroup):
-    """How Sinew drives this object: in the place of the Armature modifiers of `stand_ins`. Without any, the
+    """How Sinew deforms this object: in the place of the Armature modifiers of `stand_ins`. Without any, the
     object has no Sinew."""
 
     method: bpy.props.EnumProperty(

@@ -87,7 +87,7 @@ def shown(meshes: list[bpy.types.Object]) -> Iterator[None]:
 
 
 def use_method(obj: bpy.types.Object, method: str) -> None:
-    """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not drive it."""
+    """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not deform it."""
     error = use_methods([(obj, method)])[0]
     if error is not None:
         raise error

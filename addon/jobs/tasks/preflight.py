@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a file needs Sinew, and what in it Sinew can not drive: for `sinew check`, ahead of a farm."""
+"""Whether a file needs Sinew, and what in it Sinew can not deform: for `sinew check`, ahead of a farm."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
 
 
 def _undrivable(objects: list[bpy.types.Object]) -> Iterator[str]:
-    """A sentence for each object with settings of Sinew that it can not drive. Each is evaluated, in its
+    """A sentence for each object with settings of Sinew that it can not deform. Each is evaluated, in its
     scene and shown: what is hidden is not, and would tell nothing."""
     left = []
     for obj in objects:
