@@ -269,6 +269,8 @@ void add_all() {
     add_kernels(sinew::Lbs::info, "kernel_lbs");
     add_kernels(sinew::Qv::info, "kernel_qv");
     add_kernels(sinew::Dq::info, "kernel_dq");
+    add_kernels(sinew::Log::info, "kernel_log");
+    add_kernels(sinew::Sbs::info, "kernel_sbs");
     add_blend<Glm4x4>("glm_4x4");
     add_blend<GlmPair>("glm_quat_vec");
     add_blend<GlmDualQuat>("glm_dual_quat");

@@ -200,6 +200,21 @@ def test_independent_of_coordinates_on_the_left(method, a, b, left, t):
     close(in_space(method, ends, t, left, RigidTransform.identity()), plain, 1e-12)
 
 
+@given(a=BELOW_180_DEGREES, b=BELOW_180_DEGREES, change=rigid_motions(), t=PARTS)
+def test_matrix_log_is_independent_of_a_change_of_coordinates(a, b, change, t):
+    ends = RigidTransform.concatenate([a, b])
+    plain = matrix(between(*layout(ends, "affine"), t, "matrix_log").transforms, "affine")
+    close(in_space("matrix_log", ends, t, change, change.inv()), plain, 1e-12)
+
+
+def test_matrix_log_depends_on_what_the_identity_is():
+    ends = RigidTransform.from_rotation(Rotation.from_euler("z", [0, 90], degrees=True))
+    plain = matrix(between(*layout(ends, "affine"), 0.25, "matrix_log").transforms, "affine")
+    left = RigidTransform.from_rotation(Rotation.from_euler("x", 90, degrees=True))
+    moved = in_space("matrix_log", ends, 0.25, left, RigidTransform.identity())
+    assert np.abs(moved - plain).max() > 0.05
+
+
 # Smith 2013, section 3.5.2: the translation of a pair interpolated after a change of the origin differs by
 # (1-t) q1 v q1* + t q2 v q2* - q(t) v q(t)*.
 @pytest.mark.parametrize("method", ["qv_nlerp", "qv_slerp"])

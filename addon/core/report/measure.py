@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import SinewError
 
 PROGRAMS = ("operation_counts", "timings_optimised", "timings_unoptimised")
@@ -23,13 +25,19 @@ OPERATIONS = {"3.4": 5 * 100_000, "3.5": 1_000_000, "3.9": 1_000_000, "3.10": 1_
 
 @dataclass(frozen=True)
 class Timing:
-    """Processor seconds for a whole loop: the median of all runs and the fastest.
+    """Processor seconds for a whole loop: the median of all runs, the fastest, the range of the middle half.
 
     A shortened loop's, as many times as it was shortened.
     """
 
     median: float
     fastest: float
+    spread: float
+
+    @classmethod
+    def of(cls, times: Sequence[float]) -> Timing:
+        low, high = np.quantile(times, (0.25, 0.75))
+        return cls(statistics.median(times), min(times), float(high - low))
 
 
 @dataclass(frozen=True)
@@ -108,9 +116,7 @@ def _timings(program: Path, repetitions: int, quick: bool, *options: str) -> tup
         if run["run_type"] == "iteration":
             name = "/".join(run["run_name"].split("/")[:2])
             runs.setdefault(name, []).append(run["cpu_time"] * 1e-9 * shorten)
-    return {name: Timing(statistics.median(times), min(times)) for name, times in runs.items()}, result[
-        "context"
-    ]
+    return {name: Timing.of(times) for name, times in runs.items()}, result["context"]
 
 
 def _output(command: Sequence[object]) -> str:

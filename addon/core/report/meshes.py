@@ -19,7 +19,8 @@ HIERARCHIES = {
     "qv_nlerp": ("3.7", "Quaternion-vector hierarchical interpolation"),
     "dlb": ("3.8", "Dual quaternion hierarchical interpolation"),
 }
-SKINS = ("lbs", "qv", "dq")
+# Those of the report's pictures (a) to (c), then those of its future work.
+SKINS = ("lbs", "qv", "dq", "log", "sbs")
 # Metres of a link of the tube.
 LINK = 0.25
 TITLES = {
@@ -204,9 +205,12 @@ def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         kept["lbs"] < 0.5 and min(kept["qv"], kept["dq"]) > 0.99,
         {f"radius, {method}": share for method, share in kept.items()},
     )
-    return Figure(
-        "3.11", TITLES["3.11"], tuple(pictures), (fact,), (_POSES + " The joint rotates by 170 degrees.",)
+    notes = (
+        _POSES + " The joint rotates by 170 degrees.",
+        f"Of its future work, log-matrix blending leaves {kept['log']:.1%} of the radius, spherical blend "
+        f"skinning {kept['sbs']:.1%}.",
     )
+    return Figure("3.11", TITLES["3.11"], tuple(pictures), (fact,), notes)
 
 
 def trimmed(pictures: list[Picture]) -> list[Picture]:

@@ -75,7 +75,6 @@ def to_html(page: Page) -> str:
     machine = "".join(
         f"<tr><td>{escape(key)}</td><td>{escape(value)}</td></tr>" for key, value in page.machine.items()
     )
-    agree, of = agreement(page)
     return "\n".join(
         [
             '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
@@ -84,8 +83,7 @@ def to_html(page: Page) -> str:
             f"<h1>{escape(TITLE)}</h1>",
             "<p>Tables 3.1 to 3.10 and Figures 3.4 to 3.11 of M. Smith, <i>Applications of Dual Quaternions "
             "in Three Dimensional Transformation and Interpolation</i> (University of Canterbury, 2013): "
-            f"what is printed there beside what Sinew gives here. Of {of} rows and statements, {agree} "
-            "agree; why the others do not stands beside them.</p>",
+            f"what is printed there beside what Sinew gives here. {escape(headline(page))}</p>",
             warning,
             '<h2>What it comes to</h2>\n<dl class="answers">',
             *(_answer(answer) for answer in page.answers),
@@ -98,6 +96,17 @@ def to_html(page: Page) -> str:
             "</body>\n</html>\n",
         ]
     )
+
+
+def headline(page: Page) -> str:
+    """What agrees, and what is not there to agree."""
+    agree, of = agreement(page)
+    missing = sum(table.missing is not None for table in page.tables)
+    missing += sum(figure.missing is not None for figure in page.figures)
+    text = f"Of {of} rows and statements here, {agree} agree; why the others do not stands beside them."
+    if missing:
+        text += f" {missing} of {len(page.tables) + len(page.figures)} tables and figures are missing: they say how to have them."
+    return text
 
 
 def agreement(page: Page) -> tuple[int, int]:

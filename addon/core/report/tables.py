@@ -170,7 +170,7 @@ _COUNTED = {
     },
     **{f"sinew_{name}": name for name in ("lbs", "qv", "dq")},
 }
-_TIME_COLUMNS = ("printed s", "ns each", "fastest ns", "operations", _UNOPTIMISED)
+_TIME_COLUMNS = ("printed s", "ns each", "spread ns", "fastest ns", "operations", _UNOPTIMISED)
 
 
 def _time_table(
@@ -190,7 +190,8 @@ def _time_table(
     """
     tolerance = (
         "Ratios to the report's matrices, 4x4 with all sixteen numbers; one agrees within "
-        f"{RATIO_TOLERANCE:.0%} of the printed one. Without optimisation the ratios are to GLM's 4x4."
+        f"{RATIO_TOLERANCE:.0%} of the printed one. Without optimisation the ratios are to GLM's 4x4. The "
+        "spread is the range of the middle half of the runs."
     )
     if measurements is None:
         return Table(number, title, ("ratio",), tolerance, 2, missing=HOW_TO_MEASURE)
@@ -222,6 +223,7 @@ def _time_table(
         more: dict[str, float | str] = {
             "printed s": seconds.get(key, ""),
             "ns each": ours.median / each * 1e9,
+            "spread ns": ours.spread / each * 1e9,
             "fastest ns": ours.fastest / each * 1e9,
             "operations": counts[_COUNTED[key]]["total"] if _COUNTED.get(key) in counts else "",
             _UNOPTIMISED: "" if slow is None else slow.median / glm_base.median,
@@ -335,6 +337,8 @@ def skinning_times(measurements: Measurements | None) -> Table:
             "kernel_lbs": "Matrix linear blending, Sinew's kernel",
             "kernel_qv": "Direct quaternion blending, Sinew's kernel",
             "kernel_dq": "Dual quaternion linear blending, Sinew's kernel",
+            "kernel_log": "Log-matrix blending, Sinew's kernel",
+            "kernel_sbs": "Spherical blend skinning, Sinew's kernel",
             "glm_4x4": "Matrix linear blending 4x4, GLM",
             "glm_quat_vec": "Direct quaternion blending, GLM",
             "glm_dual_quat": "Dual quaternion linear blending, GLM",

@@ -136,9 +136,10 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
         evaluate.set_frame(scene, frame)
         view = whole_view([seen_extent(shape) for shape in of_methods.values()])
         pictures[frame] = []
-        for letter, method in zip("abc", meshes.SKINS, strict=True):
+        for number, method in enumerate(meshes.SKINS):
             evaluate.use_method(mesh, method)
-            pictures[frame].append(Picture(f"({letter}) {labels[method]}", _draw(studio, view, scratch)))
+            letter = f"({'abc'[number]}) " if number < 3 else ""
+            pictures[frame].append(Picture(letter + labels[method], _draw(studio, view, scratch)))
         pictures[frame] = meshes.trimmed(pictures[frame])
     evaluate.set_frame(scene, scene.frame_start)
     view = whole_view([seen_extent(rest)])

@@ -12,7 +12,9 @@ sclerp, dib    dual_quat  ScLERP: the screw at constant      DIB (Kavan et al. 2
                           pace (section 3.4)
 
 Quaternions are first brought to one side, of the first of two or of the heaviest of many: the shorter way.
-Only dlb, sclerp and dib do not depend on where the origin is.
+A transform composed to all of them goes through matrix_linear, dlb, sclerp and dib from either side: they do
+not depend on where the origin is. qv_nlerp, qv_slerp and matrix_polar let it through from the left alone, and
+depend on the origin. matrix_log lets a change of coordinates through, x a x^-1, and nothing else.
 
 Each result says whether it is defined. Not defined, and then:
   rotations half a turn from the first or the heaviest (qv_*, dlb, sclerp, dib): the signs as given decide;

@@ -8,9 +8,11 @@
 
 namespace sinew {
 
-/// Exponential of the weighted sum of logarithms in se(3) (Alexa 2002; Smith 2013, sections 2.2.2 and
-/// 2.3.1). Rigid; not the shortest path, as every logarithm is taken from the identity: the result depends
-/// on the orientation of the axes, and constant pace holds only from or to the identity.
+/// Exponential of the weighted sum of logarithms in se(3) (Alexa 2002; Smith 2013, sections 2.3.1 and
+/// 3.5.2). Rigid; not the shortest path, as every logarithm is taken from the identity. Does not depend on
+/// the origin or the axes, x a x^-1 and x b x^-1 give x times the result times x^-1; but x a and x b give
+/// another path than x times the result. Constant pace, which section 2.2.2 promises, holds only where both
+/// turn about one screw axis, as from or to the identity.
 ///
 /// Not defined where a matrix is 180 degrees from the identity to within rounding: the axis of its
 /// logarithm then has the sign that makes to_quat() of it.

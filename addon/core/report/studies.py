@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the report concludes from one chain, over many random ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from typing import Any
+
+import numpy as np
+import sinew
+
+LAYOUTS: dict[str, Any] = {
+    "affine": sinew.affine,
+    "quat_vec": sinew.quat_vec,
+    "dual_quat": sinew.dual_quat,
+}
+CHAINS = 2000
+LENGTHS = (4, 16, 64, 256)
+# Where nlerp and slerp are farthest apart, and near it; from half way on it is the same mirrored.
+TIMES = (0.1, 0.2, 0.3)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of one number for each chain: root mean square, and what 5 and 95 of 100 chains are below."""
+
+    rms: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> Spread:
+        low, high = np.quantile(values, (0.05, 0.95))
+        return cls(float(np.sqrt(np.mean(np.square(values)))), float(low), float(high))
+
+
+def _random_axes(random: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+    axes = random.normal(size=(*shape, 3))
+    return axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+
+
+def _links(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """float64 [chains, length, 7]: pairs that go on by 1 after they rotate."""
+    pairs = sinew.quat_vec.from_axis_angle(axes, angles)
+    pairs[..., 4] = 1.0
+    return pairs
+
+
+def accuracy(length: int, chains: int = CHAINS) -> dict[str, Spread]:
+    """By representation: how far the end of a chain, combined in float32, is from where float64 has it, as a
+    part of the chain's length."""
+    random, shape = np.random.default_rng(length), (chains, length)
+    pairs = _links(_random_axes(random, shape), random.uniform(-np.pi, np.pi, shape))
+    exact = _end(sinew.quat_vec, pairs)
+    found = {}
+    for name, module in LAYOUTS.items():
+        # Each from the same pairs, rounded to float32.
+        single = pairs.astype(np.float32)
+        links = single if name == "quat_vec" else getattr(sinew.quat_vec, f"to_{name}")(single)
+        distance = np.linalg.norm(_end(module, links).astype(np.float64) - exact, axis=-1)
+        found[name] = Spread.of(distance / length)
+    return found
+
+
+def _end(module: Any, links: np.ndarray) -> np.ndarray:
+    """[chains, 3]: where the origin of the last link is."""
+    whole = links[:, 0]
+    for link in range(1, links.shape[1]):
+        whole = module.compose(whole, links[:, link])
+    return module.transform_point(whole, np.zeros(3, links.dtype))
+
+
+def drift(length: int, chains: int = CHAINS, most: float = np.pi / 4) -> Spread:
+    """How far apart DLB and ScLERP have the tip of a chain, at most over TIMES, as a part of its length. Each
+    joint rotates about an axis of its own from one angle to another, both up to `most` radians."""
+    random, shape = np.random.default_rng(length), (chains, length)
+    axes = _random_axes(random, shape)
+    first, second = (
+        sinew.quat_vec.to_dual_quat(_links(axes, random.uniform(-most, most, shape))) for _key in range(2)
+    )
+    worst = np.zeros(chains)
+    for t in TIMES:
+        tips = [
+            _end(sinew.dual_quat, sinew.interpolate.between(first, second, t, method).transforms)
+            for method in ("dlb", "sclerp")
+        ]
+        worst = np.maximum(worst, np.linalg.norm(tips[0] - tips[1], axis=-1))
+    return Spread.of(worst / length)
