@@ -208,7 +208,7 @@ def test_matrix_log_is_independent_of_a_change_of_coordinates(a, b, change, t):
 
 
 def test_matrix_log_depends_on_what_the_identity_is():
-    ends = RigidTransform.from_rotation(Rotation.from_euler("z", [0, 90], degrees=True))
+    ends = RigidTransform.from_rotation(Rotation.from_euler("z", [[0], [90]], degrees=True))
     plain = matrix(between(*layout(ends, "affine"), 0.25, "matrix_log").transforms, "affine")
     left = RigidTransform.from_rotation(Rotation.from_euler("x", 90, degrees=True))
     moved = in_space("matrix_log", ends, 0.25, left, RigidTransform.identity())

@@ -137,7 +137,7 @@ def test_what_does_not_agree_says_why(made):
 
 
 def test_what_is_missing_says_how_to_get_it(made):
-    _html, content, said = made
+    html, content, said = made
     missing = {f"Table {number}" for number, table in content["tables"].items() if table["missing"]}
     missing |= {f"Figure {number}" for number, figure in content["figures"].items() if figure["missing"]}
     measured = set() if PROGRAMS else {f"Table {number}" for number in MEASURED}
@@ -145,6 +145,7 @@ def test_what_is_missing_says_how_to_get_it(made):
     for name in missing:
         assert f"{name}: Not " in said
         assert "./dev report" in said
+    assert f"{len(missing)} of {len(TABLES) + len(FIGURES)} tables and figures are missing" in html
 
 
 def test_quick_mode_warns(made):

@@ -105,7 +105,8 @@ def headline(page: Page) -> str:
     missing += sum(figure.missing is not None for figure in page.figures)
     text = f"Of {of} rows and statements here, {agree} agree; why the others do not stands beside them."
     if missing:
-        text += f" {missing} of {len(page.tables) + len(page.figures)} tables and figures are missing: they say how to have them."
+        of_parts = len(page.tables) + len(page.figures)
+        text += f" {missing} of {of_parts} tables and figures are missing: they say how to have them."
     return text
 
 
