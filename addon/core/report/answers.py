@@ -25,7 +25,7 @@ def answers(measurements: Measurements | None, figures: tuple[Figure, ...]) -> t
         _slower_methods(measurements, figures),
         _chains(),
         Answer(
-            "Future work: inverse kinematics, blending of motions, rigid bodies",
+            "Future work: inverse kinematics, blending of motions (chapter 4), rigid bodies (chapter 5)",
             "This page has no experiments on them.",
         ),
     )
