@@ -18,7 +18,7 @@ _last: dict[int, tuple] = {}
 
 def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
     """Colours those of the objects with a heat map that are in the scene that was evaluated, if anything
-    changed."""
+    changed. One that its Armature modifier deforms has no point buffer, and shows no colours."""
     if not heated:
         if _last:
             live.forget()
@@ -26,7 +26,11 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
         heat_legend.contents.clear()
         return
     scene = depsgraph.scene.session_uid
-    shown = [(obj, skinned) for obj, skinned in heated if obj.evaluated_get(depsgraph).is_evaluated]
+    shown = [
+        (obj, skinned)
+        for obj, skinned in heated
+        if obj.evaluated_get(depsgraph).is_evaluated and properties.of(obj).point_buffer is not None
+    ]
     if not shown:
         _last.pop(scene, None)
         heat_legend.contents.pop(scene, None)
