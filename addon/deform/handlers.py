@@ -60,7 +60,8 @@ def close_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None
     with reaction() as may_react, contextlib.suppress(ReferenceError):
         for obj in current.objects or () if may_react and not current.is_saving else ():
             state = session.state_of(obj)
-            if state is not None and state.dirtied_by_frames:
+            # What its Armature modifiers deform is not evaluated again for Sinew.
+            if state is not None and state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
                 current.gate.suspend(obj, current.is_rendering)
 
 

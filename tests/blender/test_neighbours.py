@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from conftest import KeepingEngine
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
@@ -404,6 +405,29 @@ def test_a_neighbour_toggles_modifiers_that_are_suspended_otherwise(gated, neigh
     assert gated.modifiers["Behind"].show_render
     take_off()
     assert_equals_modifier(gated)
+
+
+def test_a_mesh_that_is_off_is_rendered_as_it_is(arm, rendered_points, tmp_path):
+    """Its Armature modifier is none that Sinew may suspend: in a render that would be as at another frame."""
+    other, _rig = scenes.make_arm(name="Other")
+    scenes.add_sinew(other, "dq")
+    rendered_points(arm)
+    arm.shape_key_add(name="Basis")
+    key = arm.shape_key_add(name="key 1")
+    for point in key.data[:20]:
+        point.co.z += 0.3
+    for frame, value in ((1, 0.0), (10, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    scenes.shapes(arm, [3, 4])
+    properties.of(arm).enabled = False
+    scene = bpy.context.scene
+    scene.render.filepath = str(tmp_path / "frame")
+    scene.frame_start, scene.frame_end = 5, 6
+    bpy.ops.render.render(animation=True)
+    got = KeepingEngine.shapes[arm.name]
+    scene.frame_set(6)
+    assert scenes.worst(got, scenes.final_points(arm)) <= 1e-6
 
 
 def test_an_artists_driver_stays(arm):
