@@ -51,9 +51,11 @@ class Child:
         import bpy
         import numpy as np
         import walk_operations
+        import walk_shapes
         import walk_sides
 
         self.bpy, self.np, self.operations, self.sides = bpy, np, walk_operations, walk_sides
+        self.shapes_of = walk_shapes
         self.errors = errors
         self.read_to = 0
         self.side = walk_sides.SinewSide() if role == "sinew" else walk_sides.BlenderSide()
@@ -157,6 +159,18 @@ class Child:
             self.side.records.unanswered = 0
         else:
             found["wrong"] = self.wrong
+            found["expected"] = self.all_expected()
+        return found
+
+    def all_expected(self) -> dict:
+        """Points of objects that are shown, and whose shape is none of Blender's own."""
+        found = {}
+        for obj in self.bpy.context.view_layer.objects:
+            if obj.type == "MESH" and obj.visible_get() and self.side.has_other_shape(obj):
+                points = self.expected(obj)
+                if points is not None:
+                    found[obj.name_full] = points
+        self.bpy.context.view_layer.update()
         return found
 
     def points_of(self, evaluated):
@@ -202,7 +216,25 @@ class Child:
                 return True
         if not side.is_on(obj):
             return False
-        return side.method(obj) == "qv" or self.has_other_scale(obj)
+        return side.has_other_shape(obj) or self.has_other_scale(obj)
+
+    def expected(self, obj, method: str | None = None):
+        """The points of an object whose shape is none of Blender's own; None where nobody knows them.
+
+        method  as a copy of a comparison has it; None: its own
+        """
+        side, claim = self.side, self.claims.get(obj.name_full)
+        if obj.library is not None or side.is_method_keyed(obj) or self.has_other_scale(obj):
+            return None
+        if claim is None or not side.is_on(obj) or obj.data.is_editmode:
+            return None
+        keys = obj.data.shape_keys
+        names = (method or claim["method"], claim["stages"].get("mix", {}).get("method"))
+        if "sdef" in names and keys is not None and "mmd_sdef_c" in keys.key_blocks:
+            return None
+        return self.shapes_of.expected(
+            obj, claim["run"], method or claim["method"], claim["stages"], claim["parameters"]
+        )
 
     def has_other_scale(self, obj) -> bool:
         """Whether Sinew makes something else of scaled bones than the modifier does."""
@@ -233,7 +265,8 @@ class Child:
             if (
                 any(".show_" in path for path in animated)
                 or len(modifiers) != 1
-                or method == "qv"
+                or method not in ("blender", *self.sides.OF_BLENDER)
+                or (method != "blender" and self.side.stages(obj))
                 or (method != "blender" and self.has_other_scale(obj))
                 or obj.data.is_editmode
                 or not obj.visible_get()
