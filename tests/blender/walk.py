@@ -395,9 +395,12 @@ def compare_shapes(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped:
 
 def compare_renders(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str]) -> Fault | None:
     for name, points in ours.get("rendered", {}).items():
-        if name.partition(" in the render")[0] in skipped:
-            continue
         other = theirs["rendered"].get(name)
+        if name.partition(" in the render")[0] in skipped:
+            other = theirs["rendered by library"].get(name)
+            if other is None:
+                continue
+            outcome.by_library += 1
         if other is None:
             return Fault("render", f"{name} only with Sinew", at)
         fault = differ(outcome, at, name, points, other)

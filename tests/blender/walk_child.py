@@ -40,6 +40,7 @@ def make_engine(walker, points_of) -> type:
                 if obj.type == "MESH" and not walker.side.may_react(obj.original):
                     name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
                     walker.rendered[name] = points_of(obj)
+                    walker.expect_rendered(name, obj.original, depsgraph)
             result = self.begin_result(0, 0, 4, 4)
             self.end_result(result)
 
@@ -62,6 +63,7 @@ class Child:
         self.side.prepare(safe=route == "safe")
         self.walker = walk_operations.Walker(self.side, folder)
         self.walker.before_evaluation = self.before_evaluation
+        self.walker.expect_rendered = self.expect_rendered
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
         self.wrong: list[str] = []
@@ -72,6 +74,7 @@ class Child:
     def start(self, _request: dict) -> dict:
         self.claims, self.wrong = {}, []
         self.side.set_safe(False)
+        self.side.compute_beside(False)
         self.operations.start(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
         # Those of a file that a walk before has left broken.
@@ -88,7 +91,7 @@ class Child:
             self.side.adopt(self.claims)
         numbers = random.Random(seed)
         operation = self.operations.OPERATIONS[name]
-        self.walker.rendered = {}
+        self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome, said = "done", None
         try:
             said = operation.act(self.walker, numbers)
@@ -107,6 +110,7 @@ class Child:
             self.wrong = []
         result = {"outcome": outcome, "said": said, **self.look(request["check"])}
         result["rendered"] = self.walker.rendered
+        result["rendered by library"] = self.walker.rendered_by_library
         if self.side.is_sinew and name == "remove_all" and not result["claims"]:
             result["left over"] = self.side.left_over()
         result["problems"] = self.problems()
@@ -149,6 +153,9 @@ class Child:
         if not self.side.is_sinew:
             self.wrong += self.side.bring_in_line(self.claims)
         self.bpy.context.view_layer.update()
+        if self.side.is_sinew:
+            self.side.wait()
+            self.bpy.context.view_layer.update()
         depsgraph = self.bpy.context.evaluated_depsgraph_get()
         found["shapes"], found["skipped"] = self.shapes(depsgraph)
         found["state"] = self.state()
@@ -218,22 +225,25 @@ class Child:
             return False
         return side.has_other_shape(obj) or self.has_other_scale(obj)
 
-    def expected(self, obj, method: str | None = None):
-        """The points of an object whose shape is none of Blender's own; None where nobody knows them.
+    def expect_rendered(self, name: str, obj, depsgraph) -> None:
+        if not self.side.is_sinew and self.side.has_other_shape(obj):
+            points = self.expected(obj, depsgraph)
+            if points is not None:
+                self.walker.rendered_by_library[name] = points
 
-        method  as a copy of a comparison has it; None: its own
-        """
+    def expected(self, obj, render=None):
+        """The points of an object whose shape is none of Blender's own; None where nobody knows them."""
         side, claim = self.side, self.claims.get(obj.name_full)
         if obj.library is not None or side.is_method_keyed(obj) or self.has_other_scale(obj):
             return None
         if claim is None or not side.is_on(obj) or obj.data.is_editmode:
             return None
         keys = obj.data.shape_keys
-        names = (method or claim["method"], claim["stages"].get("mix", {}).get("method"))
+        names = (claim["method"], claim["stages"].get("mix", {}).get("method"))
         if "sdef" in names and keys is not None and "mmd_sdef_c" in keys.key_blocks:
             return None
         return self.shapes_of.expected(
-            obj, claim["run"], method or claim["method"], claim["stages"], claim["parameters"]
+            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render
         )
 
     def has_other_scale(self, obj) -> bool:

@@ -62,6 +62,11 @@ class Walker:
         self.folder = folder
         self.number = 0
         self.rendered: dict[str, np.ndarray] = {}
+        # What renders should be given of shapes that are none of Blender's own, where that is known.
+        self.rendered_by_library: dict[str, np.ndarray] = {}
+        self.expect_rendered: Callable[[str, bpy.types.Object, bpy.types.Depsgraph], None] = (
+            lambda *_arguments: None
+        )
         self.chosen = ""
         self.compared = False
         # Changed since the last step of undo: Blender's own operations always push one.
@@ -297,6 +302,11 @@ def make_library(walker: Walker) -> None:
 # --- Sinew
 
 
+def _method(r: random.Random) -> str:
+    """Half of the time one whose shape Blender itself makes."""
+    return r.choice(OF_BLENDER if r.random() < 0.5 else METHODS[len(OF_BLENDER) :])
+
+
 @operation(6)
 def add(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(
@@ -309,7 +319,7 @@ def add(w: Walker, r: random.Random) -> str | None:
     )
     if obj is None:
         return None
-    method, leave = r.choice((None, *OF_BLENDER)), r.random() < 0.15
+    method, leave = r.choice((None, _method(r))), r.random() < 0.15
     w.object_mode()
     flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
     if len(flags) > 1 and method is None:
@@ -342,11 +352,6 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
     return "Sinew off all"
 
 
-def _method(r: random.Random) -> str:
-    """Half of the time one whose shape Blender itself makes."""
-    return r.choice(OF_BLENDER if r.random() < 0.5 else METHODS[len(OF_BLENDER) :])
-
-
 @operation(6)
 def method(w: Walker, r: random.Random) -> str | None:
     obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), _method(r)
@@ -356,7 +361,7 @@ def method(w: Walker, r: random.Random) -> str | None:
     return f"{obj.name} by {name}"
 
 
-@operation(3)
+@operation(5)
 def stages(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, w.side.has_sinew)
     # Without them the shape is Blender's.
@@ -378,6 +383,13 @@ def parameters(w: Walker, r: random.Random) -> str | None:
     else:
         w.side.set_option(obj, "sdef.interpolation", value)
     return f"{obj.name}: sdef by {value}"
+
+
+@operation(0.5)
+def compute_beside(w: Walker, r: random.Random) -> str | None:
+    on = r.random() < 0.6
+    w.side.compute_beside(on)
+    return f"what methods need is computed {'on a thread' if on else 'at once'}"
 
 
 @operation(0.5)

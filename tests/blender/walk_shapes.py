@@ -7,13 +7,15 @@ It knows no modifiers behind, envelopes, bendy bones and keyed visibility.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
 import sinew
+import walk_sides
 
 # What the Armature modifier takes for no weight at all.
 LEAST_WEIGHT = 1e-4
@@ -41,6 +43,20 @@ class _Armature:
     ends: tuple[np.ndarray, np.ndarray]
     bones_from_model: np.ndarray
     mask: np.ndarray | None
+    multi: bool
+
+
+@dataclass
+class _Read:
+    """rest  float32 [vertices, 3], what comes to the first Armature modifier; own: the mesh's own, None where
+    modifiers in front give it other vertices."""
+
+    rest: np.ndarray
+    own: np.ndarray | None
+    triangles: np.ndarray
+    topology: tuple[np.ndarray, np.ndarray, np.ndarray]
+    groups: dict[str, dict[int, float]]
+    armatures: list[_Armature]
 
 
 def expected(
@@ -49,62 +65,68 @@ def expected(
     method: str,
     stages: Mapping[str, Mapping[str, Any]],
     parameters: Mapping[str, Any],
+    render: bpy.types.Depsgraph | None = None,
 ) -> np.ndarray | None:
     """float32 [vertices, 3], object space; None where this file does not know it.
 
     run         names of the Armature modifiers that Sinew replaces
     stages      the parameters of those that are on
     parameters  of methods, by their full names
+    render      the evaluation for a render; None: that of the viewport
     """
     modifiers = list(obj.modifiers)
     places = [index for index, modifier in enumerate(modifiers) if modifier.name in run]
-    if not places or not _is_known(obj, modifiers, places):
+    shown = "show_viewport" if render is None else "show_render"
+    if not places or not _is_known(obj, modifiers, places, shown):
         return None
-    replaced = [modifiers[place] for place in places]
-    active = [m for m in replaced if m.show_viewport and m.object is not None]
-    in_front = [m for m in modifiers[: places[0]] if m.show_viewport]
-    for modifier in active:
-        modifier.show_viewport = False
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    mesh = obj.evaluated_get(depsgraph).data
-    rest = _points(mesh)
-    is_same_count = len(mesh.vertices) == len(obj.data.vertices)
-    own = _points(obj.data) if is_same_count else rest
-    topology = _topology(mesh)
-    groups = _groups(mesh, obj)
-    armatures = [_read(obj, modifier, groups, depsgraph) for modifier in active]
-    surface = (own, _triangles(obj.data if is_same_count else mesh))
-    flags = [modifier.use_multi_modifier for modifier in active]
-    for modifier in active:
-        modifier.show_viewport = True
+    active = [modifiers[place] for place in places]
+    active = [m for m in active if getattr(m, shown) and m.object is not None]
+    is_moved = any(getattr(m, shown) for m in modifiers[: places[0]])
+    if render is not None:
+        if is_moved or obj.data.shape_keys is not None:
+            # A render can not be had without what deforms.
+            return None
+        read = _read(obj, obj.data, active, render)
+    else:
+        with _off(active):
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            read = _read(obj, obj.evaluated_get(depsgraph).data, active, depsgraph)
     if not active:
-        return rest
-    if in_front and not is_same_count and "cor" in (method, stages.get("mix", {}).get("method")):
+        return read.rest
+    if read.own is None and "cor" in (method, stages.get("mix", {}).get("method")):
         # The centres are of the mesh as it came first.
         return None
-    points = start_before = rest
-    for armature, multi in zip(armatures, flags, strict=True):
-        start = start_before if multi else points
+    points = start_before = read.rest
+    for armature in read.armatures:
+        start = start_before if armature.multi else points
         start_before = start
-        blended = _blend(armature, start, surface, method, _mix(stages, groups), parameters)
+        blended = _blend(armature, start, read, method, _mix(stages, read.groups), parameters)
         share = 1.0 if armature.mask is None else armature.mask[:, None]
         points = (points + share * (blended - points)).astype(np.float32)
-    points = _limit(armatures[0], points, rest, stages.get("bulge_limit"), groups)
-    return _mush(own, topology, points, stages.get("delta_mush"), groups)
+    points = _limit(read, points, stages.get("bulge_limit"))
+    return _mush(read, points, stages.get("delta_mush"))
 
 
-def _is_known(obj: bpy.types.Object, modifiers: list[bpy.types.Modifier], places: list[int]) -> bool:
-    curves = obj.animation_data is not None and obj.animation_data.action is not None
+@contextlib.contextmanager
+def _off(modifiers: list[bpy.types.Modifier]) -> Iterator[None]:
+    for modifier in modifiers:
+        modifier.show_viewport = False
+    yield
+    for modifier in modifiers:
+        modifier.show_viewport = True
+
+
+def _is_known(
+    obj: bpy.types.Object, modifiers: list[bpy.types.Modifier], places: list[int], shown: str
+) -> bool:
     replaced = [modifiers[place] for place in places]
     return (
         obj.mode == "OBJECT"
-        and not curves
-        and obj.override_library is None
+        and not any(".show_" in curve.data_path for curve in walk_sides.curves_of(obj))
         and obj.parent_type != "ARMATURE"
-        and all(not m.show_viewport for m in modifiers[places[-1] + 1 :])
+        and all(not getattr(m, shown) for m in modifiers[places[-1] + 1 :])
         and places == list(range(places[0], places[-1] + 1))
         and not any(m.use_bone_envelopes or not m.use_vertex_groups for m in replaced)
-        and not replaced[0].use_multi_modifier
         and all(_is_plain(modifier.object) for modifier in replaced if modifier.object is not None)
     )
 
@@ -161,40 +183,62 @@ def _weights_of(groups: dict[str, dict[int, float]], name: str, count: int) -> n
 
 def _read(
     obj: bpy.types.Object,
+    mesh: bpy.types.Mesh,
+    modifiers: list[bpy.types.ArmatureModifier],
+    depsgraph: bpy.types.Depsgraph,
+) -> _Read:
+    groups = _groups(mesh, obj)
+    return _Read(
+        _points(mesh),
+        _points(obj.data) if len(mesh.vertices) == len(obj.data.vertices) else None,
+        _triangles(obj.data),
+        _topology(mesh),
+        groups,
+        [_read_armature(obj, mesh, modifier, groups, depsgraph) for modifier in modifiers],
+    )
+
+
+def _read_armature(
+    obj: bpy.types.Object,
+    mesh: bpy.types.Mesh,
     modifier: bpy.types.ArmatureModifier,
     groups: dict[str, dict[int, float]],
     depsgraph: bpy.types.Depsgraph,
 ) -> _Armature:
     rig = modifier.object.evaluated_get(depsgraph)
-    mesh = obj.evaluated_get(depsgraph)
     bones = modifier.object.data.bones
-    number = {bone.name: index for index, bone in enumerate(bones) if bone.use_deform}
-    names = [group.name for group in obj.vertex_groups]
-    offsets, of, weights = [0], [], []
-    for vertex in mesh.data.vertices:
-        own = [(e.group, e.weight) for e in vertex.groups if e.group < len(names)]
-        own = [(number[names[g]], weight) for g, weight in own if names[g] in number and weight > 0.0]
-        if sum(weight for _bone, weight in own) > LEAST_WEIGHT:
-            of += [bone for bone, _weight in own]
-            weights += [weight for _bone, weight in own]
-        offsets.append(len(of))
-    count = len(mesh.data.vertices)
-    mask = _weights_of(groups, modifier.vertex_group, count) if modifier.vertex_group else None
+    count = len(mesh.vertices)
+    mask = _weights_of(groups, modifier.vertex_group, count)
     if mask is not None and modifier.invert_vertex_group:
         mask = 1.0 - mask
     posed = np.array([np.array(rig.pose.bones[bone.name].matrix) for bone in bones]).reshape(-1, 4, 4)
     rest = np.array([np.array(bone.matrix_local) for bone in bones]).reshape(-1, 4, 4)
+    place = np.array(obj.evaluated_get(depsgraph).matrix_world)
     return _Armature(
-        _Influences(np.array(offsets), np.array(of, dtype=np.int32), np.array(weights, dtype=np.float32)),
+        _influences(mesh, [group.name for group in obj.vertex_groups], bones),
         posed.astype(np.float64) @ np.linalg.inv(rest.astype(np.float64)),
         rest,
         (
             np.array([bone.head_local[:] for bone in bones], dtype=np.float32).reshape(-1, 3),
             np.array([bone.tail_local[:] for bone in bones], dtype=np.float32).reshape(-1, 3),
         ),
-        np.linalg.inv(np.array(rig.matrix_world, dtype=np.float64)) @ np.array(mesh.matrix_world),
+        np.linalg.inv(np.array(rig.matrix_world, dtype=np.float64)) @ place,
         mask,
+        modifier.use_multi_modifier,
     )
+
+
+def _influences(mesh: bpy.types.Mesh, names: list[str], bones: bpy.types.bpy_prop_collection) -> _Influences:
+    number = {bone.name: index for index, bone in enumerate(bones) if bone.use_deform}
+    offsets, of, weights = [0], [], []
+    for vertex in mesh.vertices:
+        own = [(e.group, e.weight) for e in vertex.groups if e.group < len(names)]
+        own = [(number[names[g]], weight) for g, weight in own if names[g] in number and weight > 0.0]
+        if sum(weight for _bone, weight in own) > LEAST_WEIGHT:
+            of += [bone for bone, _weight in own]
+            weights += [weight for _bone, weight in own]
+        offsets.append(len(of))
+    return _Influences(np.array(offsets), np.array(of, dtype=np.int32), np.array(weights, dtype=np.float32))
 
 
 def _mix(
@@ -210,19 +254,18 @@ def _mix(
 def _blend(
     armature: _Armature,
     points: np.ndarray,
-    surface: tuple[np.ndarray, np.ndarray],
+    read: _Read,
     method: str,
     mix: tuple[str, dict[int, float]] | None,
     parameters: Mapping[str, Any],
 ) -> np.ndarray:
     own = armature.influences
     influences = (own.offsets, own.bones, own.weights)
-    own_points, triangles = surface
     shapes = []
     for name in (method,) if mix is None else (method, mix[0]):
         data = {}
         if name == "cor":
-            data[name] = sinew.centres_of_rotation(own_points, *influences, triangles)
+            data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles)
         binding = sinew.Binding(points, *influences, rest_bones=armature.rest, vertex_data=data)
         shapes.append(
             sinew.Deformer(binding, name).deform(
@@ -238,45 +281,37 @@ def _blend(
     return shapes[0] + np.clip(share, 0.0, 1.0) * (shapes[1].astype(np.float64) - shapes[0])
 
 
-def _limit(
-    armature: _Armature,
-    points: np.ndarray,
-    rest: np.ndarray,
-    options: Mapping[str, Any] | None,
-    groups: dict[str, dict[int, float]],
-) -> np.ndarray:
+def _limit(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) -> np.ndarray:
+    """By the first armature."""
     if options is None:
         return points
-    mask = _weights_of(groups, options["group"], len(points))
+    armature = read.armatures[0]
+    mask = _weights_of(read.groups, options["group"], len(points))
     if armature.mask is not None:
         whole = (armature.mask >= 1.0).astype(np.float32)
         mask = whole if mask is None else whole * mask
-    own, space = armature.influences, armature.bones_from_model
+    own = armature.influences
     stage = sinew.BulgeLimit(
-        rest,
+        read.rest,
         own.offsets,
         own.bones,
         own.weights,
         *armature.ends,
-        bones_from_model=space,
+        bones_from_model=armature.bones_from_model,
         weights=mask,
     )
     return stage.apply(points, armature.motions, strength=options["strength"], form=options["form"])
 
 
-def _mush(
-    rest: np.ndarray,
-    topology: tuple[np.ndarray, np.ndarray, np.ndarray],
-    points: np.ndarray,
-    options: Mapping[str, Any] | None,
-    groups: dict[str, dict[int, float]],
-) -> np.ndarray:
+def _mush(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) -> np.ndarray:
     if options is None:
         return points
-    weights = _weights_of(groups, options["group"], len(points))
+    weights = _weights_of(read.groups, options["group"], len(points))
     if weights is not None and options["invert_group"]:
         weights = 1.0 - weights
     bound = {
         name: options[name] for name in ("iterations", "radius", "factor", "smooth_type", "pin_boundary")
     }
-    return sinew.DeltaMush(rest, *topology, weights=weights, **bound).apply(points, scale=options["scale"])
+    rest = read.rest if read.own is None else read.own
+    stage = sinew.DeltaMush(rest, *read.topology, weights=weights, **bound)
+    return stage.apply(points, scale=options["scale"])

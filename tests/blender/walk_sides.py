@@ -10,6 +10,7 @@ method makes of it for now.
 from __future__ import annotations
 
 import logging
+import time
 
 import bpy
 import sinew
@@ -221,6 +222,9 @@ class BlenderSide:
     def set_safe(self, on: bool) -> None:
         pass
 
+    def compute_beside(self, on: bool) -> None:
+        pass
+
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         self._set(obj, KEYED, True)
         if self.method(obj) not in OF_BLENDER:
@@ -315,7 +319,7 @@ class BlenderSide:
             self._set(obj, ON, claim is not None and claim["on"])
             if claim is not None:
                 self.set_method(obj, claim["method"])
-                self.set_stages(obj, number_of(claim["stages"]))
+            self.set_stages(obj, 0 if claim is None else number_of(claim["stages"]))
             return []
         if self.has_sinew(obj) != (claim is not None):
             return [f"{obj.name_full} is{'' if claim else ' not'} Sinew's, against the walk's list"]
@@ -366,8 +370,10 @@ class SinewSide:
         sinew_addon.register()
         self._is_safe = safe
         routes.force(routes.UPDATE if safe else routes.EVALUATION)
-        from sinew_addon.deform import small_meshes
+        from sinew_addon.deform import precompute_watch, small_meshes
 
+        # Nobody paints in between.
+        precompute_watch.PAUSE = 0.0
         # The walk says itself which are left to Blender.
         small_meshes.is_used = True
 
@@ -476,6 +482,22 @@ class SinewSide:
 
         safe_mode.set_forced(on or self._is_safe)
         session.refresh(bpy.context)
+
+    def compute_beside(self, on: bool) -> None:
+        """What methods need computed is so on a thread, as in a window, or before the first frame."""
+        from sinew_addon.core.precompute import precomputations
+
+        precomputations.waits = not on
+
+    def wait(self) -> None:
+        """Until no object waits for what a thread computes, which a timer of the window sees to."""
+        from sinew_addon.deform import precompute_watch
+
+        until = time.monotonic() + 30.0
+        while precompute_watch.look() is not None:
+            if time.monotonic() > until:
+                raise RuntimeError("what methods need is still computed after half a minute")
+            time.sleep(0.002)
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         numbers = {m.name: m.number for m in self._properties.METHODS.values()}
