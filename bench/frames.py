@@ -20,6 +20,7 @@ from pathlib import Path
 import bpy
 import common
 import numpy as np
+import sinew
 
 FRAMES = 60
 # Frames in a row, as on playback, before Sinew is switched; and frames before these that are not timed, for
@@ -233,6 +234,51 @@ def measure(case: Case, seconds: float, leave_small: bool) -> dict:
     return asdict(case) | {"vertices": vertices} | spreads | {"away": away, "handler": scene.handler()}
 
 
+def looks(scene: Scene) -> dict[str, Callable[[], None]]:
+    """What sets the scene up, by name: the Armature modifier with Preserve Volume and with Corrective Smooth
+    behind it, every method, stages behind dq."""
+    smooths = [obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH") for obj in scene.meshes]
+
+    def look(method: str | None, stage: str = "") -> Callable[[], None]:
+        def choose() -> None:
+            for obj, smooth in zip(scene.meshes, smooths, strict=True):
+                wanted = method is None and stage == "smooth"
+                if smooth.show_viewport != wanted:
+                    smooth.show_viewport = wanted
+                obj.sinew.enabled = method is not None
+                obj.sinew.bulge_limit.enabled = stage == "bulge_limit"
+                obj.sinew.delta_mush.enabled = stage == "delta_mush"
+                obj.sinew.mix.method = "lbs" if stage == "mix" else "OFF"
+                obj.sinew.mix.group = obj.vertex_groups[0].name
+                if method is not None:
+                    obj.sinew.method = method
+
+        return choose
+
+    return {
+        "modifier": look(None),
+        "modifier, Corrective Smooth": look(None, "smooth"),
+        **{method.name: look(method.name) for method in sinew.methods()},
+        **{f"dq, {stage.name}": look("dq", stage.name) for stage in sinew.stages()},
+    }
+
+
+def measure_methods(case: Case, seconds: float) -> dict:
+    """Spreads of seconds of a frame by the names of looks(), which take turns."""
+    scene = Scene(case, leave_small=False)
+    chosen = looks(scene)
+    times: dict[str, list[float]] = {name: [] for name in chosen}
+    number, end = 1, time.perf_counter() + seconds * len(chosen)
+    while time.perf_counter() < end or len(times["modifier"]) < 2 * RUN:
+        numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
+        number += 7 * RUN
+        for name, choose in chosen.items():
+            choose()
+            scene.run(numbers[:BEFORE])
+            times[name] += scene.run(numbers)
+    return {name: common.spread(of) for name, of in times.items()}
+
+
 @contextmanager
 def quiet_blender() -> Iterator[Callable[[str], None]]:
     """A context with a function that prints, in which Blender's own output is discarded."""
@@ -277,6 +323,19 @@ def main() -> None:
             result = measure(case, 2.0 if arguments.quick else 4.0, not arguments.all_by_sinew)
             results[f"{case.name} {case.method}"] = result
             say(line(case.name, result))
+        case = next((c for c in cases(arguments.quick) if c.rig == "human.blend"), Case(13_380))
+        if arguments.k in f"{case.name} methods":
+            say(
+                f"\nAll methods and stages in turns, {case.name}: milliseconds, medians and least tenths, and"
+            )
+            say("the medians over that of dq")
+            found = measure_methods(case, 2.0 if arguments.quick else 4.0)
+            for name, spread in found.items():
+                kinds = ("median", "least")
+                own = "".join(f"{spread[kind] * 1e3:9.2f}" for kind in kinds)
+                ratios = "".join(f"{spread[kind] / found['dq'][kind]:8.2f}" for kind in kinds)
+                say(f"{name:30}{own}{ratios}")
+            results[f"{case.name} methods"] = found
     common.write(arguments.name, machine=facts, seconds=results)
 
 

@@ -42,7 +42,10 @@ def run(
 
 
 def rows(kind: str, size: int, times: dict) -> list[str]:
-    """A line for each method that the program measured; nan where a method has no plain loops."""
+    """A line for each method that the program measured, and for what follows them; nan where one has no plain
+    loops."""
+    scene = f"{kind}/{size}"
+    of_lbs = times[f"glm/lbs/{scene}"]["least"] / size
     lines = []
     for method in dict.fromkeys(name.split("/")[1] for name in times if name.startswith("sinew1/")):
         glm, eigen, one, two = (
@@ -51,8 +54,12 @@ def rows(kind: str, size: int, times: dict) -> list[str]:
         )
         lines.append(
             f"{kind:10}{size:>10,}  {method:5}{glm:8.2f}{eigen:8.2f}{one:8.2f}{two:8.2f}"
-            f"{glm / one:9.1f} x{eigen / one:8.1f} x{one / two:8.2f} x"
+            f"{glm / one:9.1f} x{eigen / one:8.1f} x{one / two:8.2f} x{one / of_lbs:10.2f}"
         )
+    for name, time in times.items():
+        if name.startswith("stage/") and name.endswith(scene):
+            one = time["least"] / size
+            lines.append(f"{kind:10}{size:>10,}  {name.split('/')[1]:21}{one:8.2f}{one / of_lbs:47.2f}")
     return lines
 
 
@@ -68,9 +75,10 @@ def main() -> None:
     facts = common.machine() | {key: context[key] for key in ("simd", "compiler", "flags", "plain_flags")}
     common.heading("kernels", facts)
     print("Nanoseconds a vertex, the least of many runs. The loops are one's first with GLM and with Eigen,")
-    print("of four influences always, with plain_flags; ours is built as it is shipped.\n")
+    print("of four influences always, with plain_flags; ours is built as it is shipped. The last column is")
+    print("ours on one thread over GLM's loop for lbs.\n")
     head = f"{'glm':>8}{'eigen':>8}{'sinew':>8}{'2 thr.':>8}{'than glm':>11}{'eigen':>10}{'2 threads':>10}"
-    print(f"{'':27}{head}")
+    print(f"{'':27}{head}{'of glm lbs':>12}")
     for kind in KINDS:
         for size in (100_000,) if arguments.quick else SIZES:
             if size > 1_000_000 and kind != "chain":

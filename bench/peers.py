@@ -49,7 +49,10 @@ class Scene:
     def deformer(self, method: str) -> sinew.Deformer:
         count = len(self.rest)
         offsets = np.arange(0, INFLUENCES * count + 1, INFLUENCES, dtype=np.int32)
-        return sinew.Deformer(self.rest, offsets, self.bones.ravel(), self.weights.ravel(), method)
+        # Centres of rotation as they are found for a limb: near its middle.
+        data = {"cor": self.rest * np.float32([0, 0, 1])} if method == "cor" else {}
+        own = (self.rest, offsets, self.bones.ravel(), self.weights.ravel())
+        return sinew.Deformer(*own, method, vertex_data=data)
 
 
 def rotate(quats: np.ndarray, points: np.ndarray) -> np.ndarray:

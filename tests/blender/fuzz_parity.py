@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Random rigs, posed at random: Sinew against Blender's Armature modifier, or for methods that Blender lacks
-against the float64 reference.
+and for stages against the float64 reference.
 
     python tests/blender/fuzz_parity.py --rigs 10000 [--first 0] [--route both] [--keep DIR]
 
@@ -14,16 +14,17 @@ not need, then saved as DIR/seed-N.blend.
 Left out of the comparison are vertices at a discontinuity of the modifier itself, where rounding decides:
 dual quaternions that meet within MARGIN of square (the sign of a term flips), weights that sum to within
 MARGIN of the modifier's threshold; and vertices that a change of the input by its rounding moves by the
-tolerance. All are computed from the input.
+tolerance; of stages, a change of what they smooth. All are computed from the input.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 import zlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -32,7 +33,7 @@ import numpy as np
 import routes
 import scenes
 from mathutils import Euler, Matrix, Vector
-from sinew_addon.attach import attach
+from sinew_addon.attach import attach, properties, stage_settings
 from sinew_addon.core import session as core_session
 from sinew_addon.deform import session
 
@@ -64,6 +65,9 @@ FEATURES = (
     "parent deforms",
     "absolute keys",
     "faces",
+    "surface",
+    "sdef keys",
+    "stages",
 )
 # Methods that Blender has, and whether with Preserve Volume.
 ORACLES = (("lbs", False), ("dq", True))
@@ -72,6 +76,10 @@ OTHERS = tuple(m.name for m in sinew.methods() if m.name not in dict(ORACLES))
 REFERENCE_VERTICES = 12
 # float32 beside exact numbers, where Blender's own are rounded alike.
 REFERENCE_TOLERANCE = 2 * scenes.TOLERANCE
+# What comes of stages: the mix of two methods, and all that follow the blend.
+MIX, AFTER = "mix", "stages after"
+# Vertex groups that stages take.
+PAINTED = ("painted", "painted too")
 NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after the update"}
 
 
@@ -79,11 +87,12 @@ NAMES = {routes.EVALUATION: "within Blender's evaluation", routes.UPDATE: "after
 class Outcome:
     """What came out for one rig.
 
-    errors    the worst by (route wanted, method), as a part of the diagonal
+    errors    the worst by (route wanted, method or MIX or AFTER), as a part of the diagonal
     taken     the route that was taken for each that was wanted
     reason    why a shape is not Sinew's, if one is not
     left_out  how many vertices were
     compared  with the reference, over all methods, and of these undecided by rounding
+    staged    the same of stages
     """
 
     seed: int
@@ -93,13 +102,15 @@ class Outcome:
     left_out: int = 0
     compared: int = 0
     undecided: int = 0
+    staged: int = 0
+    undecided_stages: int = 0
     vertices: int = 0
 
     @property
     def failed(self) -> bool:
-        limits = dict.fromkeys(OTHERS, REFERENCE_TOLERANCE)
+        limits = {method: scenes.TOLERANCE for method, _preserve_volume in ORACLES}
         return not all(
-            error <= limits.get(method, scenes.TOLERANCE) for (_route, method), error in self.errors.items()
+            error <= limits.get(what, REFERENCE_TOLERANCE) for (_route, what), error in self.errors.items()
         )
 
 
@@ -172,7 +183,12 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
     rng = numbers(seed, "mesh")
     count = int(rng.integers(20, 120))
     mesh = bpy.data.meshes.new("Mesh")
-    mesh.from_pydata(rng.uniform(-1.2, 1.2, (count, 3)).tolist(), [], faces_of(seed, features, count))
+    points = rng.uniform(-1.2, 1.2, (count, 3))
+    if has(seed, "surface", features):
+        faces = make_surface(numbers(seed, "surface"), points)
+    else:
+        faces = faces_of(seed, features, count)
+    mesh.from_pydata(points.tolist(), [], faces)
     obj = bpy.data.objects.new("Mesh", mesh)
     bpy.context.scene.collection.objects.link(obj)
     groups = [obj.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
@@ -187,6 +203,8 @@ def make_mesh(seed: int, features: set[str], armature: bpy.types.Object) -> bpy.
         make_weights_messy(numbers(seed, "messy weights"), count, groups)
     if has(seed, "shape keys", features):
         add_shape_keys(seed, features, obj)
+    if has(seed, "sdef keys", features):
+        add_sdef_keys(numbers(seed, "sdef keys"), obj)
     return obj
 
 
@@ -196,6 +214,31 @@ def faces_of(seed: int, features: set[str], count: int) -> list[tuple[int, ...]]
         return [(0, 1, 2), (3, 4, 5)]
     rng = numbers(seed, "faces")
     return [tuple(rng.choice(count, 3, replace=False).tolist()) for _face in range(count)]
+
+
+def make_surface(rng: np.random.Generator, points: np.ndarray) -> list[tuple[int, ...]]:
+    """Moves most of `points` onto a rough sheet, and returns its faces: triangles, quads, hexagons and holes,
+    and one on an edge that has others."""
+    width = int(rng.integers(3, 8))
+    height = len(points) // width
+    x, y = np.meshgrid(np.linspace(-1.2, 1.2, width), np.linspace(-1.2, 1.2, height), indexing="xy")
+    bent = np.stack([x, y, 0.5 * np.sin(2.0 * x + y)], axis=-1).reshape(-1, 3)
+    points[: width * height] = bent + rng.normal(0.0, 0.03, bent.shape)
+    faces: list[tuple[int, ...]] = []
+    for row in range(height - 1):
+        column = 0
+        while column < width - 1:
+            a, fate = row * width + column, rng.random()
+            b, c, d = a + 1, a + width + 1, a + width
+            if fate < 0.2:
+                faces += [(a, b, c), (a, c, d)]
+            elif fate < 0.3 and column + 2 < width:
+                faces.append((a, b, b + 1, c + 1, c, d))
+                column += 1
+            elif fate < 0.9:
+                faces.append((a, b, c, d))
+            column += 1
+    return [*faces, (0, 1, len(points) - 1)]
 
 
 def make_weights_messy(rng: np.random.Generator, count: int, groups: list[bpy.types.VertexGroup]) -> None:
@@ -227,6 +270,19 @@ def add_shape_keys(seed: int, features: set[str], obj: bpy.types.Object) -> None
     if has(seed, "absolute keys", features, share=0.2):
         obj.data.shape_keys.use_relative = False
         obj.data.shape_keys.eval_time = rng.uniform(0.0, 30.0)
+
+
+def add_sdef_keys(rng: np.random.Generator, obj: bpy.types.Object) -> None:
+    """Of about half of the vertices, as mmd_tools stores them."""
+    points = scenes.rest_points(obj)
+    if obj.data.shape_keys is None:
+        obj.shape_key_add(name="Basis")
+    used = rng.random(len(points)) < 0.5
+    for name in ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1"):
+        key = obj.shape_key_add(name=name, from_mix=False)
+        moved = points + used[:, None] * rng.normal(0.0, 0.3, points.shape).astype(np.float32)
+        key.data.foreach_set("co", moved.ravel())
+        key.mute = True
 
 
 def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types.Object]:
@@ -267,8 +323,20 @@ def make_rig(seed: int, features: set[str]) -> tuple[bpy.types.Object, bpy.types
     elif has(seed, "parent deforms", features, share=0.1):
         obj.parent, obj.parent_type = armature, "ARMATURE"
     pose(seed, features, armature)
+    if has(seed, "stages", features):
+        paint(numbers(seed, "painted"), obj)
     bpy.context.view_layer.update()
     return obj, armature
+
+
+def paint(rng: np.random.Generator, obj: bpy.types.Object) -> None:
+    """The vertex groups of stages: none, all or a part of a vertex."""
+    for name in PAINTED:
+        group = obj.vertex_groups.new(name=name)
+        for vertex in range(len(obj.data.vertices)):
+            fate = rng.random()
+            if fate < 0.75:
+                group.add([vertex], 1.0 if fate < 0.2 else float(rng.random()), "REPLACE")
 
 
 def add_modifier_in_front(rng: np.random.Generator, obj: bpy.types.Object) -> None:
@@ -377,7 +445,8 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     for points in (rest_points, rest_points + moved):
         stages = []
         for known in skinned.bound.skin_stack.skin_stages:
-            binding = core_session.Binding(known.binding.weighting, vertex_data=known.binding.vertex_data)
+            own = known.binding
+            binding = core_session.Binding(own.weighting, own.mix_weights, own.vertex_data)
             stages.append(core_session.SkinStage(binding, known.mask, known.multi))
         chain = core_session.SkinStack(stages)
         chain.deform(points.astype(np.float32), skinned.shown.frames)
@@ -405,16 +474,96 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
+        properties.of(obj).sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
         for method in OTHERS:
             try:
                 error = error_to_reference(obj, armature, method, seed, outcome, route)
             except routes.NotBySinewError as why:
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
+        if has(seed, "stages", features):
+            check_stages(obj, armature, seed, outcome, route)
         attach.remove(obj)
         session.forget()
     routes.release()
     return outcome
+
+
+def check_stages(
+    obj: bpy.types.Object, armature: bpy.types.Object, seed: int, outcome: Outcome, route: str
+) -> None:
+    """A mix of two random methods, then random stages that follow it; notes the errors."""
+    rng = numbers(seed, "stages")
+    method, second = rng.choice([m.name for m in sinew.methods()], 2, replace=False).tolist()
+    mix = properties.of(obj).mix
+    mix.method, mix.group = second, PAINTED[0]
+    try:
+        outcome.errors[route, MIX] = error_to_reference(obj, armature, method, seed, outcome, route)
+        choose_stages_after(rng, properties.of(obj), scenes.diagonal(obj))
+        outcome.errors[route, AFTER] = error_of_stages(obj, armature, method, outcome, route)
+    except routes.NotBySinewError as why:
+        outcome.errors[route, AFTER], outcome.reason = float("inf"), str(why)
+
+
+def choose_stages_after(rng: np.random.Generator, settings: bpy.types.PropertyGroup, diagonal: float) -> None:
+    """One of them, or both, with random parameters."""
+    which = int(rng.integers(3))
+    limit, mush = settings.bulge_limit, settings.delta_mush
+    limit.enabled, mush.enabled = which != 1, which != 0
+    limit.strength = rng.uniform(0.1, 1.0)
+    limit.form = str(rng.choice(["continuous", "kim_han"]))
+    mush.iterations, mush.factor = int(rng.integers(0, 25)), rng.uniform(0.05, 1.0)
+    mush.radius = rng.uniform(0.02, 0.1) * diagonal if rng.random() < 0.3 else 0.0
+    mush.smooth_type = str(rng.choice(["simple", "length_weighted"]))
+    mush.pin_boundary, mush.invert_group = bool(rng.random() < 0.3), bool(rng.random() < 0.4)
+    mush.scale = rng.uniform(-1.0, 2.0) if rng.random() < 0.5 else 1.0
+    for stage in (limit, mush):
+        stage.group = str(rng.choice(["", *PAINTED]))
+
+
+def error_of_stages(
+    obj: bpy.types.Object, armature: bpy.types.Object, method: str, outcome: Outcome, route: str
+) -> float:
+    """As error_of(), to the float64 reference of the stages that follow the blend and are on; it starts from
+    the shape without them, whose own error is that of the method."""
+    settings = properties.of(obj)
+    groups = {name: getattr(settings, name) for name in stage_settings.names_on(settings) if name != MIX}
+    values = {name: stage_settings.values_of(settings, name) for name in groups}
+    values = {name: {k: v for k, v in of.items() if k != "enabled"} for name, of in values.items()}
+    with without_modifiers_behind(obj):
+        for group in groups.values():
+            group.enabled = False
+        before = shape_of(obj, armature, method, outcome, route)
+        for group in groups.values():
+            group.enabled = True
+        shown = shape_of(obj, armature, method, outcome, route)
+    state = session.state_of(obj)
+    extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(shown, axis=0))))
+    moved = numbers(len(before), "rounding").uniform(-1.0, 1.0, before.shape) * ROUNDING * extent
+    expected, beside = (
+        fuzz_reference.stages_after(
+            state.bound.skin_stack, before, state.shown.rest_points, state.shown.frames, values, rounding
+        )
+        for rounding in (0.0, moved)
+    )
+    decided = np.abs(expected - beside).max(axis=1) <= scenes.TOLERANCE * extent
+    outcome.staged += len(shown)
+    outcome.undecided_stages += int((~decided).sum())
+    return float(np.abs(shown - expected)[decided].max(initial=0.0)) / extent
+
+
+@contextlib.contextmanager
+def without_modifiers_behind(obj: bpy.types.Object) -> Iterator[None]:
+    """Those behind what Sinew replaces are off: the reference knows nothing of them."""
+    place = list(obj.modifiers).index(attach.sinew_modifier(obj))
+    behind = [m for m in list(obj.modifiers)[place:] if m.type not in ("ARMATURE", "NODES")]
+    for modifier in behind:
+        modifier.show_viewport = False
+    try:
+        yield
+    finally:
+        for modifier in behind:
+            modifier.show_viewport = True
 
 
 def error_of(
@@ -443,21 +592,16 @@ def error_to_reference(
     obj: bpy.types.Object, armature: bpy.types.Object, method: str, seed: int, outcome: Outcome, route: str
 ) -> float:
     """As error_of(), of some vertices, to the float64 reference."""
-    place = list(obj.modifiers).index(attach.sinew_modifier(obj))
-    behind = [m for m in list(obj.modifiers)[place:] if m.type not in ("ARMATURE", "NODES")]
-    for modifier in behind:
-        modifier.show_viewport = False
-    shown = shape_of(obj, armature, method, outcome, route)
-    state = session.state_of(obj)
-    count = min(REFERENCE_VERTICES, len(shown))
-    chosen = np.sort(numbers(seed, "reference").choice(len(shown), count, replace=False))
-    expected, decided = fuzz_reference.deform(
-        state.bound.skin_stack, state.shown.rest_points, state.shown.frames, chosen
-    )
-    extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(shown, axis=0))))
-    decided &= ~unstable(obj, extent)[chosen]
-    for modifier in behind:
-        modifier.show_viewport = True
+    with without_modifiers_behind(obj):
+        shown = shape_of(obj, armature, method, outcome, route)
+        state = session.state_of(obj)
+        count = min(REFERENCE_VERTICES, len(shown))
+        chosen = np.sort(numbers(seed, "reference").choice(len(shown), count, replace=False))
+        expected, decided = fuzz_reference.deform(
+            state.bound.skin_stack, state.shown.rest_points, state.shown.frames, chosen
+        )
+        extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(shown, axis=0))))
+        decided &= ~unstable(obj, extent)[chosen]
     outcome.compared += count
     outcome.undecided += int((~decided).sum())
     return float(np.abs(shown[chosen] - expected)[decided].max(initial=0.0)) / extent
@@ -514,16 +658,19 @@ def run(first: int, count: int, keep: Path, wanted: Sequence[str] = routes.ROUTE
 
 
 def summarise(outcomes: list[Outcome]) -> str:
-    worst = {key: max(outcomes, key=lambda o: o.errors[key]) for key in outcomes[0].errors}
+    keys = dict.fromkeys(key for o in outcomes for key in o.errors)
+    worst = {key: max((o for o in outcomes if key in o.errors), key=lambda o: o.errors[key]) for key in keys}
     left_out = sum(o.left_out for o in outcomes)
     vertices = sum(o.vertices for o in outcomes)
     touched = sum(o.left_out > 0 for o in outcomes)
     compared, undecided = sum(o.compared for o in outcomes), sum(o.undecided for o in outcomes)
+    staged, undecided_stages = sum(o.staged for o in outcomes), sum(o.undecided_stages for o in outcomes)
     errors = ", ".join(f"{m} by {r} {o.errors[r, m]:.1e} (seed {o.seed})" for (r, m), o in worst.items())
     return (
         f"{len(outcomes)} rigs, {sum(o.failed for o in outcomes)} failed; worst error as a part of the "
         f"diagonal: {errors}; {left_out} of {vertices} vertices on {touched} rigs left out at a "
-        f"discontinuity, with the reference {undecided} of {compared}\n" + "\n".join(routes_taken(outcomes))
+        f"discontinuity, with the reference {undecided} of {compared}, after the blend {undecided_stages} of "
+        f"{staged}\n" + "\n".join(routes_taken(outcomes))
     )
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig's whole stack of Armature modifiers by the float64 reference, for methods that Blender lacks.
+"""A rig's whole stack of Armature modifiers by the float64 reference, for methods that Blender lacks, and the
+stages that follow.
 
 What Sinew reads of Blender, poses and weights, is what `lbs` and `dq` have, whose oracle is Blender itself.
 """
@@ -7,13 +8,18 @@ What Sinew reads of Blender, poses and weights, is what `lbs` and `dq` have, who
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from sinew_addon.core import session as core_session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+import bulge_limit_reference
+import delta_mush_reference
 import reference
+from sinew_addon.core.bulge_limit import segments
 
 MARGIN = 1e-3
 # Near half a turn from rest, the logarithm of a rotation in float32 errs by its rounding divided by the
@@ -29,7 +35,7 @@ def deform(
 ) -> tuple[np.ndarray, np.ndarray]:
     """float64 [of `vertices`, 3], object space, and bool [of them] those where rounding does not decide.
 
-    frames    as the stack takes them, of scale rule Blender 4 and without mix
+    frames    as the stack takes them, of scale rule Blender 4
     vertices  int [any number] the only ones that are deformed
     """
     points = rest_points.astype(np.float64)
@@ -41,12 +47,78 @@ def deform(
         start_before = start
         if frame is None:
             continue
-        deformed, margins = _by_one_modifier(stage.binding, frame, start, vertices)
+        deformed, is_decided = _by_one_modifier(stage.binding, frame, start, vertices)
         share = np.ones(len(vertices)) if stage.mask is None else stage.mask[vertices].astype(np.float64)
         points = points.copy()
         points[vertices] += share[:, None] * (deformed - points[vertices])
-        decided &= margins > MARGINS.get(frame.method, MARGIN)
+        decided &= is_decided
     return points[vertices], decided
+
+
+def stages_after(
+    stack: core_session.SkinStack,
+    points: np.ndarray,
+    rest_points: np.ndarray,
+    frames: list[core_session.SkinStageFrame | None],
+    values: Mapping[str, Mapping[str, Any]],
+    rounding: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """float64 [vertices, 3], object space: the stages that follow the blend.
+
+    points    [vertices, 3], the shape before them
+    frames    as for deform()
+    values    of the parameters of each stage that is on
+    rounding  [vertices, 3], added to `points` and to what is smoothed, to see what their rounding does
+    """
+    after = stack.stages_after
+    points = points.astype(np.float64) + rounding
+    if "bulge_limit" in values:
+        mask = after.masks.get("bulge_limit")
+        points = _limited(stack, points, rest_points, frames, mask, values["bulge_limit"])
+    if "delta_mush" in values:
+        options = dict(values["delta_mush"])
+        weights = after.masks.get("delta_mush")
+        if options.pop("invert_group") and weights is not None:
+            weights = 1.0 - weights
+        topology, own = after.mesh.topology, after.mesh.rest_points
+        faces = np.split(topology.corner_vertices, topology.face_offsets[1:-1])
+        faces = [face.tolist() for face in faces if len(face)]
+        mesh = (rest_points if own is None else own, faces, topology.edges)
+        points = delta_mush_reference.delta_mush(points, mesh, weights=weights, rounding=rounding, **options)
+    return points
+
+
+def _limited(
+    stack: core_session.SkinStack,
+    points: np.ndarray,
+    rest_points: np.ndarray,
+    frames: list[core_session.SkinStageFrame | None],
+    mask: np.ndarray | None,
+    options: Mapping[str, Any],
+) -> np.ndarray:
+    """By the bones of the first modifier that takes part, where its own mask has all of a vertex."""
+    number = next((i for i, frame in enumerate(frames) if frame is not None), None)
+    if number is None:
+        return points
+    stage, frame = stack.skin_stages[number], frames[number]
+    mask = np.ones(len(points)) if mask is None else mask
+    if stage.mask is not None:
+        mask = np.where(stage.mask >= 1.0, mask, 0.0)
+    space, weighting = frame.bones_from_model, stage.binding.weighting
+    rest = _moved(space, rest_points.astype(np.float64))
+    influences = weighting.influences_over_joints(rest)
+    result = bulge_limit_reference.limit(
+        _moved(space, points),
+        rest,
+        influences.offsets,
+        influences.bones,
+        influences.weights,
+        *segments(weighting.bones),
+        frame.pose.astype(np.float64) @ np.linalg.inv(weighting.bones.rest.astype(np.float64)),
+        mask=mask,
+        **options,
+    )
+    return _moved(np.linalg.inv(space), result)
 
 
 def _by_one_modifier(
@@ -55,26 +127,47 @@ def _by_one_modifier(
     points: np.ndarray,
     vertices: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Points, and whether rounding does not decide them."""
+    deformed, decided = _by_one_method(binding, frame, frame.method, points, vertices)
+    if not frame.mix or binding.mix_weights is None:
+        return deformed, decided
+    second, is_decided = _by_one_method(binding, frame, frame.mix, points, vertices)
+    share = np.clip(binding.mix_weights[vertices].astype(np.float64), 0.0, 1.0)
+    mixed = deformed + share[:, None] * (second - deformed)
+    return mixed, (decided | (share == 1.0)) & (is_decided | (share == 0.0))
+
+
+def _by_one_method(
+    binding: core_session.Binding,
+    frame: core_session.SkinStageFrame,
+    method: str,
+    points: np.ndarray,
+    vertices: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     space, back = frame.bones_from_model, np.linalg.inv(frame.bones_from_model)
     in_armature = _moved(space, points)
     influences = binding.weighting.influences_over_joints(in_armature)
     spans = [slice(influences.offsets[v], influences.offsets[v + 1]) for v in vertices]
-    data = {}
-    if binding.vertex_data is not None:
-        kept = binding.vertex_data.of(frame.method, space)
-        # cor's are points.
-        data = {} if kept is None else {frame.method: _moved(space, kept.astype(np.float64))[vertices]}
+    kept = None if binding.vertex_data is None else binding.vertex_data.of(method, space)
     deformed, margins = reference.deform(
-        frame.method,
+        method,
         in_armature[vertices],
         np.cumsum([0, *(span.stop - span.start for span in spans)]),
         np.concatenate([influences.bones[span] for span in spans]),
         np.concatenate([influences.weights[span] for span in spans]),
         frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64)),
         binding.bones.rest_axes.astype(np.float64),
-        data,
+        {} if kept is None else {method: _kept_in_armature(space, kept[vertices].astype(np.float64))},
+        frame.parameters,
     )
-    return _moved(back, deformed), margins
+    return _moved(back, deformed), margins > MARGINS.get(method, MARGIN)
+
+
+def _kept_in_armature(space: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """What a method keeps of each vertex: points, one after the other, and after them what is none."""
+    count = kept.shape[1] // 3
+    points = kept[:, : 3 * count].reshape(len(kept), count, 3)
+    return np.hstack([_moved(space, points).reshape(len(kept), -1), kept[:, 3 * count :]])
 
 
 def _moved(transform: np.ndarray, points: np.ndarray) -> np.ndarray:

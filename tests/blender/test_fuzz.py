@@ -33,6 +33,7 @@ def test_random_rigs_equal_the_modifier(tmp_path):
     # An exclusion that covered more vertices would hide faults.
     assert sum(o.left_out for o in outcomes) < 0.005 * sum(o.vertices for o in outcomes)
     assert sum(o.undecided for o in outcomes) < 0.05 * sum(o.compared for o in outcomes)
+    assert sum(o.undecided_stages for o in outcomes) < 0.1 * sum(o.staged for o in outcomes)
     # Many rigs are deformed within the evaluation, and none in safe mode.
     within = sum(o.taken[routes.EVALUATION] == routes.EVALUATION for o in outcomes)
     assert within > 0.3 * RIGS

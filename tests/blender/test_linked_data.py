@@ -128,3 +128,23 @@ def test_settings_are_copied_whole():
     assert [s.name for s in copied.replaced_modifiers] == [s.name for s in settings.replaced_modifiers]
     for name in ("method", "leave_small", "scale_rule", "enabled", "standing_in"):
         assert getattr(copied, name) == getattr(settings, name)
+
+
+def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
+    save_library(tmp_path, skinned=True, front=False)
+    link(tmp_path, override=True)
+    settings = properties.of(character())
+    settings.mix.method, settings.mix.group = "lbs", "bone.1"
+    settings.delta_mush.iterations, settings.delta_mush.enabled = 9, True
+    settings.sdef.interpolation = "slerp"
+    expected = scenes.shapes(character(), FRAMES)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    settings = properties.of(character())
+    assert (settings.mix.method, settings.mix.group, settings.sdef.interpolation) == (
+        "lbs",
+        "bone.1",
+        "slerp",
+    )
+    assert (settings.delta_mush.iterations, settings.delta_mush.enabled) == (9, True)
+    assert_shapes(expected)

@@ -18,6 +18,7 @@ from sinew_addon.attach import attach, properties, stored_vertex_data
 from sinew_addon.core import vertex_data
 from sinew_addon.core.file_cache import FileCache
 from sinew_addon.core.precompute import precomputations
+from sinew_addon.core.vertex_data import VertexData
 from sinew_addon.deform import precompute_watch, precomputing, session
 from sinew_addon.deform.plan import State
 
@@ -304,6 +305,19 @@ def test_triangles_are_read_where_a_method_needs_them():
     assert session.state_of(obj).bound.source.triangles is not None
     bpy.context.scene.frame_set(FRAME)
     assert not obj.sinew.error
+
+
+def test_outdated_centres_of_a_mesh_whose_triangles_are_no_longer_read_are_not_asked_for():
+    """As the last evaluation still has the method that needs them: the modifier's shape comes first."""
+    obj, _armature = scenes.make_arm()
+    bpy.context.scene.frame_set(11)
+    scenes.add_sinew(obj, "cor")
+    before = session.state_of(obj).bound.binding.vertex_data
+    assert before.is_current("cor")
+    after = VertexData(before.weighting, before.points + 0.1, before=before)
+    assert not after.is_ready("cor")
+    after.add_triangles(before.triangles)
+    assert after.is_ready("cor")
 
 
 def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():

@@ -5,8 +5,10 @@
 
 A walk is a list of operations (walk_operations), each with its own random numbers, so that any of them can
 be left out. Two processes do them: in one Sinew is at work, in the other the Armature modifiers, with
-Preserve Volume where Sinew's method is dq. After most steps the final points of all meshes, what renders were
-given and what the file holds have to be the same; a step after which nobody looks leaves more to the next.
+Preserve Volume where Sinew's method is dq; for methods and stages that Blender lacks, the library is given
+what the Blender without Sinew has (walk_shapes). After most steps the final points of all meshes, what
+renders were given and what the file holds have to be the same; a step after which nobody looks leaves more
+to the next.
 
 A walk that fails is cut down to the operations that it needs, and saved as DIR/walk-SEED-ROUTE.py, which does
 them again.
@@ -44,12 +46,35 @@ LIMIT = 60.0
 # original they do not follow.
 FOLLOWED = {
     *("frame", "subframe", "play", "pose", "key_pose", "rest_position", "move_vertices", "weights", "update"),
-    *("method", "enabled", "rebind", "heat", "leave_small", "move_object", "compare", "arrange_comparison"),
+    *(
+        "method",
+        "stages",
+        "parameters",
+        "enabled",
+        "rebind",
+        "heat",
+        "leave_small",
+        "move_object",
+        "compare",
+        "arrange_comparison",
+    ),
     *("render", "touch", "shape_key_value", "shape_key_points", "save_and_load"),
 }
 # A setting, what the artist changes then, and what has Blender evaluate.
 RUNS = (
-    ("method", "enabled", "heat", "leave_small", "rebind", "add", "scale_rule", "undo", "save", "compare"),
+    (
+        "method",
+        "stages",
+        "enabled",
+        "heat",
+        "leave_small",
+        "rebind",
+        "add",
+        "scale_rule",
+        "undo",
+        "save",
+        "compare",
+    ),
     (
         "weights",
         "move_vertices",
@@ -110,6 +135,7 @@ class Outcome:
     ran: Counter = field(default_factory=Counter)
     refused: Counter = field(default_factory=Counter)
     compared: int = 0
+    by_library: int = 0
     worst: float = 0.0
     copies_follow: bool = False
     unanswered: int = 0
@@ -359,14 +385,22 @@ def compare_shapes(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped:
                 return fault
         elif not np.isfinite(points).all():
             return Fault("shape", f"{name} has points that are not finite", at)
+        elif name in theirs.get("expected", {}) and name not in ours["skipped"]:
+            outcome.by_library += 1
+            fault = differ(outcome, at, name, points, theirs["expected"][name])
+            if fault is not None:
+                return fault
     return None
 
 
 def compare_renders(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str]) -> Fault | None:
     for name, points in ours.get("rendered", {}).items():
-        if name.partition(" in the render")[0] in skipped:
-            continue
         other = theirs["rendered"].get(name)
+        if name.partition(" in the render")[0] in skipped:
+            other = theirs["rendered by library"].get(name)
+            if other is None:
+                continue
+            outcome.by_library += 1
         if other is None:
             return Fault("render", f"{name} only with Sinew", at)
         fault = differ(outcome, at, name, points, other)
@@ -597,10 +631,11 @@ def summarise(outcomes: Sequence[Outcome], seconds: float) -> str:
     lines = []
     for route in dict.fromkeys(o.route for o in outcomes):
         own = [o for o in outcomes if o.route == route]
+        worst, by_library = max((o.worst for o in own), default=0.0), sum(o.by_library for o in own)
         lines.append(
             f"{route}: {sum(len(o.said) for o in own)} steps in {len(own)} walks, "
             f"{sum(o.fault is not None for o in own)} failed; {sum(o.compared for o in own)} shapes "
-            f"compared, worst {max((o.worst for o in own), default=0.0):.1e} of the diagonal; "
+            f"compared, {by_library} of them with the library's, worst {worst:.1e} of the diagonal; "
             f"{sum(o.unanswered for o in own)} requests within Blender's evaluation not answered"
         )
     kinds = Counter(o.fault.kind for o in outcomes if o.fault is not None)

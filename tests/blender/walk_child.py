@@ -40,6 +40,7 @@ def make_engine(walker, points_of) -> type:
                 if obj.type == "MESH" and not walker.side.may_react(obj.original):
                     name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
                     walker.rendered[name] = points_of(obj)
+                    walker.expect_rendered(name, obj.original, depsgraph)
             result = self.begin_result(0, 0, 4, 4)
             self.end_result(result)
 
@@ -51,15 +52,18 @@ class Child:
         import bpy
         import numpy as np
         import walk_operations
+        import walk_shapes
         import walk_sides
 
         self.bpy, self.np, self.operations, self.sides = bpy, np, walk_operations, walk_sides
+        self.shapes_of = walk_shapes
         self.errors = errors
         self.read_to = 0
         self.side = walk_sides.SinewSide() if role == "sinew" else walk_sides.BlenderSide()
         self.side.prepare(safe=route == "safe")
         self.walker = walk_operations.Walker(self.side, folder)
         self.walker.before_evaluation = self.before_evaluation
+        self.walker.expect_rendered = self.expect_rendered
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
         self.wrong: list[str] = []
@@ -70,6 +74,7 @@ class Child:
     def start(self, _request: dict) -> dict:
         self.claims, self.wrong = {}, []
         self.side.set_safe(False)
+        self.side.compute_beside(False)
         self.operations.start(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
         # Those of a file that a walk before has left broken.
@@ -86,7 +91,7 @@ class Child:
             self.side.adopt(self.claims)
         numbers = random.Random(seed)
         operation = self.operations.OPERATIONS[name]
-        self.walker.rendered = {}
+        self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome, said = "done", None
         try:
             said = operation.act(self.walker, numbers)
@@ -105,6 +110,7 @@ class Child:
             self.wrong = []
         result = {"outcome": outcome, "said": said, **self.look(request["check"])}
         result["rendered"] = self.walker.rendered
+        result["rendered by library"] = self.walker.rendered_by_library
         if self.side.is_sinew and name == "remove_all" and not result["claims"]:
             result["left over"] = self.side.left_over()
         result["problems"] = self.problems()
@@ -147,6 +153,9 @@ class Child:
         if not self.side.is_sinew:
             self.wrong += self.side.bring_in_line(self.claims)
         self.bpy.context.view_layer.update()
+        if self.side.is_sinew:
+            self.side.wait()
+            self.bpy.context.view_layer.update()
         depsgraph = self.bpy.context.evaluated_depsgraph_get()
         found["shapes"], found["skipped"] = self.shapes(depsgraph)
         found["state"] = self.state()
@@ -157,6 +166,18 @@ class Child:
             self.side.records.unanswered = 0
         else:
             found["wrong"] = self.wrong
+            found["expected"] = self.all_expected()
+        return found
+
+    def all_expected(self) -> dict:
+        """Points of objects that are shown, and whose shape is none of Blender's own."""
+        found = {}
+        for obj in self.bpy.context.view_layer.objects:
+            if obj.type == "MESH" and obj.visible_get() and self.side.has_other_shape(obj):
+                points = self.expected(obj)
+                if points is not None:
+                    found[obj.name_full] = points
+        self.bpy.context.view_layer.update()
         return found
 
     def points_of(self, evaluated):
@@ -202,7 +223,28 @@ class Child:
                 return True
         if not side.is_on(obj):
             return False
-        return side.method(obj) == "qv" or self.has_other_scale(obj)
+        return side.has_other_shape(obj) or self.has_other_scale(obj)
+
+    def expect_rendered(self, name: str, obj, depsgraph) -> None:
+        if not self.side.is_sinew and self.side.has_other_shape(obj):
+            points = self.expected(obj, depsgraph)
+            if points is not None:
+                self.walker.rendered_by_library[name] = points
+
+    def expected(self, obj, render=None):
+        """The points of an object whose shape is none of Blender's own; None where nobody knows them."""
+        side, claim = self.side, self.claims.get(obj.name_full)
+        if obj.library is not None or side.is_method_keyed(obj) or self.has_other_scale(obj):
+            return None
+        if claim is None or not side.is_on(obj) or obj.data.is_editmode:
+            return None
+        keys = obj.data.shape_keys
+        names = (claim["method"], claim["stages"].get("mix", {}).get("method"))
+        if "sdef" in names and keys is not None and "mmd_sdef_c" in keys.key_blocks:
+            return None
+        return self.shapes_of.expected(
+            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render
+        )
 
     def has_other_scale(self, obj) -> bool:
         """Whether Sinew makes something else of scaled bones than the modifier does."""
@@ -233,7 +275,8 @@ class Child:
             if (
                 any(".show_" in path for path in animated)
                 or len(modifiers) != 1
-                or method == "qv"
+                or method not in ("blender", *self.sides.OF_BLENDER)
+                or (method != "blender" and self.side.stages(obj))
                 or (method != "blender" and self.has_other_scale(obj))
                 or obj.data.is_editmode
                 or not obj.visible_get()

@@ -17,7 +17,16 @@ import bmesh
 import bpy
 import numpy as np
 from mathutils import Euler, Vector
-from walk_sides import METHODS, BlenderSide, SinewSide, armature_modifiers, key, remove_curves
+from walk_sides import (
+    METHODS,
+    OF_BLENDER,
+    STAGES,
+    BlenderSide,
+    SinewSide,
+    armature_modifiers,
+    key,
+    remove_curves,
+)
 
 FRAMES = (1, 11)
 # No turn of a bone against another by as much as half a turn, where dual quaternions meet a discontinuity.
@@ -53,6 +62,11 @@ class Walker:
         self.folder = folder
         self.number = 0
         self.rendered: dict[str, np.ndarray] = {}
+        # What renders should be given of shapes that are none of Blender's own, where that is known.
+        self.rendered_by_library: dict[str, np.ndarray] = {}
+        self.expect_rendered: Callable[[str, bpy.types.Object, bpy.types.Depsgraph], None] = (
+            lambda *_arguments: None
+        )
         self.chosen = ""
         self.compared = False
         # Changed since the last step of undo: Blender's own operations always push one.
@@ -288,6 +302,11 @@ def make_library(walker: Walker) -> None:
 # --- Sinew
 
 
+def _method(r: random.Random) -> str:
+    """Half of the time one whose shape Blender itself makes."""
+    return r.choice(OF_BLENDER if r.random() < 0.5 else METHODS[len(OF_BLENDER) :])
+
+
 @operation(6)
 def add(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(
@@ -300,7 +319,7 @@ def add(w: Walker, r: random.Random) -> str | None:
     )
     if obj is None:
         return None
-    method, leave = r.choice((None, *METHODS[:2])), r.random() < 0.15
+    method, leave = r.choice((None, _method(r))), r.random() < 0.15
     w.object_mode()
     flags = {w.side.preserve_volume(m) for m in armature_modifiers(obj)}
     if len(flags) > 1 and method is None:
@@ -335,11 +354,60 @@ def remove_all(w: Walker, r: random.Random) -> str | None:
 
 @operation(6)
 def method(w: Walker, r: random.Random) -> str | None:
-    obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), r.choice(METHODS)
+    obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), _method(r)
     if obj is None:
         return None
     w.side.set_method(obj, name)
     return f"{obj.name} by {name}"
+
+
+@operation(5)
+def stages(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, w.side.has_sinew)
+    # Without them the shape is Blender's.
+    number = r.randrange(1, len(STAGES)) if r.random() < 0.5 else 0
+    if obj is None:
+        return None
+    w.side.set_stages(obj, number)
+    return f"{obj.name}: stages {STAGES[number] or 'off'}"
+
+
+@operation(0.5)
+def parameters(w: Walker, r: random.Random) -> str | None:
+    """Of methods: what they change is seen where the method is used."""
+    obj, value = w.mesh(r, w.side.has_sinew), r.choice(("nlerp", "slerp"))
+    if obj is None:
+        return None
+    if w.side.is_sinew:
+        obj.sinew.sdef.interpolation = value
+    else:
+        w.side.set_option(obj, "sdef.interpolation", value)
+    return f"{obj.name}: sdef by {value}"
+
+
+@operation(0.5)
+def compute_beside(w: Walker, r: random.Random) -> str | None:
+    on = r.random() < 0.6
+    w.side.compute_beside(on)
+    return f"what methods need is computed {'on a thread' if on else 'at once'}"
+
+
+@operation(0.5)
+def sdef_keys(w: Walker, r: random.Random) -> str | None:
+    """As mmd_tools stores them."""
+    obj = w.editable(r)
+    if obj is None or obj.data.library is not None or obj.mode != "OBJECT" or w.users(obj.data) > 1:
+        return None
+    if obj.data.shape_keys is not None and len(obj.data.shape_keys.key_blocks) > 4:
+        return None
+    if obj.data.shape_keys is None:
+        obj.shape_key_add(name="Basis")
+    for name in ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1"):
+        block = obj.shape_key_add(name=name, from_mix=False)
+        for point in block.data:
+            point.co.z += r.uniform(-0.2, 0.2)
+        block.mute = True
+    return f"SDEF's shape keys for {obj.name}"
 
 
 @operation(4)
@@ -474,14 +542,14 @@ def key_method(w: Walker, r: random.Random) -> str | None:
     frames = sorted(r.sample(range(1, 12), 2))
     if obj is None:
         return None
-    w.side.key_method(obj, [(frames[0], r.choice(METHODS[:2])), (frames[1], r.choice(METHODS[:2]))])
+    w.side.key_method(obj, [(frames[0], r.choice(OF_BLENDER)), (frames[1], r.choice(OF_BLENDER))])
     w.this_frame()
     return f"key the method of {obj.name} at {frames}"
 
 
 @operation(1)
 def unkey_method(w: Walker, r: random.Random) -> str | None:
-    obj, name = w.mesh(r, w.side.is_method_keyed), r.choice(METHODS[:2])
+    obj, name = w.mesh(r, w.side.is_method_keyed), r.choice(OF_BLENDER)
     if obj is None or not w.side.has_sinew(obj):
         return None
     w.side.unkey_method(obj, name)
@@ -1142,7 +1210,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
             and o.data.shape_keys is None
             and o.override_library is None
             and w.side.is_on(o)
-            and not w.side.has_qv(o)
+            and not w.side.has_other_shape(o)
         ),
     )
     if obj is None or not w.select(obj):
@@ -1161,7 +1229,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
 @operation(0.4)
 def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
-    if obj is None or obj.data.library is not None or w.side.has_qv(obj) or not w.select(obj):
+    if obj is None or obj.data.library is not None or w.side.has_other_shape(obj) or not w.select(obj):
         return None
     w.before_evaluation()
     bpy.ops.object.convert(target="MESH")

@@ -10,13 +10,57 @@ method makes of it for now.
 from __future__ import annotations
 
 import logging
+import time
 
 import bpy
+import sinew
 
-METHODS = ("lbs", "dq", "qv")
+OF_BLENDER = ("lbs", "dq")
+METHODS = (*OF_BLENDER, *(m.name for m in sinew.methods() if m.name not in OF_BLENDER))
+# What stages an object may have, by their parameters that differ from the default: the first has none. Their
+# groups are those of the tubes, which they may lack, as any other.
+STAGES: tuple[dict[str, dict[str, object]], ...] = (
+    {},
+    {"mix": {"method": "dq", "group": "lower"}},
+    {"mix": {"method": "cor", "group": "upper"}},
+    {"bulge_limit": {"strength": 0.8}},
+    {"bulge_limit": {"form": "kim_han", "group": "shin"}},
+    {"delta_mush": {"iterations": 4}},
+    {"delta_mush": {"radius": 0.2, "smooth_type": "length_weighted", "group": "lower"}},
+    {"delta_mush": {"pin_boundary": True, "group": "thigh", "invert_group": True, "scale": 0.5}},
+    {
+        "mix": {"method": "lbs", "group": "lower"},
+        "bulge_limit": {"group": "upper"},
+        "delta_mush": {"factor": 0.9, "iterations": 3},
+    },
+)
 # Bits of the pass index. ADOPTED: what Sinew makes of it, and when, is its own choice, until it is put on.
 # CHANGED: other settings differ from before, as Blender's undo looks whether anything does.
-DRIVEN, ON, DQ, QV, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16, 32, 64
+DRIVEN, ON, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16
+# Numbers in the bits above: places in METHODS and STAGES, each in four bits.
+METHOD, STAGE, FIELD = 32, 512, 15
+
+
+def whole_stages(number: int) -> dict[str, dict[str, object]]:
+    """All parameters of STAGES[number], as claims have them."""
+    known = {stage.name: stage for stage in sinew.stages()}
+    found = {}
+    for name, given in STAGES[number].items():
+        values = {p.id: "" if p.kind == "vertex_group" else p.default for p in known[name].parameters}
+        found[name] = {**values, "enabled": True, **given} if "enabled" in values else {**values, **given}
+    return found
+
+
+def number_of(stages: dict[str, dict[str, object]]) -> int:
+    """The place in STAGES of what an object is set to; -1 for none of them."""
+
+    def rounded(of: dict[str, dict[str, object]]) -> dict:
+        return {
+            name: {key: round(v, 5) if isinstance(v, float) else v for key, v in values.items()}
+            for name, values in of.items()
+        }
+
+    return next((n for n in range(len(STAGES)) if rounded(whole_stages(n)) == rounded(stages)), -1)
 
 
 def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -103,11 +147,24 @@ class BlenderSide:
         return bool(obj.pass_index & ON)
 
     def method(self, obj: bpy.types.Object) -> str:
-        return "qv" if obj.pass_index & QV else "dq" if obj.pass_index & DQ else "lbs"
+        return METHODS[self._field(obj, METHOD)]
 
-    def has_qv(self, obj: bpy.types.Object) -> bool:
+    def stages(self, obj: bpy.types.Object) -> int:
+        """The place in STAGES."""
+        return self._field(obj, STAGE)
+
+    def has_other_shape(self, obj: bpy.types.Object) -> bool:
         """Whether it has a shape that is none of Blender's."""
-        return self.is_on(obj) and self.method(obj) == "qv"
+        return self.is_on(obj) and (self.method(obj) not in OF_BLENDER or self.stages(obj) != 0)
+
+    @staticmethod
+    def _field(obj: bpy.types.Object, first: int) -> int:
+        return obj.pass_index // first & FIELD
+
+    def _set_field(self, obj: bpy.types.Object, first: int, number: int) -> None:
+        value = obj.pass_index & ~(FIELD * first) | number * first
+        if obj.pass_index != value:
+            obj.pass_index = value
 
     def _set(self, obj: bpy.types.Object, bit: int, on: bool) -> None:
         value = obj.pass_index | bit if on else obj.pass_index & ~bit
@@ -144,8 +201,10 @@ class BlenderSide:
             obj.pass_index = 0
 
     def set_method(self, obj: bpy.types.Object, method: str) -> None:
-        self._set(obj, DQ, method == "dq")
-        self._set(obj, QV, method == "qv")
+        self._set_field(obj, METHOD, METHODS.index(method))
+
+    def set_stages(self, obj: bpy.types.Object, number: int) -> None:
+        self._set_field(obj, STAGE, number)
 
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
         if on and not self.is_on(obj):
@@ -174,9 +233,13 @@ class BlenderSide:
     def set_safe(self, on: bool) -> None:
         pass
 
+    def compute_beside(self, on: bool) -> None:
+        pass
+
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         self._set(obj, KEYED, True)
-        self._set(obj, QV, False)
+        if self.method(obj) not in OF_BLENDER:
+            self.set_method(obj, "lbs")
         for modifier in armature_modifiers(obj):
             path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].use_deform_preserve_volume'
             key(obj, path, [(frame, float(method == "dq")) for frame, method in values])
@@ -267,6 +330,7 @@ class BlenderSide:
             self._set(obj, ON, claim is not None and claim["on"])
             if claim is not None:
                 self.set_method(obj, claim["method"])
+            self.set_stages(obj, 0 if claim is None else number_of(claim["stages"]))
             return []
         if self.has_sinew(obj) != (claim is not None):
             return [f"{obj.name_full} is{'' if claim else ' not'} Sinew's, against the walk's list"]
@@ -278,6 +342,8 @@ class BlenderSide:
             return [f"{obj.name_full}: Sinew is {'on' if claim['on'] else 'off'} against the walk's list"]
         if not self.is_method_keyed(obj) and claim["method"] != self.method(obj):
             return [f"{obj.name_full}: method {claim['method']}, the walk's list has {self.method(obj)}"]
+        if number_of(claim["stages"]) != self.stages(obj):
+            return [f"{obj.name_full}: stages {claim['stages']}, the walk's list has {self.stages(obj)}"]
         return []
 
 
@@ -315,8 +381,10 @@ class SinewSide:
         sinew_addon.register()
         self._is_safe = safe
         routes.force(routes.UPDATE if safe else routes.EVALUATION)
-        from sinew_addon.deform import small_meshes
+        from sinew_addon.deform import precompute_watch, small_meshes
 
+        # Nobody paints in between.
+        precompute_watch.PAUSE = 0.0
         # The walk says itself which are left to Blender.
         small_meshes.is_used = True
 
@@ -344,8 +412,21 @@ class SinewSide:
     def is_on(self, obj: bpy.types.Object) -> bool:
         return self.has_sinew(obj) and obj.sinew.enabled
 
-    def has_qv(self, obj: bpy.types.Object) -> bool:
-        return self.is_on(obj) and obj.sinew.method == "qv"
+    def has_other_shape(self, obj: bpy.types.Object) -> bool:
+        return self.is_on(obj) and (obj.sinew.method not in OF_BLENDER or bool(self._stages(obj)))
+
+    @staticmethod
+    def _stages(obj: bpy.types.Object) -> dict[str, dict[str, object]]:
+        """All parameters of the stages that are on."""
+        from sinew_addon.attach import stage_settings
+
+        return {
+            name: {
+                each.id: getattr(getattr(obj.sinew, name), each.id)
+                for each in stage_settings.STAGES[name].parameters
+            }
+            for name in stage_settings.names_on(obj.sinew)
+        }
 
     def note_flags(self, obj: bpy.types.Object) -> None:
         pass
@@ -380,6 +461,17 @@ class SinewSide:
 
         attach.use_one_method(obj, method)
 
+    def set_stages(self, obj: bpy.types.Object, number: int) -> None:
+        """As somebody who clicks: first what is on goes off."""
+        wanted = whole_stages(number)
+        for stage in sinew.stages():
+            group, switch = getattr(obj.sinew, stage.name), stage.parameters[0].id
+            if stage.name not in wanted:
+                setattr(group, switch, "OFF" if stage.name == "mix" else False)
+                continue
+            for parameter, value in wanted[stage.name].items():
+                setattr(group, parameter, value)
+
     def set_enabled(self, obj: bpy.types.Object, on: bool) -> None:
         obj.sinew.enabled = on
 
@@ -401,6 +493,22 @@ class SinewSide:
 
         safe_mode.set_forced(on or self._is_safe)
         session.refresh(bpy.context)
+
+    def compute_beside(self, on: bool) -> None:
+        """What methods need computed is so on a thread, as in a window, or before the first frame."""
+        from sinew_addon.core.precompute import precomputations
+
+        precomputations.waits = not on
+
+    def wait(self) -> None:
+        """Until no object waits for what a thread computes, which a timer of the window sees to."""
+        from sinew_addon.deform import precompute_watch
+
+        until = time.monotonic() + 30.0
+        while precompute_watch.look() is not None:
+            if time.monotonic() > until:
+                raise RuntimeError("what methods need is still computed after half a minute")
+            time.sleep(0.002)
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         numbers = {m.name: m.number for m in self._properties.METHODS.values()}
@@ -465,11 +573,15 @@ class SinewSide:
 
     def claims(self) -> dict[str, dict]:
         """By the name of each object that Sinew drives: how it says it does."""
+        from sinew_addon.attach import stage_settings
+
         return {
             obj.name_full: {
                 "on": obj.sinew.enabled,
                 "method": obj.sinew.method,
                 "rule": obj.sinew.scale_rule,
+                "stages": self._stages(obj),
+                "parameters": stage_settings.method_values(obj.sinew, METHODS),
                 "error": obj.sinew.error,
                 "run": [replaced.name for replaced in obj.sinew.replaced_modifiers],
             }

@@ -40,6 +40,26 @@ def smoothed(points, edges, factors, iterations, smooth_type):
     return points
 
 
+def amount(rest, edges, factor, radius, smooth_type, most=1000):
+    """Iterations and the factor of each vertex that make details of the width `radius` out of those of one
+    edge: n iterations by the factor f spread as far as h sqrt(n f / 2), h the root mean square of a vertex's
+    edges, or by half of the square where neighbours count by length."""
+    a, b = np.asarray(edges).reshape(-1, 2).T
+    squares = ((rest[a] - rest[b]) ** 2).sum(axis=1)
+    total = np.bincount(np.r_[a, b], np.r_[squares, squares], minlength=len(rest))
+    squared = total / np.maximum(np.bincount(np.r_[a, b], minlength=len(rest)), 1)
+    factors = np.full(len(rest), float(factor))
+    found = np.sort(squared[squared > 0.0])
+    if not len(found) or factor == 0.0:
+        return 0, factors
+    wanted = (4.0 if smooth_type == "length_weighted" else 2.0) * radius**2
+    # All but the shortest tenth.
+    iterations = int(np.clip(np.ceil(wanted / (factor * found[int(0.1 * len(found))])), 1, most))
+    some = squared > 0.0
+    factors[some] = np.minimum(wanted / (iterations * squared[some]), factor)
+    return iterations, factors
+
+
 def angle(cosine):
     m = min(abs(cosine), 1.0)
     size = np.sqrt(1 - m) * (1.5707963267 + m * (-0.213300989 + m * (0.077980478 + m * -0.02164095)))
@@ -60,25 +80,32 @@ def frame(before, at, after):
     return np.column_stack([x, np.cross(z, x), z]), angle(a @ b)
 
 
-def delta_mush(
+def delta_mush(  # noqa: PLR0913 - as the library's
     points,
     mesh,
     *,
     iterations=5,
+    radius=0.0,
     factor=0.5,
     smooth_type="simple",
     pin_boundary=False,
     weights=None,
     scale=1.0,
+    rounding=0.0,
 ):
-    """mesh: (rest points, faces as lists of vertices, edges)."""
+    """mesh: (rest points, faces as lists of vertices, edges). rounding: added to smoothed points, to see what
+    their rounding does."""
     rest, faces, edges = mesh
-    factors = factor * (np.ones(len(rest)) if weights is None else np.array(weights, np.float64))
+    rest = np.asarray(rest, np.float64)
+    factors = np.full(len(rest), float(factor))
+    if radius > 0.0:
+        iterations, factors = amount(rest, edges, factor, radius, smooth_type)
+    if weights is not None:
+        factors = factors * np.clip(np.asarray(weights, np.float64), 0.0, 1.0)
     if pin_boundary:
         factors[boundary_of(faces, edges)] = 0.0
-    rest = np.asarray(rest, np.float64)
-    rest_smoothed = smoothed(rest, edges, factors, iterations, smooth_type)
-    result = smoothed(points, edges, factors, iterations, smooth_type)
+    rest_smoothed = smoothed(rest, edges, factors, iterations, smooth_type) - rounding
+    result = smoothed(points, edges, factors, iterations, smooth_type) + rounding
     details, weight_sums = np.zeros_like(result), np.zeros(len(result))
     for at, before, after in corners_of(faces):
         axes, _ = frame(*rest_smoothed[[before, at, after]])

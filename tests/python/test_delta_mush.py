@@ -51,6 +51,8 @@ CASES = [
     {"smooth_type": "length_weighted"},
     {"smooth_type": "length_weighted", "iterations": 20, "factor": 0.2},
     {"pin_boundary": True},
+    {"radius": 0.1},
+    {"radius": 0.2, "smooth_type": "length_weighted", "weights": np.linspace(0, 1, 148)},
     {"weights": np.linspace(0, 1, 148)},
     {"weights": np.linspace(0, 1, 148), "pin_boundary": True, "smooth_type": "length_weighted"},
 ]

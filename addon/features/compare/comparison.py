@@ -13,11 +13,12 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ...attach import attach, node_group, point_buffer, properties, stack, upstream_proxy
+from ...attach import attach, corrective_smooth, node_group, point_buffer, properties, stack, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...core import side_by_side
 from ...core.errors import SinewError
 from ...core.spaces import transformed
+from ...core.stages import ORDER
 from ...deform import evaluate, session
 from ...io import actions
 from . import comparison_state, offset_nodes
@@ -182,6 +183,8 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
         copy.make_local(clear_liboverride=True)
     copy.name = f"{obj.name} {properties.method_label(method)}"
     original = properties.of(obj) if properties.has_sinew(obj) else None
+    replaced = corrective_smooth.replaced_modifier(obj) if original is not None else None
+    smooth = replaced.name if replaced is not None else None
     _take_sinew_off(copy)
     for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
         copy.modifiers.remove(modifier)
@@ -199,7 +202,11 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
         attach.add(copy, method)
         if original is not None:
             settings.scale_rule = original.scale_rule
-            properties.copy_groups(original, settings, properties.METHOD_GROUPS)
+            # A copy shows one method, without another mixed in.
+            properties.copy_groups(original, settings, (*properties.METHOD_GROUPS, *ORDER))
+            if smooth is not None:
+                # The stage does what it did.
+                copy.modifiers.remove(copy.modifiers[smooth])
     offset_nodes.add(copy)
     return copy
 

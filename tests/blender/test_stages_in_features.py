@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every stage in whatever measures, shows and writes shapes: what each feature has is the final mesh of an
+object with that stage, whose own oracle is in test_mix, test_bulge_limit and test_delta_mush."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+import test_bake
+import test_compare
+import test_comparison
+import test_heat_map
+import trimesh
+from program import run_sinew
+from sinew_addon.attach import properties
+from sinew_addon.core.heat import HeatScale, linear
+from sinew_addon.core.metrics import METRICS, Measured
+from sinew_addon.deform import evaluate, session
+from sinew_addon.features.heat import live, worst_frames
+from sinew_addon.features.pages import measure
+
+FRAMES = [1, 6, 11]
+GROUP = "painted"
+STAGES = {
+    "mix": ("mix=lbs", f"mix.group={GROUP}"),
+    "bulge_limit": ("bulge_limit=on", "bulge_limit.strength=0.8", f"bulge_limit.group={GROUP}"),
+    "delta_mush": ("delta_mush=on", "delta_mush.iterations=12", "delta_mush.pin_boundary=on"),
+}
+
+
+def options(stage: str) -> list[str]:
+    """As a command takes them."""
+    return [text for value in STAGES[stage] for text in ("--set", value)]
+
+
+def set_on(obj: bpy.types.Object, stage: str) -> None:
+    """As the panel does."""
+    own = getattr(properties.of(obj), stage)
+    if stage == "mix":
+        own.method, own.group = "lbs", GROUP
+    elif stage == "bulge_limit":
+        own.strength, own.group, own.enabled = 0.8, GROUP, True
+    else:
+        own.iterations, own.pin_boundary, own.enabled = 12, True, True
+
+
+@pytest.fixture
+def arm(tmp_path):
+    """The mesh, and the file that it is saved in."""
+    obj, _armature = scenes.make_arm(bones=3)
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex in obj.data.vertices:
+        group.add([vertex.index], float(np.clip(vertex.co.x - 0.5, 0.0, 1.0)), "REPLACE")
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return obj, path
+
+
+@pytest.fixture(params=STAGES)
+def stage(request):
+    return request.param
+
+
+def with_stage(obj: bpy.types.Object, stage: str) -> tuple[np.ndarray, np.ndarray]:
+    """The final shapes without the stage and with it, which stays on; they differ."""
+    scenes.add_sinew(obj, "dq")
+    without = scenes.shapes(obj, FRAMES)
+    set_on(obj, stage)
+    shapes = scenes.shapes(obj, FRAMES)
+    assert scenes.worst(without, shapes) > 0.005
+    return without, shapes
+
+
+def measured(obj: bpy.types.Object, frame: int, shape: np.ndarray) -> Measured:
+    """The measures of the object's final mesh, which is `shape`, by way of Blender's own evaluations;
+    distances are to the Armature modifier. Leaves the object under dq."""
+    subject = measure.gather(bpy.context.scene, [obj])
+    shapes = measure.shapes_at(subject, ("dq", evaluate.BLENDER), frame)
+    np.testing.assert_allclose(shapes["dq"], shape, atol=1e-6)
+    found = subject.gauge.measure(shapes["dq"], shapes[evaluate.BLENDER])
+    evaluate.use_method(obj, "dq")
+    return found
+
+
+def test_compare_measures_the_shapes_with_it(arm, stage, tmp_path):
+    obj, path = arm
+    _without, shapes = with_stage(obj, stage)
+    run_sinew(
+        *("compare", path, "--methods", "blender,dq", "--frames", "11", "--pictures", 0),
+        *(*options(stage), "--out", tmp_path / "page"),
+    )
+    with open(tmp_path / "page" / "arm" / "metrics.csv", newline="", encoding="utf-8") as file:
+        rows = {row["method"]: row for row in csv.DictReader(file)}
+    evaluate.use_method(obj, evaluate.BLENDER)
+    # The Armature modifier has no stages.
+    blender = scenes.shapes(obj, [11])[0]
+    for method, shape in (("dq", shapes[-1]), (evaluate.BLENDER, blender)):
+        mesh = trimesh.Trimesh(shape.astype(np.float64), test_compare.triangles_of(obj), process=False)
+        assert float(rows[method]["volume"]) == pytest.approx(mesh.volume, rel=1e-4)
+        assert float(rows[method]["area"]) == pytest.approx(mesh.area, rel=1e-4)
+    apart = np.linalg.norm(shapes[-1].astype(np.float64) - blender, axis=1)
+    assert float(rows["dq"]["distance_max"]) == pytest.approx(apart.max(), abs=2e-5)
+
+
+@pytest.mark.parametrize("quantity", ["stretch", "bulge", "distance"])
+def test_the_heat_map_shows_it(arm, stage, quantity):
+    obj, _path = arm
+    _without, shapes = with_stage(obj, stage)
+    expected = measured(obj, 11, shapes[-1])
+    values, diagonal = expected.field(quantity), expected.rest.diagonal
+    assert np.ptp(values) > 0.02
+    test_heat_map.choose(quantity)
+    bpy.ops.sinew.heat_map()
+    scale = HeatScale.over_values(METRICS[quantity], values.min(), values.max(), diagonal)
+    shown = test_heat_map.shown_colours(obj)
+    np.testing.assert_allclose(shown, linear(scale.colours(values)), atol=3e-3)
+
+
+def test_numbers_and_worst_frames_are_of_it(arm, stage):
+    obj, _path = arm
+    _without, shapes = with_stage(obj, stage)
+    expected = {frame: measured(obj, frame, shape) for frame, shape in zip(FRAMES, shapes, strict=True)}
+    test_heat_map.choose("stretch")
+    assert bpy.ops.sinew.worst_frames() == {"FINISHED"}
+    found = dict(worst_frames.scans[bpy.context.scene.session_uid].frames)
+    for frame, own in expected.items():
+        assert found[frame] == pytest.approx(own.entry(METRICS["stretch"].worst), rel=1e-3, abs=1e-5)
+    bpy.context.scene.frame_set(11)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    numbers = live.measure(session.states_of([obj], depsgraph), evaluate.BLENDER, depsgraph).measured
+    for name, value in expected[11].summary().__dict__.items():
+        assert numbers.summary().__dict__[name] == pytest.approx(value, rel=2e-4, abs=2e-5), name
+
+
+def test_copies_of_a_comparison_have_what_follows_the_blend(arm, stage):
+    obj, _path = arm
+    without, shapes = with_stage(obj, stage)
+    assert_copy_shows(obj, without if stage == "mix" else shapes)
+
+
+def test_copies_have_a_corrective_smooth_that_was_taken_over_once(arm):
+    obj, _path = arm
+    modifier = obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH")
+    modifier.iterations = 20
+    scenes.add_sinew(obj, "dq")
+    behind = scenes.shapes(obj, FRAMES)
+    bpy.context.view_layer.objects.active = obj
+    assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
+    assert properties.of(obj).delta_mush.enabled
+    assert_copy_shows(obj, behind)
+
+
+def assert_copy_shows(obj: bpy.types.Object, shapes: np.ndarray) -> None:
+    """One by dq, in each of FRAMES."""
+    test_comparison.compare(obj, {"dq"})
+    for frame, expected in zip(FRAMES, shapes, strict=True):
+        bpy.context.scene.frame_set(frame)
+        found = test_comparison.without_offset(test_comparison.copies(obj)["dq"], 1)
+        assert scenes.worst(found, expected) < 1e-5
+
+
+@pytest.mark.parametrize("kind", ["shape-keys", "mdd"])
+def test_a_bake_plays_it_elsewhere(arm, stage, kind, tmp_path):
+    obj, path = arm
+    _without, shapes = with_stage(obj, stage)
+    run_sinew("bake", path, "--method", "dq", *options(stage), "--to", kind, "--out", tmp_path / "out")
+    read = test_bake.read_elsewhere(tmp_path / "out" / "arm.blend", FRAMES, tmp_path)["Arm"]
+    assert scenes.worst(read, shapes) <= test_bake.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_the_bake_operator_takes_what_is_set(arm, stage):
+    obj, _path = arm
+    _without, shapes = with_stage(obj, stage)
+    assert bpy.ops.sinew.bake(kind="shape-keys", frames="1-11") == {"FINISHED"}
+    assert not properties.has_sinew(obj)
+    assert scenes.worst(scenes.shapes(obj, FRAMES), shapes) <= test_bake.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_points_and_job_files_take_it(arm, stage, tmp_path):
+    obj, path = arm
+    _without, shapes = with_stage(obj, stage)
+    frames = ",".join(map(str, FRAMES))
+    run_sinew(
+        *("points", path, "--method", "dq", *options(stage), "--frames", frames),
+        *("--out", tmp_path / "points.npz"),
+    )
+    with np.load(tmp_path / "points.npz") as arrays:
+        assert scenes.worst(arrays["Arm"], shapes) <= 1e-6
+    job = tmp_path / "job.toml"
+    job.write_text(
+        f"inputs = {json.dumps([str(path)])}\nout = {json.dumps(str(tmp_path / 'copies'))}\n"
+        f'method = "dq"\n[[objects]]\nmatch = "A*"\nset = {json.dumps(list(STAGES[stage]))}\n'
+    )
+    run_sinew("reskin", "--job", job, "--no-pictures")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "copies" / "arm.blend"))
+    copy = bpy.data.objects["Arm"]
+    assert scenes.worst(scenes.shapes(copy, FRAMES), shapes) <= 1e-6
+    assert properties.of(copy).method == "dq"
+
+
+def test_pictures_differ_where_it_does(arm, stage, tmp_path):
+    """--against renders by what the golden pictures were rendered with, unless another is asked for."""
+    _obj, path = arm
+    render = ("render", path, "--method", "dq", "--frames", "11", "--size", 128)
+    run_sinew(*render, *options(stage), "--out", tmp_path / "golden")
+    again = ("--against", tmp_path / "golden", "--out")
+    run_sinew("render", path, "--frames", "11", *again, tmp_path / "same")
+    off = f"{stage}=off"
+    run_sinew("render", path, "--set", off, *again, tmp_path / "other", status=1)
