@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sinew/deform/normals.h"
+#include "sinew/deform/packed_mesh.h"
+#include "sinew/deform/palette.h"
+
+namespace sinew {
+
+/// Up to kLanes faces of as many corners, or one face of more than kMaxBlockCorners.
+///
+/// A face has a slot for each four of its corners, with its normal and their angles. Slot s of the face in lane l of a
+/// block is number first_slot + s * lanes + l.
+struct FaceBlock {
+    std::size_t first_vertex;  // of NormalMesh::corner_vertices: [corners][lanes]
+    std::uint32_t first_slot;
+    std::uint32_t corners;
+    std::uint8_t lanes;     // kLanes or 1; those without a face repeat the last
+    bool reads_last_point;  // behind which nothing may be read
+};
+
+/// Corners whose normals are added up: of group g, sources [offsets[g], offsets[g + 1]), in the order of the corners.
+struct CornerGroups {
+    std::vector<std::uint32_t> offsets{0};
+    // Each the corner's angle, as an index into the angles of all slots. The slot is a fourth of it.
+    std::vector<std::uint32_t> sources;
+
+    [[nodiscard]] std::size_t size() const noexcept { return offsets.size() - 1; }
+};
+
+/// A mesh as its normals are computed.
+struct NormalMesh {
+    static constexpr std::size_t kMaxBlockCorners = 32;
+
+    std::vector<FaceBlock> blocks;
+    std::vector<std::int32_t> corner_vertices;
+    std::vector<std::int32_t> face_slots;  // [faces] the first of each
+    std::size_t slot_count = 0;
+
+    CornerGroups vertices;
+    CornerGroups fans;  // of at least two corners; only of the domain `corner`
+    // [corners] slot_count and the fan of a corner; the slot of its face where it is a fan by itself, and in the domain
+    // `face`. Empty in the domain `vertex`.
+    std::vector<std::int32_t> corner_sources;
+};
+
+/// topology  checked
+/// domain    of the mesh: Normals::domain()
+[[nodiscard]] NormalMesh make_normal_mesh(const MeshTopology& topology, std::size_t vertex_count,
+                                          const Sharpness& sharpness, NormalDomain domain);
+
+/// What the kernels of one call read and write.
+struct NormalFrame {
+    const NormalMesh* mesh;
+    const Vec3<float>* points;
+    Float4* slot_normals;        // [slots] the last number 0
+    float* angles;               // [slots][4]
+    const CornerGroups* groups;  // to be added up
+    Float4* group_normals;       // [groups], and room for kLanes
+    Vec3<float>* normals;        // [groups] the caller's
+};
+
+/// Functions compiled once for each instruction set, with the same results on all.
+struct NormalKernel {
+    /// The normals of the faces of blocks [begin, end).
+    void (*faces)(const NormalFrame& frame, std::size_t begin, std::size_t end);
+    /// And the angles.
+    void (*corners)(const NormalFrame& frame, std::size_t begin, std::size_t end);
+    /// Groups [begin, end), to `normals`.
+    void (*sum)(const NormalFrame& frame, std::size_t begin, std::size_t end);
+    /// The same, to `group_normals`; `begin` is a multiple of kLanes.
+    void (*sum_groups)(const NormalFrame& frame, std::size_t begin, std::size_t end);
+};
+
+/// For the instruction set in use.
+[[nodiscard]] NormalKernel normal_kernel() noexcept;
+
+}  // namespace sinew
