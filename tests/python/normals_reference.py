@@ -70,8 +70,8 @@ def vertex_normals(points, faces):
 
 
 def corner_fans(faces, edges, sharp_edges=(), sharp_faces=()):
-    """Which fan each corner is in: corners of a vertex whose faces meet at smooth edges there. An edge is smooth
-    that is not sharp, nor of a sharp face, and has two faces which go along it in opposite directions."""
+    """Which fan each corner is in: corners of a vertex whose faces meet at smooth edges there. An edge is
+    smooth that is not sharp, nor of a sharp face, and has two faces which go along it in opposite ways."""
     sharp = {frozenset(map(int, edges[i])) for i in np.flatnonzero(sharp_edges)}
     users = {}
     first = 0

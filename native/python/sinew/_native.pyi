@@ -472,8 +472,8 @@ class Normals:
         """
     @property
     def domain(self) -> str:
-        """The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: "face" where every face is
-        flat or every edge sharp, else "corner" where something is sharp, else "vertex".
+        """The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: "face" where every
+        face is flat or every edge sharp, else "corner" where something is sharp, else "vertex".
         """
     @property
     def vertex_count(self) -> int:
