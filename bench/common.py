@@ -42,8 +42,8 @@ def spread(times: list[float]) -> dict:
 
 def alternate(candidates: dict, seconds: float) -> dict:
     """Calls the functions of {name: function} alternately, for `seconds` each: {name: spread() of seconds a
-    call}. Each runs for some calls at a time: the first of these has to fill the caches again. What a function
-    has as `prepare` is called before it, out of the time."""
+    call}. Each runs for some calls at a time: the first of these has to fill the caches again. What a
+    function has as `prepare` is called before it, out of the time."""
     times = {name: [] for name in candidates}
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end:

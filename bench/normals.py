@@ -24,10 +24,10 @@ ARGUMENTS = PARSER.parse_args()
 if hasattr(os, "sched_setaffinity"):
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: ARGUMENTS.threads])
 
-import bpy
-import common
-import numpy as np
-import sinew
+import bpy  # noqa: E402
+import common  # noqa: E402
+import numpy as np  # noqa: E402
+import sinew  # noqa: E402
 
 SIDE = 317
 ORDERS = ("rows", "random")

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "arrays.h"
@@ -30,6 +31,23 @@ std::vector<std::uint8_t> checked_flags(const py::object& value, const char* arg
     std::vector<std::uint8_t> result(static_cast<std::size_t>(flags.size()));
     std::ranges::transform(as_span(flags), result.begin(),
                            [](float flag) { return static_cast<std::uint8_t>(flag != 0.0f); });
+    return result;
+}
+
+/// None as an empty array.
+std::vector<std::int16_t> checked_custom(const py::object& value) {
+    if (value.is_none()) return {};
+    const std::string wanted = "None or int16 [corners, 2]";
+    const auto numbers = checked<std::int32_t>(value, "custom_normals", 2, wanted);
+    if (numbers.shape(1) != 2) fail("custom_normals", wanted, describe(value));
+    std::vector<std::int16_t> result;
+    result.reserve(static_cast<std::size_t>(numbers.size()));
+    for (const std::int32_t number : as_span(numbers)) {
+        if (!std::in_range<std::int16_t>(number)) {
+            fail("custom_normals", "numbers that int16 holds", std::to_string(number));
+        }
+        result.push_back(static_cast<std::int16_t>(number));
+    }
     return result;
 }
 
@@ -61,7 +79,7 @@ std::string name_of(NormalDomain domain) { return std::string(kDomains[static_ca
 
 Normals make(const py::object& vertex_count, const py::object& face_offsets,
              const py::object& corner_vertices, const py::object& edges, const py::object& sharp_edges,
-             const py::object& sharp_faces) {
+             const py::object& sharp_faces, const py::object& custom_normals) {
     const std::size_t vertices = checked_count(vertex_count);
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
@@ -72,7 +90,9 @@ Normals make(const py::object& vertex_count, const py::object& face_offsets,
     }
     const auto of_edges = checked_flags(sharp_edges, "sharp_edges", "None or bool [edges]");
     const auto of_faces = checked_flags(sharp_faces, "sharp_faces", "None or bool [faces]");
-    return Normals({as_span(offsets), as_span(corners), as_span(ends)}, vertices, {of_edges, of_faces});
+    const auto custom = checked_custom(custom_normals);
+    return Normals({as_span(offsets), as_span(corners), as_span(ends)}, vertices,
+                   {of_edges, of_faces, custom});
 }
 
 py::array_t<float> compute(const Normals& normals, const py::object& points, const py::object& domain,
@@ -103,17 +123,22 @@ py::object flags_of(std::span<const std::uint8_t> flags) {
     return array_of(flags);
 }
 
+py::object custom_of(std::span<const std::int16_t> numbers) {
+    if (numbers.empty()) return py::none();
+    return array_of(numbers).reshape({static_cast<py::ssize_t>(numbers.size() / 2), py::ssize_t{2}});
+}
+
 py::tuple state_of(const Normals& normals) {
     const auto [topology, vertex_count, sharpness] = normals.parts();
     const auto edges = static_cast<py::ssize_t>(topology.edges.size() / 2);
     return py::make_tuple(vertex_count, array_of(topology.face_offsets), array_of(topology.corner_vertices),
                           array_of(topology.edges).reshape({edges, py::ssize_t{2}}),
-                          flags_of(sharpness.edges), flags_of(sharpness.faces));
+                          flags_of(sharpness.edges), flags_of(sharpness.faces), custom_of(sharpness.custom));
 }
 
 Normals of_state(const py::object& state) {
-    const auto part = [&](std::size_t index) { return part_of(state, 6, index); };
-    return make(part(0), part(1), part(2), part(3), part(4), part(5));
+    const auto part = [&](std::size_t index) { return part_of(state, 7, index); };
+    return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6));
 }
 
 std::string text_of(const Normals& normals) {
@@ -132,21 +157,26 @@ void bind_normals(py::module_& m) {
         "weighted by the angles of corners, of corners by fans between sharp edges. Can be pickled.")
         .def(py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
              py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
-             py::arg("sharp_faces") = py::none(),
+             py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
              "vertex_count: vertices of the mesh, at most 2^29 - 1.\n"
              "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
              "corner_vertices: int32 [corners], the vertex of each corner; at most 2^29 - 1.\n"
              "edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None "
              "where\n"
-             "    nothing is sharp.\n"
+             "    nothing is sharp or custom.\n"
              "sharp_edges: None, or bool [edges].\n"
-             "sharp_faces: None, or bool [faces], which are flat.\n\n"
+             "sharp_faces: None, or bool [faces], which are flat.\n"
+             "custom_normals: None, or int16 [corners, 2], as Blender's attribute of the name custom_normal "
+             "has "
+             "them.\n\n"
              "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
         .def_property_readonly(
             "domain", [](const Normals& normals) { return name_of(normals.domain()); },
             "The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: \"face\" where "
             "every face is\n"
-            "flat or every edge sharp, else \"corner\" where something is sharp, else \"vertex\".")
+            "flat or every edge sharp, else \"corner\" where something is sharp, else \"vertex\". With "
+            "custom normals\n"
+            "\"corner\".")
         .def_property_readonly(
             "vertex_count", [](const Normals& normals) { return normals.count(NormalDomain::vertex); },
             "Vertices of the mesh.")

@@ -21,6 +21,16 @@ def flags_of(collection: bpy.types.bpy_prop_collection, name: str) -> np.ndarray
     return flags
 
 
+def custom_of(mesh: bpy.types.Mesh) -> np.ndarray | None:
+    """int16 [corners, 2]; 4.2 does not let these be read."""
+    attribute = mesh.attributes.get("custom_normal")
+    if attribute is None:
+        return None
+    numbers = np.empty((len(attribute.data), 2), np.int32)
+    attribute.data.foreach_get("value", numbers.ravel())
+    return numbers
+
+
 def normals_of(mesh: bpy.types.Mesh) -> sinew.Normals:
     topology = mesh_io.read_topology(mesh)
     return sinew.Normals(
@@ -30,6 +40,7 @@ def normals_of(mesh: bpy.types.Mesh) -> sinew.Normals:
         topology.edges,
         sharp_edges=flags_of(mesh.edges, "use_edge_sharp"),
         sharp_faces=~flags_of(mesh.polygons, "use_smooth"),
+        custom_normals=custom_of(mesh),
     )
 
 
@@ -112,6 +123,38 @@ def test_random_meshes(share):
         assert_as_blender(mesh)
 
 
+def tilt(mesh: bpy.types.Mesh, by: float, seed: int = 2) -> None:
+    """Gives it custom normals: its own, and as much of random ones."""
+    rng = np.random.default_rng(seed)
+    normals = by_blender(mesh, "corner")
+    normals = normals + by * rng.normal(size=normals.shape)
+    mesh.normals_split_custom_set((normals / np.linalg.norm(normals, axis=1, keepdims=True)).tolist())
+    mesh.update()
+
+
+needs_stored = pytest.mark.skipif(bpy.app.version < (4, 5), reason="custom normals can not be read")
+
+
+@needs_stored
+@pytest.mark.parametrize("share", [(0, 0), (0.3, 0), (0.2, 0.3), (0, 1)], ids=str)
+def test_custom_normals(share):
+    for seed in range(3):
+        mesh = random_mesh(seed)
+        mark(mesh, *share)
+        tilt(mesh, 0.5)
+        assert_as_blender(mesh)
+        # Numbers as none would be stored, unlike in a fan, some 0.
+        rng = np.random.default_rng(seed)
+        numbers = rng.integers(-32767, 32768, (len(mesh.loops), 2)) * (rng.random((len(mesh.loops), 2)) < 0.7)
+        for value, stored in zip(numbers.tolist(), mesh.attributes["custom_normal"].data, strict=True):
+            stored.value = value
+        mesh.update()
+        assert_as_blender(mesh)
+        points = mesh_io.read_points(mesh)
+        give_points(mesh, points + rng.normal(0, 0.3, points.shape))
+        assert_as_blender(mesh)
+
+
 def degenerate(points: np.ndarray, faces: np.ndarray, seed: int) -> np.ndarray:
     """With doubled vertices, whole faces in a point or on a line, and needles."""
     rng = np.random.default_rng(seed)
@@ -185,11 +228,15 @@ def test_real_rigs(real_rig, name):
     for obj in found:
         shapes = shapes_of(obj)
         assert len(shapes) == 5
-        mesh = obj.data.copy()
-        if "custom_normal" in mesh.attributes:
-            mesh.attributes.remove(mesh.attributes["custom_normal"])
-        for share in ((0, 0), (0.05, 0.02)):
-            mark(mesh, *share)
-            for points in shapes:
-                give_points(mesh, points)
-                assert_as_blender(mesh)
+        for is_custom in (False, True) if bpy.app.version >= (4, 5) else (False,):
+            mesh = obj.data.copy()
+            give_points(mesh, shapes[0])
+            if is_custom:
+                tilt(mesh, 0.2)
+            elif mesh.has_custom_normals:
+                mesh.free_custom_normals()
+            for share in ((0, 0), (0.05, 0.02)):
+                mark(mesh, *share)
+                for points in shapes:
+                    give_points(mesh, points)
+                    assert_as_blender(mesh)

@@ -36,8 +36,9 @@ Point unit(const Point& v) {
 struct Flags {
     std::vector<std::uint8_t> edges;
     std::vector<std::uint8_t> faces;
+    std::vector<std::int16_t> custom;
 
-    [[nodiscard]] Sharpness sharpness() const { return {edges, faces}; }
+    [[nodiscard]] Sharpness sharpness() const { return {edges, faces, custom}; }
 };
 
 Flags random_flags(const Mesh& mesh, double share_of_edges, double share_of_faces) {
@@ -48,6 +49,15 @@ Flags random_flags(const Mesh& mesh, double share_of_edges, double share_of_face
     }
     for (std::size_t i = 0; i + 1 < mesh.offsets.size(); ++i) {
         flags.faces.push_back(random.uniform(0.0, 1.0) < share_of_faces ? 200 : 0);
+    }
+    return flags;
+}
+
+/// With custom normals for all corners, unlike in a fan.
+Flags with_custom(Flags flags, const Mesh& mesh) {
+    Random random(10);
+    for (std::size_t i = 0; i < 2 * mesh.corners.size(); ++i) {
+        flags.custom.push_back(static_cast<std::int16_t>(random.index(65536) - 32768));
     }
     return flags;
 }
@@ -200,7 +210,7 @@ TEST_P(NormalKernels, agree_with_the_definition_in_double) {
 
 TEST_P(NormalKernels, have_the_bits_of_any_other) {
     const Mesh mesh = mesh_with_large_faces();
-    const Flags flags = random_flags(mesh, 0.2, 0.1);
+    const Flags flags = with_custom(random_flags(mesh, 0.2, 0.1), mesh);
     const Normals normals = normals_of(mesh, flags);
     for (const NormalDomain domain : kDomains) {
         use_simd_target(simd_targets().back());
@@ -212,7 +222,7 @@ TEST_P(NormalKernels, have_the_bits_of_any_other) {
 
 TEST_P(NormalKernels, threads_change_no_bit) {
     const Mesh mesh = random_mesh(5, 150);
-    const Normals normals = normals_of(mesh, random_flags(mesh, 0.1, 0.1));
+    const Normals normals = normals_of(mesh, with_custom(random_flags(mesh, 0.1, 0.1), mesh));
     for (const NormalDomain domain : kDomains) {
         const auto expected = computed(normals, domain, mesh.rest_points, 1);
         for (const std::size_t threads : {0, 2, 3, 8}) {
@@ -229,6 +239,37 @@ TEST_P(NormalKernels, corners_of_a_smooth_mesh_have_the_normals_of_their_vertice
     for (std::size_t i = 0; i < corners.size(); ++i) {
         ASSERT_TRUE(same_bits(corners[i], vertices[static_cast<std::size_t>(mesh.corners[i])])) << i;
     }
+}
+
+TEST_P(NormalKernels, tilt_and_turn_custom_normals) {
+    Mesh mesh;
+    // A pyramid without base; its edges are at 45 degrees to the normal of its top.
+    mesh.rest_points = {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
+    for (std::int32_t i = 1; i < 5; ++i) mesh.add_face({0, i, i % 4 + 1});
+    mesh.add_edges_of_faces();
+    Flags flags;
+    flags.custom.assign(2 * mesh.corners.size(), 0);
+    // The walk begins at the edge to vertex 1, the first corner's following one.
+    const auto at_top = [&](std::int16_t tilt, std::int16_t turn) {
+        for (std::size_t corner = 0; corner < mesh.corners.size(); corner += 3) {
+            flags.custom[2 * corner] = tilt;
+            flags.custom[2 * corner + 1] = turn;
+        }
+        return Point(computed(normals_of(mesh, flags), NormalDomain::corner, mesh.rest_points)[0]);
+    };
+    const double whole = 3.0 * 0.7853981633974483;  // from +z to the edges, which go down
+    EXPECT_LT(distance(at_top(0, 20000), Point(0, 0, 1)), 1e-6);
+    EXPECT_LT(distance(at_top(32767, 0), Point(std::sin(whole), 0, std::cos(whole))), 1e-4);
+    EXPECT_LT(distance(at_top(16384, 8192), Point(0, std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
+    EXPECT_LT(distance(at_top(16384, 24575), Point(0, -std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
+    // Backwards: what is left of a turn.
+    EXPECT_LT(distance(at_top(-32767, 0), Point(std::sin(whole), 0, std::cos(whole))), 1e-4);
+    // Of unlike corners the mean, rounded to 0.
+    at_top(16384, 8192);
+    flags.custom[0] = 16384 - 3;
+    const auto result = computed(normals_of(mesh, flags), NormalDomain::corner, mesh.rest_points);
+    EXPECT_LT(distance(Point(result[0]), Point(0, std::sin(whole / 2), std::cos(whole / 2))), 1e-3);
+    EXPECT_TRUE(same_bits(result[0], result[3]));
 }
 
 TEST_P(NormalKernels, degenerate_faces_have_defined_normals) {
@@ -264,7 +305,9 @@ TEST_P(NormalKernels, faces_back_to_back_cancel) {
 
 TEST_P(NormalKernels, any_points_give_finite_normals) {
     const Mesh mesh = mesh_with_large_faces();
-    const Normals normals = normals_of(mesh, random_flags(mesh, 0.2, 0.1));
+    const Flags flags = random_flags(mesh, 0.2, 0.1);
+    const Normals normals = normals_of(mesh, flags);
+    const Normals custom = normals_of(mesh, with_custom(flags, mesh));
     Random random(4);
     const float values[] = {std::numeric_limits<float>::quiet_NaN(),
                             std::numeric_limits<float>::infinity(),
@@ -284,6 +327,10 @@ TEST_P(NormalKernels, any_points_give_finite_normals) {
                 ASSERT_TRUE(length == 0.0f || std::abs(length - 1.0f) < 1e-5f) << length;
             }
         }
+        // Without a first edge there is nothing to tilt to.
+        for (const auto& normal : computed(custom, NormalDomain::corner, points)) {
+            ASSERT_LT(glm::length(normal), 1.00001f);
+        }
     }
 }
 
@@ -298,6 +345,9 @@ TEST(Normals, say_their_domain) {
     EXPECT_EQ(domain(0.0, 0.3), NormalDomain::corner);
     EXPECT_EQ(domain(1.0, 0.0), NormalDomain::face);
     EXPECT_EQ(domain(0.3, 1.0), NormalDomain::face);
+    EXPECT_EQ(normals_of(mesh, with_custom({}, mesh)).domain(), NormalDomain::corner);
+    EXPECT_EQ(normals_of(mesh, with_custom(random_flags(mesh, 0.0, 1.0), mesh)).domain(),
+              NormalDomain::corner);
 }
 
 TEST(Normals, take_meshes_without_faces_and_without_vertices) {
@@ -320,7 +370,7 @@ TEST(Normals, write_nothing_where_sizes_do_not_fit) {
 
 TEST(Normals, say_what_they_were_made_of) {
     const Mesh mesh = random_mesh(8, 20);
-    const Normals normals = normals_of(mesh, random_flags(mesh, 0.1, 0.1));
+    const Normals normals = normals_of(mesh, with_custom(random_flags(mesh, 0.1, 0.1), mesh));
     const Normals::Parts parts = normals.parts();
     const Normals copy(parts.topology, parts.vertex_count, parts.sharpness);
     for (const NormalDomain domain : kDomains) {
@@ -339,6 +389,8 @@ TEST(Normals, refuse_what_does_not_fit) {
     EXPECT_THROW(Normals(mesh.topology(), count - 30), std::invalid_argument);
     EXPECT_THROW(Normals(mesh.topology(), count, {one, {}}), std::invalid_argument);
     EXPECT_THROW(Normals(mesh.topology(), count, {{}, one}), std::invalid_argument);
+    const std::vector<std::int16_t> numbers(mesh.corners.size());
+    EXPECT_THROW(Normals(mesh.topology(), count, {{}, {}, numbers}), std::invalid_argument);
     EXPECT_NO_THROW(Normals({mesh.offsets, mesh.corners, {}}, count, {{}, faces}));
     // Fans need the edges.
     EXPECT_THROW(Normals({mesh.offsets, mesh.corners, {}}, count, {{}, one_flat}), std::invalid_argument);

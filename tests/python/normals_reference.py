@@ -69,9 +69,9 @@ def vertex_normals(points, faces):
     return normals
 
 
-def corner_fans(faces, edges, sharp_edges=(), sharp_faces=()):
-    """Which fan each corner is in: corners of a vertex whose faces meet at smooth edges there. An edge is
-    smooth that is not sharp, nor of a sharp face, and has two faces which go along it in opposite ways."""
+def smooth_edges(faces, edges, sharp_edges=(), sharp_faces=()):
+    """{edge: the two corners that go along it} of smooth edges: those that are not sharp, nor of a sharp face,
+    and have two faces which go along them in opposite directions. A corner is (vertex, itself, the next)."""
     sharp = {frozenset(map(int, edges[i])) for i in np.flatnonzero(sharp_edges)}
     users = {}
     first = 0
@@ -83,22 +83,28 @@ def corner_fans(faces, edges, sharp_edges=(), sharp_faces=()):
                 sharp.add(edge)
             users.setdefault(edge, []).append((vertex, first + k, first + following))
         first += len(face)
-    fan = list(range(first))
+    return {
+        edge: corners
+        for edge, corners in users.items()
+        if edge not in sharp and len(corners) == 2 and corners[0][0] != corners[1][0]
+    }
+
+
+def corner_fans(faces, edges, sharp_edges=(), sharp_faces=()):
+    """Which fan each corner is in: corners of a vertex whose faces meet at smooth edges there."""
+    fan = list(range(sum(map(len, faces))))
 
     def root(corner):
         while fan[corner] != corner:
             corner = fan[corner]
         return corner
 
-    for edge, of_edge in users.items():
-        if edge in sharp or len(of_edge) != 2:
-            continue
-        (a, start_a, end_a), (b, start_b, end_b) = of_edge
-        if a == b:
-            continue
-        for corner, other in ((start_a, end_b), (end_a, start_b)):
+    for (_, start, end), (_, other_start, other_end) in smooth_edges(
+        faces, edges, sharp_edges, sharp_faces
+    ).values():
+        for corner, other in ((start, other_end), (end, other_start)):
             fan[root(corner)] = root(other)
-    return np.unique([root(corner) for corner in range(first)], return_inverse=True)[1]
+    return np.unique([root(corner) for corner in range(len(fan))], return_inverse=True)[1]
 
 
 def corner_normals(points, faces, edges, sharp_edges=(), sharp_faces=()):
@@ -108,3 +114,73 @@ def corner_normals(points, faces, edges, sharp_edges=(), sharp_faces=()):
     of_face = np.repeat(face_normals(points, faces), [len(face) for face in faces], axis=0)
     of_fan = sums(points, faces, fans, len(sizes))[fans]
     return np.where((sizes[fans] == 1)[:, None], of_face, of_fan)
+
+
+def fan_edges(fan, faces, first_corners, smooth):
+    """(vertex of the fan, vertices at the ends of its edges in the order of Blender's walk, the last of them).
+
+    The walk goes from a corner's following edge to its preceding one. It begins at the corner whose following
+    edge ends the fan, and at the first corner where none does. The edge where it began is not listed twice.
+
+    fan: its corners, rising; first_corners: of each face; smooth: the edges that are
+    """
+    before, starts = {}, []
+    for corner in fan:
+        face = np.searchsorted(first_corners, corner, side="right") - 1
+        ring, k = faces[face], corner - first_corners[face]
+        vertex, following = ring[k], ring[(k + 1) % len(ring)]
+        before[following] = ring[k - 1]
+        if frozenset((vertex, following)) not in smooth:
+            starts.insert(0, following)
+        starts.append(following)
+    walk = [starts[0]]
+    for _ in fan:
+        walk.append(before[walk[-1]])
+    other = walk[-1]
+    return vertex, walk[:-1] if other == walk[0] else walk, other
+
+
+TOO_STEEP = 0.9999
+
+
+def fan_normal(normal, reference, other, edges, custom):
+    """The custom normal `custom`, two int16, of a fan whose normal would be `normal`.
+
+    reference, other: directions of its first and last edge; edges: of all
+    """
+    along = [normal @ reference, normal @ other]
+    if max(map(abs, along)) >= TOO_STEEP:
+        return np.zeros(3)
+    if custom[0] == 0:
+        return normal
+    alpha = np.mean([angle(edge @ normal) for edge in edges])
+    x = unit(reference - along[0] * normal)
+    y = unit(np.cross(normal, x))
+    last = unit(other - along[1] * normal)
+    beta = 2 * np.pi
+    if x @ last < TOO_STEEP:
+        beta = angle(x @ last)
+        beta = 2 * np.pi - beta if y @ last < 0 else beta
+    if alpha == 0 or beta == 0:
+        return normal
+    tilt, turn = np.clip(np.asarray(custom) / 32767, -1, 1)
+    tilt *= alpha if tilt > 0 else 2 * np.pi - alpha
+    turn *= beta if turn > 0 else 2 * np.pi - beta
+    return np.cos(tilt) * normal + np.sin(tilt) * (np.cos(turn) * x + np.sin(turn) * y)
+
+
+def custom_normals(points, faces, edges, custom, sharp_edges=(), sharp_faces=()):
+    """Of corners, with custom normals: int16 [corners, 2], relative to the space of each fan."""
+    points = np.asarray(points, np.float64)
+    first_corners = np.cumsum([0, *map(len, faces)])[:-1]
+    sharp = edges, sharp_edges, sharp_faces
+    smooth, fans = smooth_edges(faces, *sharp), corner_fans(faces, *sharp)
+    normals = corner_normals(points, faces, *sharp)
+    for number in range(fans.max() + 1):
+        fan = np.flatnonzero(fans == number)
+        vertex, walk, last = fan_edges(fan, faces, first_corners, smooth)
+        directions = [unit(points[end] - points[vertex]) for end in walk]
+        other = unit(points[last] - points[vertex])
+        mean = np.trunc(np.asarray(custom, int)[fan].sum(axis=0) / len(fan))
+        normals[fan] = fan_normal(normals[fan[0]], directions[0], other, directions, mean)
+    return normals

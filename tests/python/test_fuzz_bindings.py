@@ -451,6 +451,10 @@ def test_normals(data):
     offsets, corners, ends = SHEETS[vertices]
     edges = np.array(ends, np.int32).reshape(-1, 2)
 
+    def custom_normals(count):
+        numbers = [(3 * i - 7, 900 * i) for i in range(count)]
+        return st.just((np.array(numbers, np.int16).reshape(-1, 2), None))
+
     def flags(count, is_wild):
         return st.one_of(st.none(), or_garbage(integers([i % 2 for i in range(count)], is_wild), is_wild))
 
@@ -461,12 +465,18 @@ def test_normals(data):
         data.draw(GARBAGE) if wild[3] else edges,
         data.draw(flags(len(edges), wild[4])),
         data.draw(flags(len(offsets) - 1, wild[5])),
+        data.draw(st.one_of(st.none(), or_garbage(custom_normals(len(corners)), wild[5]))),
     ]
     given_data[4:] = [None if flag is None else flag[0] for flag in given_data[4:]]
     normals = attempt(
-        lambda *given: sinew.Normals(*given[:4], sharp_edges=given[4], sharp_faces=given[5]),
+        lambda *given: sinew.Normals(
+            *given[:4], sharp_edges=given[4], sharp_faces=given[5], custom_normals=given[6]
+        ),
         given_data,
-        {"vertex_count", "face_offsets", "corner_vertices", "edges", "sharp_edges", "sharp_faces"},
+        {
+            *("vertex_count", "face_offsets", "corner_vertices", "edges"),
+            *("sharp_edges", "sharp_faces", "custom_normals"),
+        },
     )
     if normals is None:
         return

@@ -18,6 +18,13 @@ def sharp_of(mesh, edges=0.2, faces=0.1, seed=3):
     return {"sharp_edges": rng.random(len(mesh[2])) < edges, "sharp_faces": rng.random(len(mesh[1])) < faces}
 
 
+def custom_of(mesh, seed=4):
+    """int16 [corners, 2], of which some are 0."""
+    rng = np.random.default_rng(seed)
+    numbers = rng.integers(-32768, 32768, (sum(map(len, mesh[1])), 2))
+    return (numbers * (rng.random(numbers.shape) < 0.8)).astype(np.int16)
+
+
 def normals_of(mesh, **sharp):
     points, offsets, corners, edges = arrays_of(mesh)
     return sinew.Normals(len(points), offsets, corners, edges, **sharp)
@@ -44,6 +51,21 @@ def test_agrees_with_the_reference(domain, share):
     assert got.dtype == np.float32
     assert len(got) == getattr(normals, f"{domain}_count")
     np.testing.assert_allclose(got, expected_of(points, mesh, sharp, domain), rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("share", [(0.0, 0.0), (0.2, 0.1), (0.0, 1.0)])
+@pytest.mark.parametrize("is_bent", [False, True])
+def test_custom_normals_agree_with_the_reference(share, is_bent):
+    mesh = mesh_of(1)
+    sharp, custom = sharp_of(mesh, *share), custom_of(mesh)
+    points = bent(mesh[0]) if is_bent else mesh[0]
+    normals = normals_of(mesh, **sharp, custom_normals=custom)
+    assert normals.domain == "corner"
+    expected = reference.custom_normals(points, mesh[1], mesh[2], custom, **sharp)
+    np.testing.assert_allclose(normals.compute(points), expected, rtol=0, atol=1e-5)
+    plain = normals_of(mesh, **sharp)
+    for domain in ("vertex", "face"):
+        np.testing.assert_array_equal(normals.compute(points, domain), plain.compute(points, domain))
 
 
 def test_its_own_domain_is_the_least_that_will_do():
@@ -88,7 +110,7 @@ def test_writes_in_place_and_on_any_number_of_threads():
 @pytest.mark.parametrize("is_sharp", [False, True])
 def test_can_be_pickled(is_sharp):
     mesh = mesh_of(4)
-    normals = normals_of(mesh, **(sharp_of(mesh) if is_sharp else {}))
+    normals = normals_of(mesh, **(sharp_of(mesh) | {"custom_normals": custom_of(mesh)} if is_sharp else {}))
     copy = pickle.loads(pickle.dumps(normals))
     for domain in DOMAINS:
         np.testing.assert_array_equal(copy.compute(mesh[0], domain), normals.compute(mesh[0], domain))

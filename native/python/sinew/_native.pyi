@@ -459,21 +459,24 @@ class Normals:
         *,
         sharp_edges: ArrayLike | None = None,
         sharp_faces: ArrayLike | None = None,
+        custom_normals: ArrayLike | None = None,
     ) -> None:
         """vertex_count: vertices of the mesh, at most 2^29 - 1.
         face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
         corner_vertices: int32 [corners], the vertex of each corner; at most 2^29 - 1.
         edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None where
-            nothing is sharp.
+            nothing is sharp or custom.
         sharp_edges: None, or bool [edges].
         sharp_faces: None, or bool [faces], which are flat.
+        custom_normals: None, or int16 [corners, 2], as Blender's attribute of the name custom_normal has them.
 
         All input is copied. Raises ValueError that names the argument, what was wanted and what came.
         """
     @property
     def domain(self) -> str:
         """The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: "face" where every
-        face is flat or every edge sharp, else "corner" where something is sharp, else "vertex".
+        face is flat or every edge sharp, else "corner" where something is sharp, else "vertex". With
+        custom normals "corner".
         """
     @property
     def vertex_count(self) -> int:

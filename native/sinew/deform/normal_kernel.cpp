@@ -24,6 +24,9 @@ namespace HWY_NAMESPACE {
 // Shorter than its root, a vector has no direction.
 constexpr float kShortest = 1e-35f;
 
+// The cosine from which on Blender has no space for custom normals.
+constexpr float kTooSteep = 0.9999f;
+
 // A point or normal at once, or one number after the other where vectors have one lane.
 using Four = hn::CappedTag<float, 4>;
 
@@ -78,9 +81,14 @@ HWY_INLINE Vec<D4> row(D4 d, const Vec3<float>* points, std::int32_t i) {
     }
 }
 
+template <bool, class D4>
+HWY_INLINE Vec<D4> row(D4 d, const Float4* normals, std::int32_t i) {
+    return hn::Load(d, normals[i].value.data());
+}
+
 /// Row r of four: lane 4 b + c is coordinate c of the point of the lane 4 b + r.
-template <bool kIsLast, class D>
-HWY_INLINE Vec<D> rows(D d, const Vec3<float>* points, const std::int32_t* vertices) {
+template <bool kIsLast, class D, class Point>
+HWY_INLINE Vec<D> rows(D d, const Point* points, const std::int32_t* vertices) {
     if constexpr (hn::MaxLanes(D()) == 4) {
         return row<kIsLast>(d, points, vertices[0]);
     } else {
@@ -93,8 +101,8 @@ HWY_INLINE Vec<D> rows(D d, const Vec3<float>* points, const std::int32_t* verti
 #endif
 
 /// One point of each lane: whole points are read and transposed, as to gather each number takes longer.
-template <bool kIsLast, class D>
-HWY_INLINE Points<D> points_of(D d, const Vec3<float>* points, const std::int32_t* vertices) {
+template <bool kIsLast, class D, class Point>
+HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* vertices) {
 #if HWY_TARGET != HWY_SCALAR
     if constexpr (hn::MaxLanes(D()) >= 4) {
         const hn::RepartitionToWide<D> pairs;
@@ -111,8 +119,8 @@ HWY_INLINE Points<D> points_of(D d, const Vec3<float>* points, const std::int32_
                 hn::BitCast(d, hn::InterleaveLower(pairs, z01, z23))};
     }
 #endif
-    const Vec3<float>& point = points[*vertices];
-    return {hn::Set(d, point.x), hn::Set(d, point.y), hn::Set(d, point.z)};
+    const auto* const numbers = reinterpret_cast<const float*>(points + *vertices);
+    return {hn::Set(d, numbers[0]), hn::Set(d, numbers[1]), hn::Set(d, numbers[2])};
 }
 
 HWY_INLINE float* numbers_of(Float4* slots) { return reinterpret_cast<float*>(slots); }
@@ -293,6 +301,114 @@ void sum_groups(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     });
 }
 
+// --- Custom normals
+
+template <class D>
+struct SineCosine {
+    Vec<D> sine;
+    Vec<D> cosine;
+};
+
+/// Of angles of at most a turn or so, to 1e-7: by Taylor series, made to fit by Moshier (Cephes), of an eighth of a turn.
+template <class D>
+HWY_INLINE SineCosine<D> sine_cosine(D d, Vec<D> angle) {
+    const auto set = [d](float value) HWY_ATTR { return hn::Set(d, value); };
+    const auto quarters = hn::Round(hn::Mul(angle, set(0.636619772367581f)));
+    // A quarter of a turn in two parts, the first of few digits.
+    auto r = hn::Sub(angle, hn::Mul(quarters, set(1.5703125f)));
+    r = hn::Sub(r, hn::Mul(quarters, set(4.83826794896619e-4f)));
+    const auto r2 = hn::Mul(r, r);
+    auto sine = hn::Add(hn::Mul(r2, set(-1.9515295891e-4f)), set(8.3321608736e-3f));
+    sine = hn::Add(hn::Mul(r2, sine), set(-1.6666654611e-1f));
+    sine = hn::Add(r, hn::Mul(hn::Mul(r, r2), sine));
+    auto cosine = hn::Add(hn::Mul(r2, set(2.443315711809948e-5f)), set(-1.388731625493765e-3f));
+    cosine = hn::Add(hn::Mul(r2, cosine), set(4.166664568298827e-2f));
+    cosine = hn::Add(hn::Sub(set(1.0f), hn::Mul(r2, set(0.5f))), hn::Mul(hn::Mul(r2, r2), cosine));
+    const auto quadrant = hn::Sub(quarters, hn::Mul(hn::Floor(hn::Mul(quarters, set(0.25f))), set(4.0f)));
+    const auto is_odd = hn::Or(hn::Eq(quadrant, set(1.0f)), hn::Eq(quadrant, set(3.0f)));
+    const auto a = hn::IfThenElse(is_odd, cosine, sine);
+    const auto b = hn::IfThenElse(is_odd, sine, cosine);
+    const auto is_first_or_last = hn::Or(hn::Eq(quadrant, hn::Zero(d)), hn::Eq(quadrant, set(3.0f)));
+    return {hn::IfThenElse(hn::Lt(quadrant, set(2.0f)), a, hn::Neg(a)),
+            hn::IfThenElse(is_first_or_last, b, hn::Neg(b))};
+}
+
+/// How far `part` turns: by as much of `whole`, or backwards of what is left of a turn.
+template <class D>
+HWY_INLINE Vec<D> turned(D d, Vec<D> part, Vec<D> whole) {
+    const auto rest = hn::Sub(hn::Set(d, 6.28318530717959f), whole);
+    return hn::Mul(part, hn::IfThenElse(hn::Gt(part, hn::Zero(d)), whole, rest));
+}
+
+template <class D>
+HWY_INLINE Points<D> rounded_cross(const Points<D>& a, const Points<D>& b) {
+    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+
+/// The direction of what is perpendicular to `n`, of cosine `along`.
+template <class D>
+HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, Vec<D> along) {
+    const Points<D> of_n{hn::Mul(n.x, along), hn::Mul(n.y, along), hn::Mul(n.z, along)};
+    return direction(d, minus<D>(v, of_n));
+}
+
+/// The custom normals of the lanes of a block from `lane` on.
+template <class D>
+HWY_INLINE Points<D> custom_normals(D d, const NormalFrame& frame, const FanBlock& block, std::size_t lane) {
+    const std::int32_t* const vertices = frame.mesh->fan_vertices.data() + block.first_vertex + lane;
+    // All normals are in one array.
+    const Points<D> n =
+        points_of<false>(d, static_cast<const Float4*>(frame.slot_normals), block.normals.lane.data() + lane);
+    const Points<D> point = points_of<true>(d, frame.points, vertices);
+    const auto edge = [&](std::size_t k) HWY_ATTR {
+        return direction(d, minus<D>(points_of<true>(d, frame.points, vertices + (1 + k) * kLanes), point));
+    };
+    const Points<D> last = edge(0);
+    const Points<D> first = edge(1);
+    const auto along_first = rounded_dot<D>(first, n);
+    const auto along_last = rounded_dot<D>(last, n);
+    auto angles = polynomial_angle(d, along_first);
+    for (std::size_t k = 1; k < block.edges; ++k) {
+        angles = hn::Add(angles, polynomial_angle(d, rounded_dot<D>(edge(1 + k), n)));
+    }
+    const auto alpha = hn::Div(angles, hn::Set(d, static_cast<float>(block.edges)));
+    const Points<D> x = perpendicular<D>(d, first, n, along_first);
+    const Points<D> y = direction(d, rounded_cross<D>(n, x));
+    const Points<D> to_last = perpendicular<D>(d, last, n, along_last);
+    const auto steep = hn::Set(d, kTooSteep);
+    const auto whole = hn::Set(d, 6.28318530717959f);
+    const auto cosine = rounded_dot<D>(x, to_last);
+    const auto acute = polynomial_angle(d, cosine);
+    const auto is_behind = hn::Lt(rounded_dot<D>(y, to_last), hn::Zero(d));
+    const auto beta =
+        hn::IfThenElse(hn::Lt(cosine, steep), hn::IfThenElse(is_behind, hn::Sub(whole, acute), acute), whole);
+    const auto tilt = hn::Load(d, block.tilt.lane.data() + lane);
+    const SineCosine<D> of_tilt = sine_cosine(d, turned(d, tilt, alpha));
+    const SineCosine<D> of_turn = sine_cosine(d, turned(d, hn::Load(d, block.turn.lane.data() + lane), beta));
+    const auto on_x = hn::Mul(of_tilt.sine, of_turn.cosine);
+    const auto on_y = hn::Mul(of_tilt.sine, of_turn.sine);
+    const auto zero = hn::Zero(d);
+    const auto stays = hn::Or(hn::Eq(tilt, zero), hn::Or(hn::Eq(alpha, zero), hn::Eq(beta, zero)));
+    const auto has_space = hn::And(hn::Lt(hn::Abs(along_first), steep), hn::Lt(hn::Abs(along_last), steep));
+    const auto of = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+        const auto sum = hn::Add(hn::Add(hn::Mul(a, of_tilt.cosine), hn::Mul(b, on_x)), hn::Mul(c, on_y));
+        return hn::IfThenElseZero(has_space, hn::IfThenElse(stays, a, sum));
+    };
+    return {of(n.x, x.x, y.x), of(n.y, x.y, y.y), of(n.z, x.z, y.z)};
+}
+
+void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {
+    const Full d;
+    for (std::size_t b = begin; b < end; ++b) {
+        for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+            const Points<Full> normals = custom_normals(d, frame, frame.mesh->fan_blocks[b], lane);
+            store_interleaved(d, normals.x, normals.y, normals.z, hn::Zero(d),
+                              numbers_of(frame.block_normals + kLanes * b + lane));
+        }
+    }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace sinew
 HWY_AFTER_NAMESPACE();
@@ -308,12 +424,13 @@ constexpr std::array<Compute*, kTargetCount> kFaces SINEW_TARGETS_OF(faces);
 constexpr std::array<Compute*, kTargetCount> kCorners SINEW_TARGETS_OF(corners);
 constexpr std::array<Compute*, kTargetCount> kSum SINEW_TARGETS_OF(sum);
 constexpr std::array<Compute*, kTargetCount> kSumGroups SINEW_TARGETS_OF(sum_groups);
+constexpr std::array<Compute*, kTargetCount> kCustomise SINEW_TARGETS_OF(customise);
 
 }  // namespace
 
 NormalKernel normal_kernel() noexcept {
     const std::size_t target = target_in_use();
-    return {kFaces[target], kCorners[target], kSum[target], kSumGroups[target]};
+    return {kFaces[target], kCorners[target], kSum[target], kSumGroups[target], kCustomise[target]};
 }
 
 }  // namespace sinew

@@ -81,32 +81,6 @@ CornerGroups groups_of_vertices(const ByVertex& corners, const std::vector<std::
     return groups;
 }
 
-/// Fans of corners, joined two by two.
-class Fans {
-public:
-    explicit Fans(std::size_t corners) : parents_(corners) {
-        std::iota(parents_.begin(), parents_.end(), std::int32_t{0});
-    }
-
-    /// The first corner of the fan that `corner` is in.
-    std::int32_t first(std::int32_t corner) {
-        while (parents_[index(corner)] != corner) {
-            std::int32_t& parent = parents_[index(corner)];
-            corner = parent = parents_[index(parent)];
-        }
-        return corner;
-    }
-
-    void join(std::int32_t a, std::int32_t b) {
-        a = first(a);
-        b = first(b);
-        parents_[index(std::max(a, b))] = std::min(a, b);
-    }
-
-private:
-    std::vector<std::int32_t> parents_;
-};
-
 /// The two corners that go along an edge, and how many do.
 struct EdgeUse {
     std::int32_t first = -1;
@@ -115,8 +89,15 @@ struct EdgeUse {
     bool is_flat = false;
 };
 
-Fans fans_of(const MeshTopology& topology, const Sharpness& sharpness, const ByVertex& edge_ends) {
-    const CornerNeighbours around = corners_around(topology);
+/// How one goes around a vertex from corner to corner, across smooth edges.
+struct Walks {
+    std::vector<std::int32_t> next;        // [corners] across its preceding edge; -1 where that is not smooth
+    std::vector<std::uint8_t> is_reached;  // [corners] from another, or itself: its following edge is smooth
+};
+
+Walks walks_of(const MeshTopology& topology, const Sharpness& sharpness, const CornerNeighbours& around,
+               const ByVertex& edge_ends) {
+    const std::size_t corner_count = topology.corner_vertices.size();
     const std::vector<std::int32_t> edges = edges_of_corners(topology, around, edge_ends);
     std::vector<EdgeUse> uses(topology.edges.size() / 2);
     for (std::size_t face = 0; face + 1 < topology.face_offsets.size(); ++face) {
@@ -126,47 +107,145 @@ Fans fans_of(const MeshTopology& topology, const Sharpness& sharpness, const ByV
             use.is_flat |= !sharpness.faces.empty() && sharpness.faces[face] != 0;
         }
     }
-    Fans fans(topology.corner_vertices.size());
+    Walks walks{std::vector<std::int32_t>(corner_count, -1), std::vector<std::uint8_t>(corner_count)};
     for (std::size_t edge = 0; edge < uses.size(); ++edge) {
-        const EdgeUse& use = uses[edge];
-        const bool is_sharp = use.is_flat || (!sharpness.edges.empty() && sharpness.edges[edge] != 0);
-        if (is_sharp || use.count != 2) continue;
+        const auto [a, b, count, is_flat] = uses[edge];
+        const bool is_sharp = is_flat || (!sharpness.edges.empty() && sharpness.edges[edge] != 0);
+        if (is_sharp || count != 2) continue;
         // Both from the same end: one of the faces is the wrong way round.
-        if (topology.corner_vertices[index(use.first)] == topology.corner_vertices[index(use.second)])
-            continue;
-        fans.join(use.first, around.next[index(use.second)]);
-        fans.join(around.next[index(use.first)], use.second);
+        if (topology.corner_vertices[index(a)] == topology.corner_vertices[index(b)]) continue;
+        walks.next[index(around.next[index(a)])] = b;
+        walks.next[index(around.next[index(b)])] = a;
+        walks.is_reached[index(a)] = walks.is_reached[index(b)] = 1;
     }
-    return fans;
+    return walks;
 }
 
-void add_fans(Fans fans, const ByVertex& corners, const std::vector<std::uint32_t>& sources,
-              NormalMesh& mesh) {
-    const std::size_t corner_count = sources.size();
-    std::vector<std::uint32_t> sizes(corner_count);
-    for (std::size_t corner = 0; corner < corner_count; ++corner) {
-        ++sizes[index(fans.first(static_cast<std::int32_t>(corner)))];
-    }
-    // Numbered by vertex, so that what is added up together is near each other.
-    std::vector<std::uint32_t> numbers(corner_count);
-    for (const std::int32_t corner : corners.items) {
-        if (fans.first(corner) != corner || sizes[index(corner)] < 2) continue;
-        numbers[index(corner)] = static_cast<std::uint32_t>(mesh.fans.size());
-        mesh.fans.offsets.push_back(mesh.fans.offsets.back() + sizes[index(corner)]);
-    }
-    mesh.fans.sources.resize(mesh.fans.offsets.back());
-    mesh.corner_sources.resize(corner_count);
-    std::vector<std::uint32_t> next(mesh.fans.offsets);
-    for (std::size_t corner = 0; corner < corner_count; ++corner) {
-        const std::size_t first = index(fans.first(static_cast<std::int32_t>(corner)));
-        if (sizes[first] < 2) {
-            mesh.corner_sources[corner] = static_cast<std::int32_t>(sources[corner] / 4);
-            continue;
+/// Fans, by the vertices that they are at.
+class FanMaker {
+public:
+    FanMaker(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness,
+             const ByVertex& corners, const std::vector<std::uint32_t>& sources, NormalMesh& mesh)
+        : topology_(topology),
+          sharpness_(sharpness),
+          corners_(corners),
+          sources_(sources),
+          around_(corners_around(topology)),
+          walks_(walks_of(topology, sharpness, around_, by_vertex(topology.edges, vertex_count))),
+          mesh_(mesh) {}
+
+    void make() {
+        std::vector<std::uint8_t> is_seen(sources_.size());
+        mesh_.corner_sources.resize(sources_.size());
+        const auto add_from = [&](std::int32_t corner) {
+            fan_.clear();
+            for (; corner >= 0 && is_seen[index(corner)] == 0; corner = walks_.next[index(corner)]) {
+                is_seen[index(corner)] = 1;
+                fan_.push_back(corner);
+            }
+            if (!fan_.empty()) add();
+        };
+        for (std::size_t vertex = 0; vertex + 1 < corners_.offsets.size(); ++vertex) {
+            for (const std::int32_t corner : corners_.of(vertex)) {
+                if (walks_.is_reached[index(corner)] == 0) add_from(corner);
+            }
+            for (const std::int32_t corner : corners_.of(vertex)) add_from(corner);
         }
-        mesh.corner_sources[corner] = static_cast<std::int32_t>(mesh.slot_count + numbers[first]);
-        mesh.fans.sources[next[numbers[first]]++] = sources[corner];
+        if (!sharpness_.custom.empty()) customise();
     }
-}
+
+private:
+    /// What customise() needs of a fan.
+    struct Custom {
+        std::size_t first_corner;  // of walked_
+        std::uint32_t corners;
+        std::uint32_t edges;
+    };
+
+    void add() {
+        auto source = static_cast<std::int32_t>(sources_[index(fan_.front())] / 4);
+        if (fan_.size() > 1) {
+            source = static_cast<std::int32_t>(mesh_.slot_count + mesh_.fans.size());
+            for (const std::int32_t corner : fan_) mesh_.fans.sources.push_back(sources_[index(corner)]);
+            mesh_.fans.offsets.push_back(static_cast<std::uint32_t>(mesh_.fans.sources.size()));
+        }
+        for (const std::int32_t corner : fan_) mesh_.corner_sources[index(corner)] = source;
+        if (sharpness_.custom.empty()) return;
+        const auto count = static_cast<std::uint32_t>(fan_.size());
+        const bool is_round = following(fan_.front()) == preceding(fan_.back());
+        customs_.push_back({walked_.size(), count, count + (is_round ? 0 : 1)});
+        walked_.insert(walked_.end(), fan_.begin(), fan_.end());
+    }
+
+    /// Vertices at the other ends of a corner's edges.
+    [[nodiscard]] std::int32_t following(std::int32_t corner) const {
+        return topology_.corner_vertices[index(around_.next[index(corner)])];
+    }
+    [[nodiscard]] std::int32_t preceding(std::int32_t corner) const {
+        return topology_.corner_vertices[index(around_.previous[index(corner)])];
+    }
+
+    void customise() {
+        for (std::size_t begin = 0; begin < customs_.size(); begin += kFacesTogether) {
+            const auto together =
+                std::span(customs_).subspan(begin, std::min(kFacesTogether, customs_.size() - begin));
+            std::ranges::stable_sort(together, {}, &Custom::edges);
+            for (std::size_t i = 0; i < together.size();) {
+                std::size_t end = i + 1;
+                while (end < together.size() && end < i + kLanes && together[end].edges == together[i].edges)
+                    ++end;
+                add_block(together.subspan(i, end - i));
+                i = end;
+            }
+        }
+    }
+
+    void add_block(std::span<const Custom> fans) {
+        const std::size_t first_vertex = mesh_.fan_vertices.size();
+        const std::size_t first_normal = mesh_.first_of_blocks() + kLanes * mesh_.fan_blocks.size();
+        FanBlock& block =
+            mesh_.fan_blocks.emplace_back(FanBlock{first_vertex, fans.front().edges, {}, {}, {}});
+        mesh_.fan_vertices.resize(first_vertex + (2 + block.edges) * kLanes);
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const Custom& fan = fans[std::min(lane, fans.size() - 1)];
+            const auto corners =
+                std::span<const std::int32_t>(walked_).subspan(fan.first_corner, fan.corners);
+            std::int32_t* const vertices = mesh_.fan_vertices.data() + first_vertex + lane;
+            vertices[0] = topology_.corner_vertices[index(corners.front())];
+            vertices[kLanes] = preceding(corners.back());
+            // Of a fan that is not round the last edge has no corner that it follows.
+            vertices[(1 + block.edges) * kLanes] = vertices[kLanes];
+            std::int64_t tilt = 0, turn = 0;
+            for (std::size_t k = 0; k < corners.size(); ++k) {
+                vertices[(2 + k) * kLanes] = following(corners[k]);
+                tilt += sharpness_.custom[2 * index(corners[k])];
+                turn += sharpness_.custom[2 * index(corners[k]) + 1];
+            }
+            block.normals.lane[lane] = mesh_.corner_sources[index(corners.front())];
+            block.tilt.lane[lane] = part(tilt / static_cast<std::int64_t>(corners.size()));
+            block.turn.lane[lane] = part(turn / static_cast<std::int64_t>(corners.size()));
+        }
+        for (std::size_t lane = 0; lane < fans.size(); ++lane) {
+            for (std::size_t k = 0; k < fans[lane].corners; ++k) {
+                mesh_.corner_sources[index(walked_[fans[lane].first_corner + k])] =
+                    static_cast<std::int32_t>(first_normal + lane);
+            }
+        }
+    }
+
+    static float part(std::int64_t value) { return std::max(static_cast<float>(value) / 32767.0f, -1.0f); }
+
+    const MeshTopology& topology_;
+    const Sharpness& sharpness_;
+    const ByVertex& corners_;
+    const std::vector<std::uint32_t>& sources_;
+    CornerNeighbours around_;
+    Walks walks_;
+    NormalMesh& mesh_;
+    std::vector<std::int32_t> fan_;     // in the order of the walk
+    std::vector<std::int32_t> walked_;  // those of all
+    std::vector<Custom> customs_;
+};
 
 }  // namespace
 
@@ -177,8 +256,7 @@ NormalMesh make_normal_mesh(const MeshTopology& topology, std::size_t vertex_cou
     const ByVertex corners = by_vertex(topology.corner_vertices, vertex_count);
     mesh.vertices = groups_of_vertices(corners, sources);
     if (domain == NormalDomain::corner) {
-        add_fans(fans_of(topology, sharpness, by_vertex(topology.edges, vertex_count)), corners, sources,
-                 mesh);
+        FanMaker(topology, vertex_count, sharpness, corners, sources, mesh).make();
     } else if (domain == NormalDomain::face) {
         for (const std::uint32_t source : sources) {
             mesh.corner_sources.push_back(static_cast<std::int32_t>(source / 4));

@@ -33,6 +33,19 @@ struct CornerGroups {
     [[nodiscard]] std::size_t size() const noexcept { return offsets.size() - 1; }
 };
 
+/// Up to kLanes fans of as many edges. Lanes without a fan repeat the last.
+struct FanBlock {
+    std::size_t
+        first_vertex;  // of NormalMesh::fan_vertices: [2 + edges][kLanes] the fan's, then the end of its last
+                       // edge, then those of all edges, each once; from the first on in the order of a walk
+    std::uint32_t edges;
+    Lanes<std::int32_t> normals;  // the slot, or slot_count and the fan, of its normal
+    Lanes<float>
+        tilt;  // from that normal, as a part of the mean angle of edges, or of what is left of a turn
+    Lanes<float>
+        turn;  // about it, from the first edge on, as a part of the angle to the last, or of the rest
+};
+
 /// A mesh as its normals are computed.
 struct NormalMesh {
     static constexpr std::size_t kMaxBlockCorners = 32;
@@ -43,10 +56,21 @@ struct NormalMesh {
     std::size_t slot_count = 0;
 
     CornerGroups vertices;
-    CornerGroups fans;  // of at least two corners; only of the domain `corner`
-    // [corners] slot_count and the fan of a corner; the slot of its face where it is a fan by itself, and in the domain
-    // `face`. Empty in the domain `vertex`.
+    CornerGroups fans;                 // of at least two corners; only of the domain `corner`
+    std::vector<FanBlock> fan_blocks;  // of all fans; none without custom normals
+    std::vector<std::int32_t> fan_vertices;
+
+    // [corners] where the normal of each is among those of all slots, then of fans, then of lanes of fan blocks. Empty
+    // in the domain `vertex`: corners have the normals of their vertices, which are in the place of the fans'.
     std::vector<std::int32_t> corner_sources;
+
+    /// Of all these, with room for kLanes behind each kind.
+    [[nodiscard]] std::size_t normal_count() const noexcept {
+        return first_of_blocks() + kLanes * fan_blocks.size();
+    }
+    [[nodiscard]] std::size_t first_of_blocks() const noexcept {
+        return slot_count + (corner_sources.empty() ? vertices : fans).size() + kLanes;
+    }
 };
 
 /// topology  checked
@@ -54,7 +78,7 @@ struct NormalMesh {
 [[nodiscard]] NormalMesh make_normal_mesh(const MeshTopology& topology, std::size_t vertex_count,
                                           const Sharpness& sharpness, NormalDomain domain);
 
-/// What the kernels of one call read and write.
+/// What the kernels of one call read and write. Pointers to normals point into one array, see NormalMesh::corner_sources.
 struct NormalFrame {
     const NormalMesh* mesh;
     const Vec3<float>* points;
@@ -62,6 +86,7 @@ struct NormalFrame {
     float* angles;               // [slots][4]
     const CornerGroups* groups;  // to be added up
     Float4* group_normals;       // [groups], and room for kLanes
+    Float4* block_normals;       // [fan blocks][kLanes]
     Vec3<float>* normals;        // [groups] the caller's
 };
 
@@ -75,6 +100,8 @@ struct NormalKernel {
     void (*sum)(const NormalFrame& frame, std::size_t begin, std::size_t end);
     /// The same, to `group_normals`; `begin` is a multiple of kLanes.
     void (*sum_groups)(const NormalFrame& frame, std::size_t begin, std::size_t end);
+    /// Custom normals of fan blocks [begin, end), to `block_normals`.
+    void (*customise)(const NormalFrame& frame, std::size_t begin, std::size_t end);
 };
 
 /// For the instruction set in use.

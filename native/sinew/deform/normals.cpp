@@ -49,12 +49,30 @@ void check(const MeshTopology& topology, std::size_t vertex_count, const Sharpne
     }
     check_flags("sharp_edges", sharpness.edges, "edges", topology.edges.size() / 2);
     check_flags("sharp_faces", sharpness.faces, "faces", topology.face_offsets.size() - 1);
+    const std::size_t numbers = 2 * topology.corner_vertices.size();
+    if (!sharpness.custom.empty() && sharpness.custom.size() != numbers) {
+        fail("custom_normals", "none, or two numbers for each corner, " + std::to_string(numbers),
+             std::to_string(sharpness.custom.size()));
+    }
 }
 
 NormalDomain domain_of(const MeshTopology& topology, const Sharpness& sharpness) {
     if (topology.corner_vertices.empty()) return NormalDomain::vertex;
+    if (!sharpness.custom.empty()) return NormalDomain::corner;
     if (all(sharpness.faces) || all(sharpness.edges)) return NormalDomain::face;
     return any(sharpness.faces) || any(sharpness.edges) ? NormalDomain::corner : NormalDomain::vertex;
+}
+
+/// A kernel's function on [0, count).
+void run(decltype(NormalKernel::sum) function, const NormalFrame& frame, std::size_t count,
+         std::size_t threads, std::size_t chunk) {
+    struct Work {
+        decltype(NormalKernel::sum) function;
+        const NormalFrame& frame;
+    } const work{function, frame};
+    parallel_for(
+        count, threads,
+        [&work](std::size_t begin, std::size_t end) { work.function(work.frame, begin, end); }, chunk);
 }
 
 }  // namespace
@@ -66,9 +84,10 @@ struct Normals::State {
           edges(topology.edges.begin(), topology.edges.end()),
           sharp_edges(sharpness.edges.begin(), sharpness.edges.end()),
           sharp_faces(sharpness.faces.begin(), sharpness.faces.end()),
+          custom(sharpness.custom.begin(), sharpness.custom.end()),
           domain(domain_of(topology, sharpness)),
           mesh(make_normal_mesh(topology, vertices, sharpness, domain)),
-          normals(mesh.slot_count + (domain == NormalDomain::face ? 0 : corner_groups().size()) + kLanes),
+          normals(mesh.normal_count()),
           angles(4 * mesh.slot_count) {}
 
     /// Those that corners have the normals of, where these are not the faces'.
@@ -91,13 +110,14 @@ struct Normals::State {
     std::vector<std::int32_t> edges;
     std::vector<std::uint8_t> sharp_edges;
     std::vector<std::uint8_t> sharp_faces;
+    std::vector<std::int16_t> custom;
 
     NormalDomain domain;
     NormalMesh mesh;
 
     // Of one call at a time.
     mutable std::mutex mutex;
-    mutable std::vector<Float4> normals;  // of slots, then of corner_groups(), and room for a block
+    mutable std::vector<Float4> normals;  // as of NormalMesh::corner_sources
     mutable std::vector<float> angles;    // [slots][4]
 };
 
@@ -140,7 +160,7 @@ Normals::Parts Normals::parts() const noexcept {
     const State& state = *state_;
     return {{state.face_offsets, state.corner_vertices, state.edges},
             state.mesh.vertices.size(),
-            {state.sharp_edges, state.sharp_faces}};
+            {state.sharp_edges, state.sharp_faces, state.custom}};
 }
 
 void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
@@ -150,40 +170,36 @@ void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
     const NormalMesh& mesh = state.mesh;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
-    // The corners of a mesh that is all flat have the normals of their faces.
-    const bool is_of_faces = domain == NormalDomain::face ||
-                             (domain == NormalDomain::corner && state.domain == NormalDomain::face);
     const bool is_of_vertices = domain == NormalDomain::vertex;
-    Float4* const of_groups = state.normals.data() + mesh.slot_count;
-    struct Work {
-        NormalKernel kernel;
-        NormalFrame frame;
-        decltype(kernel.faces) of_faces;
-        decltype(kernel.sum) of_groups;
-    } work{normal_kernel(),
-           {&mesh, points.data(), state.normals.data(), state.angles.data(),
-            is_of_vertices ? &mesh.vertices : &state.corner_groups(), of_groups, normals.data()},
-           nullptr,
-           nullptr};
-    work.of_faces = is_of_faces ? work.kernel.faces : work.kernel.corners;
-    work.of_groups = is_of_vertices ? work.kernel.sum : work.kernel.sum_groups;
-    parallel_for(
-        mesh.blocks.size(), threads,
-        [&work](std::size_t begin, std::size_t end) { work.of_faces(work.frame, begin, end); },
-        kBlocksOfChunk);
-    if (!is_of_faces) {
-        parallel_for(
-            work.frame.groups->size(), threads,
-            [&work](std::size_t begin, std::size_t end) { work.of_groups(work.frame, begin, end); },
+    const NormalKernel kernel = normal_kernel();
+    Float4* const all = state.normals.data();
+    const NormalFrame frame{&mesh,
+                            points.data(),
+                            all,
+                            state.angles.data(),
+                            is_of_vertices ? &mesh.vertices : &state.corner_groups(),
+                            all + mesh.slot_count,
+                            all + mesh.first_of_blocks(),
+                            normals.data()};
+    // The corners of a mesh that is all flat have the normals of their faces.
+    if (domain == NormalDomain::face ||
+        (domain == NormalDomain::corner && state.domain == NormalDomain::face)) {
+        run(kernel.faces, frame, mesh.blocks.size(), threads, kBlocksOfChunk);
+    } else {
+        run(kernel.corners, frame, mesh.blocks.size(), threads, kBlocksOfChunk);
+        run(is_of_vertices ? kernel.sum : kernel.sum_groups, frame, frame.groups->size(), threads,
             kGroupsOfChunk);
     }
-    if (is_of_vertices) return;
-    if (domain == NormalDomain::face) {
-        state.write(normals, mesh.face_slots.data(), state.normals.data(), threads);
-    } else if (mesh.corner_sources.empty()) {
-        state.write(normals, state.corner_vertices.data(), of_groups, threads);
+    switch (domain) {
+        case NormalDomain::vertex: return;
+        case NormalDomain::face: return state.write(normals, mesh.face_slots.data(), all, threads);
+        case NormalDomain::corner: break;
+    }
+    run(kernel.customise, frame, mesh.fan_blocks.size(), threads, kBlocksOfChunk);
+    if (mesh.corner_sources.empty()) {
+        state.write(normals, state.corner_vertices.data(), frame.group_normals, threads);
     } else {
-        state.write(normals, mesh.corner_sources.data(), state.normals.data(), threads);
+        state.write(normals, mesh.corner_sources.data(), all, threads);
     }
 }
 

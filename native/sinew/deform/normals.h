@@ -19,10 +19,12 @@ inline constexpr std::size_t kMaxNormalCorners = 0x1FFFFFFF;
 /// What has a normal of its own.
 enum class NormalDomain { vertex, corner, face };
 
-/// Where a mesh is not shaded smoothly.
+/// How a mesh is shaded otherwise than smoothly.
 struct Sharpness {
     std::span<const std::uint8_t> edges{};  // [edges] not 0: sharp; empty: none is
     std::span<const std::uint8_t> faces{};  // [faces] not 0: flat; empty: none is
+    // [corners][2] custom normals, as Blender's attribute `custom_normal` stores them; empty: none
+    std::span<const std::int16_t> custom{};
 };
 
 /// Normals of a mesh that deforms, as Blender defines them: the arithmetic is that of Blender 4.2 to 5.2, so that on x86
@@ -33,7 +35,13 @@ struct Sharpness {
 ///           polynomial that Blender has for acos; 0 where they cancel. Without faces: the direction of its point
 ///   corner  the same of the corners of its fan; the face's where it is a fan by itself. A fan are corners of a vertex whose
 ///           faces meet there at smooth edges. An edge is smooth that is neither sharp nor of a flat face, and has two
-///           faces, which go along it in opposite directions. Where nothing is sharp: the vertex's
+///           faces, which go along it in opposite directions. Where nothing is sharp or custom: the vertex's
+///   custom  the normal n of the fan, tilted by the first number of its corners towards the plane of n and the fan's first
+///           edge, then turned about n by the second; each number is the mean of the fan's, rounded to 0. 32767 tilts by the
+///           mean angle between n and the fan's edges, -32767 by the rest of a turn, backwards; 32767 turns by the angle
+///           from the fan's first edge to its last, which is a whole turn in a fan all around. Edges are numbered from a
+///           corner's following edge to its preceding one, from the sharp edge on, or from the fan's first corner. 0 where
+///           the first or last edge is within 0.8 degrees of n or -n (their cosine is at least 0.9999)
 ///
 /// Any polygons, also with less than three corners; vertices that a face names twice have both of its corners. Points
 /// that are not finite, and faces beyond the range of floats, give finite normals, which may be 0.
@@ -43,7 +51,7 @@ struct Sharpness {
 class SINEW_EXPORT Normals {
 public:
     /// Throws std::invalid_argument that names the field, what was wanted and what came: sizes that do not fit or are
-    /// beyond the limits, vertices that there are not. Edges are read where something is sharp, and must then have every
+    /// beyond the limits, vertices that there are not. Edges are read where something is sharp or custom, and must then have every
     /// edge of each face. Nothing is kept by reference.
     Normals(const MeshTopology& topology, std::size_t vertex_count, const Sharpness& sharpness = {});
 
@@ -52,13 +60,13 @@ public:
     ~Normals();
 
     /// The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: `face` where every face is flat or
-    /// every edge sharp, else `corner` where something is sharp, else `vertex`.
+    /// every edge sharp, else `corner` where something is sharp, else `vertex`. With custom normals always `corner`.
     [[nodiscard]] NormalDomain domain() const noexcept;
 
     /// How many normals there are: the vertices, corners or faces of the mesh.
     [[nodiscard]] std::size_t count(NormalDomain domain) const noexcept;
 
-    /// Unit vectors, some of them 0 as said above.
+    /// Unit vectors, some of them 0 as said above; custom normals of fans whose edges have no length may be shorter.
     ///
     /// domain   of the result: any, whatever domain() is
     /// points   [vertices]
