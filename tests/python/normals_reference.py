@@ -70,8 +70,9 @@ def vertex_normals(points, faces):
 
 
 def smooth_edges(faces, edges, sharp_edges=(), sharp_faces=()):
-    """{edge: the two corners that go along it} of smooth edges: those that are not sharp, nor of a sharp face,
-    and have two faces which go along them in opposite directions. A corner is (vertex, itself, the next)."""
+    """{edge: the two corners that go along it} of smooth edges: those that are not sharp, nor of a sharp
+    face, and have two faces which go along them in opposite directions. A corner is (vertex, itself, the
+    next)."""
     sharp = {frozenset(map(int, edges[i])) for i in np.flatnonzero(sharp_edges)}
     users = {}
     first = 0
@@ -117,10 +118,11 @@ def corner_normals(points, faces, edges, sharp_edges=(), sharp_faces=()):
 
 
 def fan_edges(fan, faces, first_corners, smooth):
-    """(vertex of the fan, vertices at the ends of its edges in the order of Blender's walk, the last of them).
+    """(vertex of the fan, the ends of its edges in the order of Blender's walk, the last of them).
 
-    The walk goes from a corner's following edge to its preceding one. It begins at the corner whose following
-    edge ends the fan, and at the first corner where none does. The edge where it began is not listed twice.
+    The walk goes from a corner's following edge to its preceding one. It begins at the corner whose
+    following edge ends the fan, and at the first corner where none does. The edge where it began is not
+    listed twice.
 
     fan: its corners, rising; first_corners: of each face; smooth: the edges that are
     """

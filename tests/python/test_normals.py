@@ -62,7 +62,8 @@ def test_custom_normals_agree_with_the_reference(share, is_bent):
     normals = normals_of(mesh, **sharp, custom_normals=custom)
     assert normals.domain == "corner"
     expected = reference.custom_normals(points, mesh[1], mesh[2], custom, **sharp)
-    np.testing.assert_allclose(normals.compute(points), expected, rtol=0, atol=1e-5)
+    # Of edges almost along the normal the angle about it is known less well.
+    np.testing.assert_allclose(normals.compute(points), expected, rtol=0, atol=5e-5)
     plain = normals_of(mesh, **sharp)
     for domain in ("vertex", "face"):
         np.testing.assert_array_equal(normals.compute(points, domain), plain.compute(points, domain))

@@ -468,7 +468,7 @@ class Normals:
             nothing is sharp or custom.
         sharp_edges: None, or bool [edges].
         sharp_faces: None, or bool [faces], which are flat.
-        custom_normals: None, or int16 [corners, 2], as Blender's attribute of the name custom_normal has them.
+        custom_normals: None, or int16 [corners, 2], as Blender's attribute custom_normal has them.
 
         All input is copied. Raises ValueError that names the argument, what was wanted and what came.
         """
