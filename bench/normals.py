@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Normals of vertices on one thread: Sinew, Blender, libigl, trimesh and numpy in one process, on a sheet of
-317 x 317 vertices: python bench/normals.py [--threads N] [--name NAME]
+"""Normals of vertices, and of corners with sharp edges and custom normals, on one thread: Sinew, Blender,
+libigl, trimesh and numpy in one process, on a sheet of 317 x 317 vertices:
+python bench/normals.py [--threads N] [--name NAME]
 
 Once with its vertices row by row, and once in random order; as quads, and as the triangles that libigl and
-trimesh take. Blender makes as many threads as it may use processors when it starts. libigl and trimesh are
-left out where they are not installed.
+trimesh take. It takes Blender 4.5 or later, which let custom normals be read. Blender makes as many threads as
+it may use processors when it starts. libigl and trimesh are left out where they are not installed.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ import sinew  # noqa: E402
 
 SIDE = 317
 ORDERS = ("rows", "random")
-# What is marked so by case: shares of the edges and faces.
-CASES = {"smooth": (0.0, 0.0), "sharp edges": (0.02, 0.01)}
+# What is sharp by case: shares of the edges and faces.
+CASES = {"smooth": (0.0, 0.0), "sharp edges": (0.02, 0.01), "custom": (0.02, 0.01)}
 
 
 def sheet(order: str) -> tuple[np.ndarray, np.ndarray]:
@@ -53,6 +54,16 @@ def make_mesh(points: np.ndarray, faces: np.ndarray) -> bpy.types.Mesh:
     mesh.from_pydata(points, [], faces.tolist())
     mesh.shade_smooth()
     return mesh
+
+
+def tilt(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Gives it custom normals; int16 [corners, 2], as they are stored."""
+    normals = Blender(mesh, "corner").result() + np.float32([0.1, 0.2, -0.1])
+    mesh.normals_split_custom_set(unit(normals).tolist())
+    stored = mesh.attributes["custom_normal"].data
+    numbers = np.empty((len(stored), 2), np.int32)
+    stored.foreach_get("value", numbers.ravel())
+    return numbers
 
 
 def mark(mesh: bpy.types.Mesh, edges: float, faces: float) -> dict[str, np.ndarray]:
@@ -143,6 +154,8 @@ def by_trimesh(points: np.ndarray, triangles: np.ndarray) -> Call:
 def candidates_of(points: np.ndarray, faces: np.ndarray, case: str) -> dict:
     mesh = make_mesh(points, faces)
     sharp = mark(mesh, *CASES[case])
+    if case == "custom":
+        sharp["custom_normals"] = tilt(mesh)
     if case != "smooth":
         return {"sinew": by_sinew(points, faces, "corner", **sharp), "blender": Blender(mesh, "corner")}
     candidates = {
@@ -168,7 +181,12 @@ def main() -> None:
     for order in ORDERS:
         points, quads = sheet(order)
         triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-        for case, faces in (("smooth", quads), ("smooth", triangles), ("sharp edges", quads)):
+        for case, faces in (
+            ("smooth", quads),
+            ("smooth", triangles),
+            ("sharp edges", quads),
+            ("custom", quads),
+        ):
             candidates = candidates_of(points, faces, case)
             kind = f"{case}, {'quads' if faces.shape[1] == 4 else 'triangles'}, {order}"
             times = common.alternate(candidates, ARGUMENTS.seconds)

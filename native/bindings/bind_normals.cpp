@@ -160,7 +160,7 @@ void bind_normals(py::module_& m) {
              py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
              "vertex_count: vertices of the mesh, at most 2^29 - 1.\n"
              "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
-             "corner_vertices: int32 [corners], the vertex of each corner; at most 2^29 - 1.\n"
+             "corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.\n"
              "edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None "
              "where\n"
              "    nothing is sharp or custom.\n"

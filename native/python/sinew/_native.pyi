@@ -463,7 +463,7 @@ class Normals:
     ) -> None:
         """vertex_count: vertices of the mesh, at most 2^29 - 1.
         face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
-        corner_vertices: int32 [corners], the vertex of each corner; at most 2^29 - 1.
+        corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.
         edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None where
             nothing is sharp or custom.
         sharp_edges: None, or bool [edges].

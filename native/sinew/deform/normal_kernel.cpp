@@ -138,6 +138,14 @@ HWY_INLINE void store_interleaved(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, f
     }
 }
 
+/// The four numbers of each lane to every other of `to`.
+template <class D>
+HWY_INLINE void store_slots(D d, Vec<D> a, Vec<D> b, Vec<D> c, Vec<D> e, Float4* to) {
+    alignas(64) Float4 numbers[hn::MaxLanes(D())];
+    store_interleaved(d, a, b, c, e, numbers_of(numbers));
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) to[2 * lane] = numbers[lane];
+}
+
 /// The unit vector of Newell's sum.
 template <class D>
 HWY_INLINE Points<D> face_normal(D d, const Points<D>& newell) {
@@ -167,7 +175,7 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
         newell.y = hn::Add(newell.y, hn::Mul(hn::Sub(from.z, to.z), hn::Add(from.x, to.x)));
         newell.z = hn::Add(newell.z, hn::Mul(hn::Sub(from.x, to.x), hn::Add(from.y, to.y)));
     };
-    float* const angles = frame.angles + 4 * (block.first_slot + lane);
+    Float4* const slots = frame.slots + 2 * (block.first_slot + lane);
     if (count > 0) {
         const Points<D> first = points_of<kIsLast>(d, frame.points, vertices);
         const Points<D> last = points_of<kIsLast>(d, frame.points, vertices + (count - 1) * lanes);
@@ -184,8 +192,8 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
                 of_slot[k % 4] = polynomial_angle(d, hn::Neg(rounded_dot<D>(before, after)));
                 before = after;
                 if (k % 4 == 3 || k + 1 == count) {
-                    store_interleaved(d, of_slot[0], of_slot[1], of_slot[2], of_slot[3],
-                                      angles + 4 * (k / 4) * lanes);
+                    store_slots(d, of_slot[0], of_slot[1], of_slot[2], of_slot[3],
+                                slots + 2 * (k / 4) * lanes + 1);
                 }
             }
             current = next;
@@ -197,9 +205,8 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
         step(count - 1, first);
     }
     const Points<D> normal = face_normal(d, newell);
-    Float4* const slots = frame.slot_normals + block.first_slot + lane;
     for (std::size_t k = 0; k == 0 || k < count; k += 4) {
-        store_interleaved(d, normal.x, normal.y, normal.z, zero, numbers_of(slots + k / 4 * lanes));
+        store_slots(d, normal.x, normal.y, normal.z, zero, slots + 2 * (k / 4) * lanes);
     }
 }
 
@@ -245,7 +252,7 @@ HWY_INLINE void sum_group(const NormalFrame& frame, std::size_t group, Float4& s
     const Four d;
     const std::uint32_t* const offsets = frame.groups->offsets.data() + group;
     const std::uint32_t* const sources = frame.groups->sources.data();
-    const float* const normals = numbers_of(frame.slot_normals);
+    const float* const slots = numbers_of(frame.slots);
     if (offsets[0] == offsets[1]) {
         // Of a vertex without faces: fans have corners.
         const Vec3<float>& point = frame.points[group];
@@ -256,8 +263,8 @@ HWY_INLINE void sum_group(const NormalFrame& frame, std::size_t group, Float4& s
         auto numbers = hn::Zero(d);
         for (std::uint32_t i = offsets[0]; i < offsets[1]; ++i) {
             const std::uint32_t source = sources[i];
-            const auto normal = hn::Load(d, normals + (source & ~3u) + number);
-            numbers = hn::Add(numbers, hn::Mul(normal, hn::Set(d, frame.angles[source])));
+            const auto normal = hn::Load(d, slots + (source & ~7u) + number);
+            numbers = hn::Add(numbers, hn::Mul(normal, hn::Set(d, slots[source])));
         }
         hn::Store(numbers, d, sum.value.data() + number);
     }
@@ -354,15 +361,16 @@ HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, 
 }
 
 /// The custom normals of the lanes of a block from `lane` on.
-template <class D>
+template <bool kIsLast, class D>
 HWY_INLINE Points<D> custom_normals(D d, const NormalFrame& frame, const FanBlock& block, std::size_t lane) {
     const std::int32_t* const vertices = frame.mesh->fan_vertices.data() + block.first_vertex + lane;
     // All normals are in one array.
     const Points<D> n =
-        points_of<false>(d, static_cast<const Float4*>(frame.slot_normals), block.normals.lane.data() + lane);
-    const Points<D> point = points_of<true>(d, frame.points, vertices);
+        points_of<false>(d, static_cast<const Float4*>(frame.slots), block.normals.lane.data() + lane);
+    const Points<D> point = points_of<kIsLast>(d, frame.points, vertices);
     const auto edge = [&](std::size_t k) HWY_ATTR {
-        return direction(d, minus<D>(points_of<true>(d, frame.points, vertices + (1 + k) * kLanes), point));
+        return direction(d,
+                         minus<D>(points_of<kIsLast>(d, frame.points, vertices + (1 + k) * kLanes), point));
     };
     const Points<D> last = edge(0);
     const Points<D> first = edge(1);
@@ -402,7 +410,10 @@ void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     for (std::size_t b = begin; b < end; ++b) {
         for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-            const Points<Full> normals = custom_normals(d, frame, frame.mesh->fan_blocks[b], lane);
+            const FanBlock& block = frame.mesh->fan_blocks[b];
+            const Points<Full> normals = block.reads_last_point
+                                             ? custom_normals<true>(d, frame, block, lane)
+                                             : custom_normals<false>(d, frame, block, lane);
             store_interleaved(d, normals.x, normals.y, normals.z, hn::Zero(d),
                               numbers_of(frame.block_normals + kLanes * b + lane));
         }

@@ -12,6 +12,9 @@ namespace {
 // Faces that are grouped by their corners: so many that blocks are full, so few that they are near each other.
 constexpr std::size_t kFacesTogether = 2048;
 
+/// The Float4 with the normal of the slot that has the angle `source`.
+std::int32_t normal_of(std::uint32_t source) { return static_cast<std::int32_t>(source / 8 * 2); }
+
 class FaceBlocks {
 public:
     FaceBlocks(const MeshTopology& topology, std::size_t vertex_count, NormalMesh& mesh)
@@ -20,7 +23,7 @@ public:
     /// Returns the index of each corner's angle.
     std::vector<std::uint32_t> make() {
         const std::size_t face_count = topology_.face_offsets.size() - 1;
-        mesh_.face_slots.resize(face_count);
+        mesh_.face_sources.resize(face_count);
         sources_.resize(topology_.corner_vertices.size());
         std::vector<std::uint32_t> faces(face_count);
         std::iota(faces.begin(), faces.end(), 0u);
@@ -58,11 +61,11 @@ private:
                 block.reads_last_point |= topology_.corner_vertices[corner] == last_vertex_;
                 if (lane >= faces.size()) continue;
                 const std::size_t slot = mesh_.slot_count + k / 4 * lanes + lane;
-                sources_[corner] = static_cast<std::uint32_t>(4 * slot + k % 4);
+                sources_[corner] = static_cast<std::uint32_t>(8 * slot + 4 + k % 4);
             }
         }
         for (std::size_t lane = 0; lane < faces.size(); ++lane) {
-            mesh_.face_slots[faces[lane]] = static_cast<std::int32_t>(mesh_.slot_count + lane);
+            mesh_.face_sources[faces[lane]] = static_cast<std::int32_t>(2 * (mesh_.slot_count + lane));
         }
         mesh_.slot_count += std::max<std::size_t>(1, (count + 3) / 4) * lanes;
         mesh_.blocks.push_back(block);
@@ -131,6 +134,7 @@ public:
           corners_(corners),
           sources_(sources),
           around_(corners_around(topology)),
+          last_vertex_(static_cast<std::int32_t>(vertex_count) - 1),
           walks_(walks_of(topology, sharpness, around_, by_vertex(topology.edges, vertex_count))),
           mesh_(mesh) {}
 
@@ -163,9 +167,9 @@ private:
     };
 
     void add() {
-        auto source = static_cast<std::int32_t>(sources_[index(fan_.front())] / 4);
+        std::int32_t source = normal_of(sources_[index(fan_.front())]);
         if (fan_.size() > 1) {
-            source = static_cast<std::int32_t>(mesh_.slot_count + mesh_.fans.size());
+            source = static_cast<std::int32_t>(mesh_.first_of_groups() + mesh_.fans.size());
             for (const std::int32_t corner : fan_) mesh_.fans.sources.push_back(sources_[index(corner)]);
             mesh_.fans.offsets.push_back(static_cast<std::uint32_t>(mesh_.fans.sources.size()));
         }
@@ -204,7 +208,7 @@ private:
         const std::size_t first_vertex = mesh_.fan_vertices.size();
         const std::size_t first_normal = mesh_.first_of_blocks() + kLanes * mesh_.fan_blocks.size();
         FanBlock& block =
-            mesh_.fan_blocks.emplace_back(FanBlock{first_vertex, fans.front().edges, {}, {}, {}});
+            mesh_.fan_blocks.emplace_back(FanBlock{first_vertex, fans.front().edges, false, {}, {}, {}});
         mesh_.fan_vertices.resize(first_vertex + (2 + block.edges) * kLanes);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const Custom& fan = fans[std::min(lane, fans.size() - 1)];
@@ -225,6 +229,8 @@ private:
             block.tilt.lane[lane] = part(tilt / static_cast<std::int64_t>(corners.size()));
             block.turn.lane[lane] = part(turn / static_cast<std::int64_t>(corners.size()));
         }
+        const auto vertices = std::span<const std::int32_t>(mesh_.fan_vertices).subspan(first_vertex);
+        block.reads_last_point = std::ranges::find(vertices, last_vertex_) != vertices.end();
         for (std::size_t lane = 0; lane < fans.size(); ++lane) {
             for (std::size_t k = 0; k < fans[lane].corners; ++k) {
                 mesh_.corner_sources[index(walked_[fans[lane].first_corner + k])] =
@@ -240,6 +246,7 @@ private:
     const ByVertex& corners_;
     const std::vector<std::uint32_t>& sources_;
     CornerNeighbours around_;
+    std::int32_t last_vertex_;
     Walks walks_;
     NormalMesh& mesh_;
     std::vector<std::int32_t> fan_;     // in the order of the walk
@@ -259,7 +266,7 @@ NormalMesh make_normal_mesh(const MeshTopology& topology, std::size_t vertex_cou
         FanMaker(topology, vertex_count, sharpness, corners, sources, mesh).make();
     } else if (domain == NormalDomain::face) {
         for (const std::uint32_t source : sources) {
-            mesh.corner_sources.push_back(static_cast<std::int32_t>(source / 4));
+            mesh.corner_sources.push_back(normal_of(source));
         }
     }
     return mesh;

@@ -14,8 +14,8 @@ namespace sinew {
 
 /// Up to kLanes faces of as many corners, or one face of more than kMaxBlockCorners.
 ///
-/// A face has a slot for each four of its corners, with its normal and their angles. Slot s of the face in lane l of a
-/// block is number first_slot + s * lanes + l.
+/// A face has a slot for each four of its corners: two Float4, its normal and their angles, so that they are read
+/// together. Slot s of the face in lane l of a block is number first_slot + s * lanes + l.
 struct FaceBlock {
     std::size_t first_vertex;  // of NormalMesh::corner_vertices: [corners][lanes]
     std::uint32_t first_slot;
@@ -27,7 +27,7 @@ struct FaceBlock {
 /// Corners whose normals are added up: of group g, sources [offsets[g], offsets[g + 1]), in the order of the corners.
 struct CornerGroups {
     std::vector<std::uint32_t> offsets{0};
-    // Each the corner's angle, as an index into the angles of all slots. The slot is a fourth of it.
+    // The corner's angle, as an index into the numbers of all slots, which are eight each.
     std::vector<std::uint32_t> sources;
 
     [[nodiscard]] std::size_t size() const noexcept { return offsets.size() - 1; }
@@ -39,7 +39,8 @@ struct FanBlock {
         first_vertex;  // of NormalMesh::fan_vertices: [2 + edges][kLanes] the fan's, then the end of its last
                        // edge, then those of all edges, each once; from the first on in the order of a walk
     std::uint32_t edges;
-    Lanes<std::int32_t> normals;  // the slot, or slot_count and the fan, of its normal
+    bool reads_last_point;        // behind which nothing may be read
+    Lanes<std::int32_t> normals;  // as NormalMesh::corner_sources, of what they are turned from
     Lanes<float>
         tilt;  // from that normal, as a part of the mean angle of edges, or of what is left of a turn
     Lanes<float>
@@ -52,7 +53,7 @@ struct NormalMesh {
 
     std::vector<FaceBlock> blocks;
     std::vector<std::int32_t> corner_vertices;
-    std::vector<std::int32_t> face_slots;  // [faces] the first of each
+    std::vector<std::int32_t> face_sources;  // [faces] as corner_sources
     std::size_t slot_count = 0;
 
     CornerGroups vertices;
@@ -60,16 +61,17 @@ struct NormalMesh {
     std::vector<FanBlock> fan_blocks;  // of all fans; none without custom normals
     std::vector<std::int32_t> fan_vertices;
 
-    // [corners] where the normal of each is among those of all slots, then of fans, then of lanes of fan blocks. Empty
-    // in the domain `vertex`: corners have the normals of their vertices, which are in the place of the fans'.
+    // [corners] where the normal of each is: among the Float4 of all slots, then of fans, then of lanes of fan blocks.
+    // Empty in the domain `vertex`: corners have the normals of their vertices, which are in the place of the fans'.
     std::vector<std::int32_t> corner_sources;
 
-    /// Of all these, with room for kLanes behind each kind.
+    /// Float4 of all these, with room for kLanes behind each kind.
     [[nodiscard]] std::size_t normal_count() const noexcept {
         return first_of_blocks() + kLanes * fan_blocks.size();
     }
+    [[nodiscard]] std::size_t first_of_groups() const noexcept { return 2 * slot_count; }
     [[nodiscard]] std::size_t first_of_blocks() const noexcept {
-        return slot_count + (corner_sources.empty() ? vertices : fans).size() + kLanes;
+        return first_of_groups() + (corner_sources.empty() ? vertices : fans).size() + kLanes;
     }
 };
 
@@ -82,8 +84,7 @@ struct NormalMesh {
 struct NormalFrame {
     const NormalMesh* mesh;
     const Vec3<float>* points;
-    Float4* slot_normals;        // [slots] the last number 0
-    float* angles;               // [slots][4]
+    Float4* slots;               // [slots][2]
     const CornerGroups* groups;  // to be added up
     Float4* group_normals;       // [groups], and room for kLanes
     Float4* block_normals;       // [fan blocks][kLanes]

@@ -87,8 +87,7 @@ struct Normals::State {
           custom(sharpness.custom.begin(), sharpness.custom.end()),
           domain(domain_of(topology, sharpness)),
           mesh(make_normal_mesh(topology, vertices, sharpness, domain)),
-          normals(mesh.normal_count()),
-          angles(4 * mesh.slot_count) {}
+          normals(mesh.normal_count()) {}
 
     /// Those that corners have the normals of, where these are not the faces'.
     [[nodiscard]] const CornerGroups& corner_groups() const noexcept {
@@ -118,7 +117,6 @@ struct Normals::State {
     // Of one call at a time.
     mutable std::mutex mutex;
     mutable std::vector<Float4> normals;  // as of NormalMesh::corner_sources
-    mutable std::vector<float> angles;    // [slots][4]
 };
 
 void Normals::State::write(std::span<Vec3<float>> to, const std::int32_t* sources, const Float4* from,
@@ -151,7 +149,7 @@ std::size_t Normals::count(NormalDomain domain) const noexcept {
     switch (domain) {
         case NormalDomain::vertex: return state_->mesh.vertices.size();
         case NormalDomain::corner: return state_->corner_vertices.size();
-        case NormalDomain::face: return state_->mesh.face_slots.size();
+        case NormalDomain::face: return state_->mesh.face_sources.size();
     }
     return 0;
 }
@@ -176,9 +174,8 @@ void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
     const NormalFrame frame{&mesh,
                             points.data(),
                             all,
-                            state.angles.data(),
                             is_of_vertices ? &mesh.vertices : &state.corner_groups(),
-                            all + mesh.slot_count,
+                            all + mesh.first_of_groups(),
                             all + mesh.first_of_blocks(),
                             normals.data()};
     // The corners of a mesh that is all flat have the normals of their faces.
@@ -192,7 +189,7 @@ void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
     }
     switch (domain) {
         case NormalDomain::vertex: return;
-        case NormalDomain::face: return state.write(normals, mesh.face_slots.data(), all, threads);
+        case NormalDomain::face: return state.write(normals, mesh.face_sources.data(), all, threads);
         case NormalDomain::corner: break;
     }
     run(kernel.customise, frame, mesh.fan_blocks.size(), threads, kBlocksOfChunk);

@@ -14,7 +14,7 @@ namespace sinew {
 
 /// What Normals takes at most; more is refused.
 inline constexpr std::size_t kMaxNormalVertices = 0x1FFFFFFF;  // 2^29 - 1
-inline constexpr std::size_t kMaxNormalCorners = 0x1FFFFFFF;
+inline constexpr std::size_t kMaxNormalCorners = 0x0FFFFFFF;   // 2^28 - 1, and as many faces
 
 /// What has a normal of its own.
 enum class NormalDomain { vertex, corner, face };
