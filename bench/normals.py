@@ -4,8 +4,8 @@ libigl, trimesh and numpy in one process, on a sheet of 317 x 317 vertices:
 python bench/normals.py [--threads N] [--name NAME]
 
 Once with its vertices row by row, and once in random order; as quads, and as the triangles that libigl and
-trimesh take. It takes Blender 4.5 or later, which let custom normals be read. Blender makes as many threads as
-it may use processors when it starts. libigl and trimesh are left out where they are not installed.
+trimesh take. It needs Blender 4.5 or later, which let custom normals be read. Blender makes as many threads
+as it may use processors when it starts. libigl and trimesh are left out where they are not installed.
 """
 
 from __future__ import annotations
