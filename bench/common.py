@@ -42,14 +42,18 @@ def spread(times: list[float]) -> dict:
 
 def alternate(candidates: dict, seconds: float) -> dict:
     """Calls the functions of {name: function} alternately, for `seconds` each: {name: spread() of seconds a
-    call}. Each runs for some calls at a time: the first of these has to fill the caches again."""
+    call}. Each runs for some calls at a time: the first of these has to fill the caches again. What a
+    function has as `prepare` is called before it, out of the time."""
     times = {name: [] for name in candidates}
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end:
         for name, call in candidates.items():
+            prepare = getattr(call, "prepare", lambda: None)
             round_end = time.perf_counter() + 0.01
+            prepare()
             call()
             while True:
+                prepare()
                 start = time.perf_counter()
                 call()
                 now = time.perf_counter()

@@ -443,6 +443,56 @@ def test_delta_mush(data):
         same(result, copy.apply(posed, None, scale, 1))
 
 
+@many(0.2)
+@given(st.data())
+def test_normals(data):
+    vertices = data.draw(st.sampled_from(sorted(SHEETS)))
+    wild = wild_one(data.draw, 10)
+    offsets, corners, ends = SHEETS[vertices]
+    edges = np.array(ends, np.int32).reshape(-1, 2)
+
+    def custom_normals(count):
+        numbers = [(3 * i - 7, 900 * i) for i in range(count)]
+        return st.just((np.array(numbers, np.int16).reshape(-1, 2), None))
+
+    def flags(count, is_wild):
+        return st.one_of(st.none(), or_garbage(integers([i % 2 for i in range(count)], is_wild), is_wild))
+
+    given_data = [
+        data.draw(names(st.just(vertices), wild[0])),
+        data.draw(or_garbage(integers(offsets, wild[1]), wild[1]))[0],
+        data.draw(or_garbage(integers(corners, wild[2]), wild[2]))[0],
+        data.draw(GARBAGE) if wild[3] else edges,
+        data.draw(flags(len(edges), wild[4])),
+        data.draw(flags(len(offsets) - 1, wild[5])),
+        data.draw(st.one_of(st.none(), or_garbage(custom_normals(len(corners)), wild[5]))),
+    ]
+    given_data[4:] = [None if flag is None else flag[0] for flag in given_data[4:]]
+    normals = attempt(
+        lambda *given: sinew.Normals(
+            *given[:4], sharp_edges=given[4], sharp_faces=given[5], custom_normals=given[6]
+        ),
+        given_data,
+        {
+            *("vertex_count", "face_offsets", "corner_vertices", "edges"),
+            *("sharp_edges", "sharp_faces", "custom_normals"),
+        },
+    )
+    if normals is None:
+        return
+    repr(normals)
+    posed = data.draw(or_garbage(arrays((vertices, 3), wild[6]), wild[6]))[0]
+    domain = data.draw(names(st.sampled_from([None, "vertex", "corner", "face"]), wild[7]))
+    out = data.draw(names(st.sampled_from([None, np.zeros((vertices, 3), np.float32)]), wild[8]))
+    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[9]))
+    result = attempt(normals.compute, [posed, domain, out, threads], {"points", "domain", "out", "threads"})
+    if result is not None:
+        assert result.shape == (getattr(normals, f"{domain or normals.domain}_count"), 3)
+        assert np.isfinite(result).all()
+        copy = pickle.loads(pickle.dumps(normals))
+        same(result, copy.compute(posed, domain, None, 1))
+
+
 @many(0.1)
 @given(st.data())
 def test_bulge_limits(data):

@@ -443,3 +443,67 @@ class DeltaMush:
         A vertex without faces is smoothed without details. The GIL is released for large meshes. Raises
         ValueError that names the argument, what was wanted and what came.
         """
+
+@final
+class Normals:
+    """Normals of one mesh that deforms, as Blender defines them: of faces by Newell's method, of vertices
+    weighted by the angles of corners, of corners by fans between sharp edges. Can be pickled.
+    """
+
+    def __init__(
+        self,
+        vertex_count: int | np.integer[Any],
+        face_offsets: ArrayLike,
+        corner_vertices: ArrayLike,
+        edges: ArrayLike | None = None,
+        *,
+        sharp_edges: ArrayLike | None = None,
+        sharp_faces: ArrayLike | None = None,
+        custom_normals: ArrayLike | None = None,
+    ) -> None:
+        """vertex_count: vertices of the mesh, at most 2^29 - 1.
+        face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
+        corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.
+        edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None where
+            nothing is sharp or custom.
+        sharp_edges: None, or bool [edges].
+        sharp_faces: None, or bool [faces], which are flat.
+        custom_normals: None, or int16 [corners, 2], as Blender's attribute custom_normal has them.
+
+        All input is copied. Raises ValueError that names the argument, what was wanted and what came.
+        """
+    @property
+    def domain(self) -> str:
+        """The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: "face" where every
+        face is flat or every edge sharp, else "corner" where something is sharp, else "vertex". With
+        custom normals "corner".
+        """
+    @property
+    def vertex_count(self) -> int:
+        """Vertices of the mesh."""
+    @property
+    def corner_count(self) -> int:
+        """Corners of its faces."""
+    @property
+    def face_count(self) -> int:
+        """Faces of the mesh."""
+    def compute(
+        self,
+        points: ArrayLike,
+        domain: str | None = None,
+        out: NDArray[np.float32] | None = None,
+        threads: int | np.integer[Any] | None = None,
+    ) -> NDArray[np.float32]:
+        """Unit vectors, float32 [vertices, corners or faces, 3].
+
+        points: float32 [vertices, 3], deformed.
+        domain: "vertex", "corner" or "face", what each has a normal of its own; None: that of the mesh.
+        out: written and returned where given: float32, C-contiguous, aligned; never converted. Not the
+            points.
+        threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The result
+            is the same bit for bit.
+
+        A face without area has (0, 0, 1). A vertex without faces has the direction of its point. Where the
+        normals of faces cancel, that of their vertex is 0. None is NaN. The GIL is released for large
+        meshes. Raises ValueError that names the argument, what was wanted and what came.
+        """

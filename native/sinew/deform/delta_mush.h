@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "sinew/deform/mesh_topology.h"
 #include "sinew/export.h"
 #include "sinew/transform/quat.h"
 
@@ -14,13 +14,6 @@ namespace sinew {
 
 /// What DeltaMush takes at most; more is refused.
 inline constexpr std::size_t kMaxMushVertices = 0x1FFFFFFF;  // 2^29 - 1
-
-/// Faces and edges of a mesh, as vertices.
-struct MeshTopology {
-    std::span<const std::int32_t> face_offsets;     // [faces + 1] first corner of each face, then the end
-    std::span<const std::int32_t> corner_vertices;  // [corners]
-    std::span<const std::int32_t> edges;            // [edges][2] every edge of a face, and those without one
-};
 
 /// How neighbours count. In the order of DeltaMushStage::kSmoothTypes.
 enum class SmoothType { simple, length_weighted };

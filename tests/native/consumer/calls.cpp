@@ -9,6 +9,7 @@
 #include "sinew/deform/centres_of_rotation.h"
 #include "sinew/deform/deformer.h"
 #include "sinew/deform/delta_mush.h"
+#include "sinew/deform/normals.h"
 #include "sinew/deform/simd.h"
 #include "sinew/deform/thread_pool.h"
 #include "sinew/interpolate/methods.h"
@@ -64,6 +65,16 @@ void smooth() {
         expect(glm::length(points[v] - rest[v]) < 1e-6f, "delta mush gives the rest shape its details back");
 }
 
+void compute_normals() {
+    const std::vector<sinew::Vec3<float>> points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    const std::vector<std::int32_t> face_offsets{0, 3}, corners{0, 1, 2};
+    const sinew::Normals normals({face_offsets, corners, {}}, points.size());
+    std::vector<sinew::Vec3<float>> result(normals.count(sinew::NormalDomain::vertex));
+    normals.compute(normals.domain(), points, result);
+    expect(normals.domain() == sinew::NormalDomain::vertex, "Normals say that nothing is sharp");
+    for (const auto& normal : result) expect(normal == sinew::Vec3<float>(0, 0, 1), "a flat face's normal");
+}
+
 void limit_bulges() {
     const std::vector<sinew::Vec3<float>> rest{{0, 1, 0}};
     const std::vector<std::int32_t> offsets{0, 2}, bones{0, 1};
@@ -96,6 +107,7 @@ void interpolate() {
 int main() {
     deform();
     smooth();
+    compute_normals();
     limit_bulges();
     find_centres();
     interpolate();

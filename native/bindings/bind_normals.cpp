@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/numpy.h>
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "gil.h"
+#include "module.h"
+#include "sinew/deform/normals.h"
+
+namespace sinew::bindings {
+namespace {
+
+constexpr std::size_t kCornersUnderLock = 4096;  // some 30 microseconds
+
+// In the order of NormalDomain.
+constexpr std::string_view kDomains[] = {"vertex", "corner", "face"};
+
+/// None as an empty array.
+///
+/// Numbers other than 0 are set flags.
+std::vector<std::uint8_t> checked_flags(const py::object& value, const char* argument,
+                                        const std::string& wanted) {
+    if (value.is_none()) return {};
+    const auto flags = checked<float>(value, argument, 1, wanted);
+    std::vector<std::uint8_t> result(static_cast<std::size_t>(flags.size()));
+    std::ranges::transform(as_span(flags), result.begin(),
+                           [](float flag) { return static_cast<std::uint8_t>(flag != 0.0f); });
+    return result;
+}
+
+/// None as an empty array.
+std::vector<std::int16_t> checked_custom(const py::object& value) {
+    if (value.is_none()) return {};
+    const std::string wanted = "None or int16 [corners, 2]";
+    const auto numbers = checked<std::int32_t>(value, "custom_normals", 2, wanted);
+    if (numbers.shape(1) != 2) fail("custom_normals", wanted, describe(value));
+    std::vector<std::int16_t> result;
+    result.reserve(static_cast<std::size_t>(numbers.size()));
+    for (const std::int32_t number : as_span(numbers)) {
+        if (!std::in_range<std::int16_t>(number)) {
+            fail("custom_normals", "numbers that int16 holds", std::to_string(number));
+        }
+        result.push_back(static_cast<std::int16_t>(number));
+    }
+    return result;
+}
+
+std::size_t checked_count(const py::object& value) {
+    const std::string wanted = "an integer from 0 to " + std::to_string(kMaxNormalVertices);
+    const auto number = py::reinterpret_steal<py::int_>(PyNumber_Index(value.ptr()));
+    if (!number) {
+        PyErr_Clear();
+        fail("vertex_count", wanted, describe(value));
+    }
+    int overflow = 0;
+    const long long count = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
+    if (overflow != 0 || count < 0 || count > static_cast<long long>(kMaxNormalVertices)) {
+        fail("vertex_count", wanted, overflow != 0 ? "one far beyond" : std::to_string(count));
+    }
+    return static_cast<std::size_t>(count);
+}
+
+NormalDomain checked_domain(const Normals& normals, const py::object& value) {
+    if (value.is_none()) return normals.domain();
+    const std::string wanted = "None, \"vertex\", \"corner\" or \"face\"";
+    const std::string name = checked_name(value, "domain", wanted);
+    const auto* const found = std::ranges::find(kDomains, name);
+    if (found == std::end(kDomains)) fail("domain", wanted, "'" + name + "'");
+    return static_cast<NormalDomain>(found - std::begin(kDomains));
+}
+
+std::string name_of(NormalDomain domain) { return std::string(kDomains[static_cast<std::size_t>(domain)]); }
+
+Normals make(const py::object& vertex_count, const py::object& face_offsets,
+             const py::object& corner_vertices, const py::object& edges, const py::object& sharp_edges,
+             const py::object& sharp_faces, const py::object& custom_normals) {
+    const std::size_t vertices = checked_count(vertex_count);
+    const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
+    const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
+    py::array_t<std::int32_t> ends;
+    if (!edges.is_none()) {
+        ends = checked<std::int32_t>(edges, "edges", 2, "int32 [edges, 2]");
+        if (ends.shape(1) != 2) fail("edges", "int32 [edges, 2]", describe(edges));
+    }
+    const auto of_edges = checked_flags(sharp_edges, "sharp_edges", "None or bool [edges]");
+    const auto of_faces = checked_flags(sharp_faces, "sharp_faces", "None or bool [faces]");
+    const auto custom = checked_custom(custom_normals);
+    return Normals({as_span(offsets), as_span(corners), as_span(ends)}, vertices,
+                   {of_edges, of_faces, custom});
+}
+
+py::array_t<float> compute(const Normals& normals, const py::object& points, const py::object& domain,
+                           const py::object& out, const py::object& threads) {
+    const std::size_t vertices = normals.count(NormalDomain::vertex);
+    const auto given = checked_points(points, "points");
+    if (static_cast<std::size_t>(given.shape(0)) != vertices) {
+        fail("points", "float32 [" + std::to_string(vertices) + ", 3]", describe(points));
+    }
+    const NormalDomain of = checked_domain(normals, domain);
+    const std::size_t most = checked_threads(threads);
+    const std::size_t count = normals.count(of);
+    py::array_t<float> result = checked_out(out, count);
+    if (count > 0 && result.data() < given.data() + given.size() &&
+        given.data() < result.data() + result.size()) {
+        fail("out", "another array than the points", "one that shares memory with them");
+    }
+    const std::span<Vec3<float>> to{reinterpret_cast<Vec3<float>*>(result.mutable_data()), count};
+    const auto run = [&] { normals.compute(of, as_points(given), to, most); };
+    normals.count(NormalDomain::corner) > kCornersUnderLock ? without_gil(run) : run();
+    return result;
+}
+
+// --- Pickles: what was given, as the constructor takes it.
+
+py::object flags_of(std::span<const std::uint8_t> flags) {
+    if (flags.empty()) return py::none();
+    return array_of(flags);
+}
+
+py::object custom_of(std::span<const std::int16_t> numbers) {
+    if (numbers.empty()) return py::none();
+    return array_of(numbers).reshape({static_cast<py::ssize_t>(numbers.size() / 2), py::ssize_t{2}});
+}
+
+py::tuple state_of(const Normals& normals) {
+    const auto [topology, vertex_count, sharpness] = normals.parts();
+    const auto edges = static_cast<py::ssize_t>(topology.edges.size() / 2);
+    return py::make_tuple(vertex_count, array_of(topology.face_offsets), array_of(topology.corner_vertices),
+                          array_of(topology.edges).reshape({edges, py::ssize_t{2}}),
+                          flags_of(sharpness.edges), flags_of(sharpness.faces), custom_of(sharpness.custom));
+}
+
+Normals of_state(const py::object& state) {
+    const auto part = [&](std::size_t index) { return part_of(state, 7, index); };
+    return make(part(0), part(1), part(2), part(3), part(4), part(5), part(6));
+}
+
+std::string text_of(const Normals& normals) {
+    return "<sinew.Normals: " + std::to_string(normals.count(NormalDomain::vertex)) + " vertices, " +
+           std::to_string(normals.count(NormalDomain::face)) + " faces, domain " + name_of(normals.domain()) +
+           ">";
+}
+
+}  // namespace
+
+void bind_normals(py::module_& m) {
+    py::class_<Normals>(
+        m, "Normals",
+        "Normals of one mesh that deforms, as Blender defines them: of faces by Newell's method, of "
+        "vertices\n"
+        "weighted by the angles of corners, of corners by fans between sharp edges. Can be pickled.")
+        .def(py::init(&make), py::arg("vertex_count"), py::arg("face_offsets"), py::arg("corner_vertices"),
+             py::arg("edges") = py::none(), py::kw_only(), py::arg("sharp_edges") = py::none(),
+             py::arg("sharp_faces") = py::none(), py::arg("custom_normals") = py::none(),
+             "vertex_count: vertices of the mesh, at most 2^29 - 1.\n"
+             "face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.\n"
+             "corner_vertices: int32 [corners], the vertex of each corner; at most 2^28 - 1.\n"
+             "edges: int32 [edges, 2], the vertices of every edge of a face and of those without one; None "
+             "where\n"
+             "    nothing is sharp or custom.\n"
+             "sharp_edges: None, or bool [edges].\n"
+             "sharp_faces: None, or bool [faces], which are flat.\n"
+             "custom_normals: None, or int16 [corners, 2], as Blender's attribute of the name custom_normal "
+             "has "
+             "them.\n\n"
+             "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
+        .def_property_readonly(
+            "domain", [](const Normals& normals) { return name_of(normals.domain()); },
+            "The least that says how the mesh is shaded, as Blender's Mesh.normals_domain: \"face\" where "
+            "every face is\n"
+            "flat or every edge sharp, else \"corner\" where something is sharp, else \"vertex\". With "
+            "custom normals\n"
+            "\"corner\".")
+        .def_property_readonly(
+            "vertex_count", [](const Normals& normals) { return normals.count(NormalDomain::vertex); },
+            "Vertices of the mesh.")
+        .def_property_readonly(
+            "corner_count", [](const Normals& normals) { return normals.count(NormalDomain::corner); },
+            "Corners of its faces.")
+        .def_property_readonly(
+            "face_count", [](const Normals& normals) { return normals.count(NormalDomain::face); },
+            "Faces of the mesh.")
+        .def("__repr__", &text_of)
+        .def(py::pickle(&state_of, &of_state))
+        .def(
+            "compute", &compute, py::arg("points"), py::arg("domain") = py::none(),
+            py::arg("out") = py::none(), py::arg("threads") = py::none(),
+            "Unit vectors, float32 [vertices, corners or faces, 3].\n\n"
+            "points: float32 [vertices, 3], deformed.\n"
+            "domain: \"vertex\", \"corner\" or \"face\", what each has a normal of its own; None: that of "
+            "the "
+            "mesh.\n"
+            "out: written and returned where given: float32, C-contiguous, aligned; never converted. Not "
+            "the\n"
+            "    points.\n"
+            "threads: how many at most, any integer: 0 for all of the machine's; None: as many as help. The "
+            "result\n    is the same bit for bit.\n\n"
+            "A face without area has (0, 0, 1). A vertex without faces has the direction of its point. Where "
+            "the\n"
+            "normals of faces cancel, that of their vertex is 0. None is NaN. The GIL is released for large\n"
+            "meshes. Raises ValueError that names the argument, what was wanted and what came.");
+}
+
+}  // namespace sinew::bindings

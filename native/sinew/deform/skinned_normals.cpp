@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/deform/skinned_normals.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "sinew/deform/check_bind_data.h"
+#include "sinew/deform/thread_pool.h"
+
+namespace sinew {
+namespace {
+
+constexpr std::size_t kFramesWorthAThread = 8192;
+
+// Shorter than its root, a vector has no direction.
+constexpr float kShortest = 1e-35f;
+
+void check_finite(const char* argument, std::span<const Vec3<float>> vectors) {
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+        const Vec3<float>& v = vectors[i];
+        if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
+            fail(argument, "finite values", "NaN or infinity at index " + std::to_string(i));
+        }
+    }
+}
+
+void check(const RestFrames& rest, std::size_t vertex_count) {
+    const std::size_t count = rest.normals.size();
+    if (rest.vertices.empty() && count != vertex_count) {
+        fail("normals", "one for each of the " + std::to_string(vertex_count) + " vertices",
+             std::to_string(count));
+    }
+    if (!rest.vertices.empty() && rest.vertices.size() != count) {
+        fail("vertices", "none, or one for each of the " + std::to_string(count) + " normals",
+             std::to_string(rest.vertices.size()));
+    }
+    if (!rest.tangents.empty() && rest.tangents.size() != count) {
+        fail("tangents", "none, or one for each of the " + std::to_string(count) + " normals",
+             std::to_string(rest.tangents.size()));
+    }
+    for (std::size_t i = 0; i < rest.vertices.size(); ++i) {
+        if (rest.vertices[i] < 0 || static_cast<std::size_t>(rest.vertices[i]) >= vertex_count) {
+            fail("vertices", "vertices below " + std::to_string(vertex_count),
+                 std::to_string(rest.vertices[i]) + " at index " + std::to_string(i));
+        }
+    }
+    check_finite("normals", rest.normals);
+    check_finite("tangents", rest.tangents);
+}
+
+/// A power of two about as large as the mesh, so that differences of points have as many digits as the points.
+float step_of(std::span<const Vec3<float>> points) {
+    float largest = 0.0f;
+    for (const Vec3<float>& point : points) {
+        const Vec3<float> away = glm::abs(point - points.front());
+        largest = std::max({largest, away.x, away.y, away.z});
+    }
+    if (!(largest > 0.0f) || !std::isfinite(largest)) return 1.0f;
+    return std::clamp(std::exp2(std::ceil(std::log2(largest))), 1e-12f, 1e12f);
+}
+
+Vec3<float> unit(const Vec3<float>& v) {
+    const float squared = glm::dot(v, v);
+    return squared > kShortest && std::isfinite(squared) ? v / std::sqrt(squared) : Vec3<float>(0.0f);
+}
+
+}  // namespace
+
+struct SkinnedNormals::State {
+    State(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
+          const std::optional<MixData>& mix)
+        : deformers{Deformer(binding, method, mix), Deformer(binding, method, mix),
+                    Deformer(binding, method, mix), Deformer(binding, method, mix)},
+          normals(rest.normals.begin(), rest.normals.end()),
+          tangents(rest.tangents.begin(), rest.tangents.end()),
+          vertices(rest.vertices.begin(), rest.vertices.end()) {
+        const std::vector<Vec3<float>> points = binding.unpack().rest_points;
+        const float step = step_of(points);
+        for (int axis = 0; axis < 3; ++axis) {
+            std::vector<Vec3<float>> moved = points;
+            std::vector<float>& scale = inverse_steps[static_cast<std::size_t>(axis)];
+            for (Vec3<float>& point : moved) {
+                const float before = point[axis];
+                point[axis] += step;
+                // How far it is after rounding.
+                scale.push_back(1.0f / (point[axis] - before));
+            }
+            const auto i = static_cast<std::size_t>(axis);
+            deformers[1 + i].set_rest_points(moved);
+            columns[i].resize(points.size());
+        }
+    }
+
+    /// Of frames [begin, end).
+    void move_frames(std::span<const Vec3<float>> points, std::span<Vec3<float>> to_normals,
+                     std::span<Vec3<float>> to_tangents, std::size_t begin, std::size_t end) const noexcept {
+        for (std::size_t i = begin; i < end; ++i) {
+            const std::size_t vertex = vertices.empty() ? i : static_cast<std::size_t>(vertices[i]);
+            const auto column = [&](std::size_t axis) {
+                return inverse_steps[axis][vertex] * (columns[axis][vertex] - points[vertex]);
+            };
+            const Vec3<float> a = column(0), b = column(1), c = column(2);
+            const Vec3<float>& n = normals[i];
+            to_normals[i] = unit(n.x * glm::cross(b, c) + n.y * glm::cross(c, a) + n.z * glm::cross(a, b));
+            if (to_tangents.empty()) continue;
+            const Vec3<float>& t = tangents[i];
+            to_tangents[i] = unit(t.x * a + t.y * b + t.z * c);
+        }
+    }
+
+    std::array<Deformer, 4> deformers;  // of the rest points, then of these a step along each axis away
+    std::array<std::vector<float>, 3> inverse_steps;
+    std::vector<Vec3<float>> normals;
+    std::vector<Vec3<float>> tangents;
+    std::vector<std::int32_t> vertices;
+
+    // Of one call at a time.
+    mutable std::mutex mutex;
+    mutable std::array<std::vector<Vec3<float>>, 3> columns;
+};
+
+SkinnedNormals::SkinnedNormals(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
+                               const std::optional<MixData>& mix) {
+    check(rest, binding.vertex_count());
+    state_ = std::make_unique<State>(binding, method, rest, mix);
+}
+
+SkinnedNormals::SkinnedNormals(SkinnedNormals&&) noexcept = default;
+SkinnedNormals& SkinnedNormals::operator=(SkinnedNormals&&) noexcept = default;
+SkinnedNormals::~SkinnedNormals() = default;
+
+std::size_t SkinnedNormals::frame_count() const noexcept { return state_->normals.size(); }
+bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.empty(); }
+const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformers[0]; }
+
+void SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+                            std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
+                            std::span<Vec3<float>> tangents) const noexcept {
+    const State& state = *state_;
+    const std::size_t most_tangents = state.tangents.size();
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return;
+    if (!tangents.empty() && tangents.size() != most_tangents) return;
+    const std::scoped_lock lock(state.mutex);
+    state.deformers[0].deform(posed_from_rest, options, points);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        state.deformers[1 + axis].deform(posed_from_rest, options, state.columns[axis]);
+    }
+    struct Work {
+        const State& state;
+        std::span<const Vec3<float>> points;
+        std::span<Vec3<float>> normals;
+        std::span<Vec3<float>> tangents;
+    } const work{state, points, normals, tangents};
+    const std::size_t threads = options.threads > 0
+                                    ? options.threads
+                                    : std::min(hardware_threads(), 1 + normals.size() / kFramesWorthAThread);
+    parallel_for(normals.size(), threads, [&work](std::size_t begin, std::size_t end) {
+        work.state.move_frames(work.points, work.normals, work.tangents, begin, end);
+    });
+}
+
+}  // namespace sinew

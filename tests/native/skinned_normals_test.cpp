@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Skinned normals and tangents, beside the differences of each method's definition in double.
+#include "sinew/deform/skinned_normals.h"
+
+#include <stdexcept>
+
+#include "scene.h"
+
+namespace sinew {
+namespace {
+
+using test::distance;
+using test::Random;
+using test::random_scene;
+using test::same_bits;
+using test::Scene;
+
+struct Frames {
+    std::vector<Vec3<float>> normals;
+    std::vector<Vec3<float>> tangents;
+    std::vector<std::int32_t> vertices;
+
+    [[nodiscard]] RestFrames rest() const { return {normals, tangents, vertices}; }
+};
+
+/// A normal and a tangent across it for each vertex.
+Frames random_frames(std::size_t count) {
+    Random random(5);
+    Frames frames;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Mat3<double> axes = glm::mat3_cast(random.rotation());
+        frames.normals.push_back(Vec3<float>(axes[2]));
+        frames.tangents.push_back(Vec3<float>(axes[0]));
+    }
+    return frames;
+}
+
+struct Result {
+    std::vector<Vec3<float>> points;
+    std::vector<Vec3<float>> normals;
+    std::vector<Vec3<float>> tangents;
+};
+
+Result deformed(const SkinnedNormals& skinned, const Scene& scene, std::size_t threads = 0) {
+    Result result{std::vector<Vec3<float>>(skinned.deformer().vertex_count()),
+                  std::vector<Vec3<float>>(skinned.frame_count()),
+                  std::vector<Vec3<float>>(skinned.has_tangents() ? skinned.frame_count() : 0)};
+    DeformOptions options;
+    options.threads = threads;
+    skinned.deform(scene.posed_from_rest, options, result.points, result.normals, result.tangents);
+    return result;
+}
+
+class SkinnedByMethod : public testing::TestWithParam<MethodInfo> {};
+
+INSTANTIATE_TEST_SUITE_P(every, SkinnedByMethod, testing::ValuesIn(kMethods),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST_P(SkinnedByMethod, points_are_the_deformers) {
+    const Scene scene = random_scene(3, 3000, 1.0);
+    const Binding binding(scene.data());
+    const Frames frames = random_frames(scene.rest_points.size());
+    const auto result = deformed(SkinnedNormals(binding, GetParam(), frames.rest()), scene);
+    std::vector<Vec3<float>> expected(scene.rest_points.size());
+    Deformer(binding, GetParam()).deform(scene.posed_from_rest, {}, expected);
+    EXPECT_TRUE(std::ranges::equal(result.points, expected, same_bits<float>));
+}
+
+TEST_P(SkinnedByMethod, stay_at_rest_in_the_rest_pose) {
+    Scene scene = random_scene(3, 500, 1.0);
+    for (auto& bone : scene.posed_from_rest) bone = {};
+    const Frames frames = random_frames(scene.rest_points.size());
+    const auto result = deformed(SkinnedNormals(Binding(scene.data()), GetParam(), frames.rest()), scene);
+    for (std::size_t i = 0; i < result.normals.size(); ++i) {
+        ASSERT_LT(distance(result.normals[i], frames.normals[i]), 2e-6f) << i;
+        ASSERT_LT(distance(result.tangents[i], frames.tangents[i]), 2e-6f) << i;
+    }
+}
+
+TEST_P(SkinnedByMethod, threads_change_no_bit) {
+    const Scene scene = random_scene(4, 20000, 1.0);
+    const SkinnedNormals skinned(Binding(scene.data()), GetParam(),
+                                 random_frames(scene.rest_points.size()).rest());
+    const auto expected = deformed(skinned, scene, 1);
+    for (const std::size_t threads : {0, 2, 5}) {
+        const auto result = deformed(skinned, scene, threads);
+        EXPECT_TRUE(std::ranges::equal(result.normals, expected.normals, same_bits<float>));
+        EXPECT_TRUE(std::ranges::equal(result.tangents, expected.tangents, same_bits<float>));
+    }
+}
+
+TEST(SkinnedNormals, of_a_sheared_bone_are_perpendicular_to_what_the_plane_becomes) {
+    Scene scene;
+    scene.add_vertex({1, 2, 3}, {{0, 1.0f}});
+    scene.posed_from_rest.resize(1);
+    scene.posed_from_rest[0].linear = Mat3<float>(1, 0, 0, 0.5f, 2, 0, 0, -1, 3);
+    const Mat3<double> m(scene.posed_from_rest[0].linear);
+    Frames frames;
+    frames.normals = {glm::normalize(Vec3<float>(1, 2, 2)), {0, 0, 3}};
+    frames.tangents = {glm::normalize(Vec3<float>(2, -2, 1)), {1, 0, 0}};
+    frames.vertices = {0, 0};
+    const auto result = deformed(SkinnedNormals(Binding(scene.data()), Lbs::info, frames.rest()), scene);
+    for (std::size_t i = 0; i < 2; ++i) {
+        const auto normal = glm::normalize(glm::inverse(glm::transpose(m)) * Vec3<double>(frames.normals[i]));
+        const auto tangent = glm::normalize(m * Vec3<double>(frames.tangents[i]));
+        EXPECT_LT(distance(Vec3<double>(result.normals[i]), normal), 1e-5);
+        EXPECT_LT(distance(Vec3<double>(result.tangents[i]), tangent), 1e-5);
+        EXPECT_LT(std::abs(glm::dot(result.normals[i], result.tangents[i])), 1e-5f);
+    }
+}
+
+TEST(SkinnedNormals, flattened_to_a_line_are_0) {
+    Scene scene;
+    scene.add_vertex({1, 2, 3}, {{0, 1.0f}});
+    scene.posed_from_rest.resize(1);
+    scene.posed_from_rest[0].linear = Mat3<float>(1, 0, 0, 0, 0, 0, 0, 0, 0);
+    Frames frames;
+    frames.normals = {{0, 0, 1}};
+    frames.tangents = {{0, 1, 0}};
+    const auto result = deformed(SkinnedNormals(Binding(scene.data()), Lbs::info, frames.rest()), scene);
+    EXPECT_EQ(result.normals[0], Vec3<float>(0));
+    EXPECT_EQ(result.tangents[0], Vec3<float>(0));
+}
+
+TEST(SkinnedNormals, refuse_what_does_not_fit) {
+    const Scene scene = random_scene(1, 20, 1.0);
+    const Binding binding(scene.data());
+    const auto make = [&](const auto& change) {
+        Frames frames = random_frames(20);
+        change(frames);
+        return SkinnedNormals(binding, Dq::info, frames.rest());
+    };
+    EXPECT_NO_THROW(make([](Frames&) {}));
+    EXPECT_THROW(make([](Frames& f) { f.normals.pop_back(); }), std::invalid_argument);
+    EXPECT_THROW(make([](Frames& f) { f.tangents.pop_back(); }), std::invalid_argument);
+    EXPECT_THROW(make([](Frames& f) { f.vertices = {1, 2}; }), std::invalid_argument);
+    EXPECT_THROW(make([](Frames& f) { f.vertices.assign(20, 20); }), std::invalid_argument);
+    EXPECT_THROW(make([](Frames& f) { f.normals[3].y = NAN; }), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sinew

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""sinew.Normals beside float64 numpy, as numpy people use it."""
+
+import pickle
+
+import normals_reference as reference
+import numpy as np
+import pytest
+import sinew
+from test_delta_mush import arrays_of, bent, mesh_of
+
+DOMAINS = ("vertex", "corner", "face")
+
+
+def sharp_of(mesh, edges=0.2, faces=0.1, seed=3):
+    """{argument of Normals: flags}"""
+    rng = np.random.default_rng(seed)
+    return {"sharp_edges": rng.random(len(mesh[2])) < edges, "sharp_faces": rng.random(len(mesh[1])) < faces}
+
+
+def custom_of(mesh, seed=4):
+    """int16 [corners, 2], of which some are 0."""
+    rng = np.random.default_rng(seed)
+    numbers = rng.integers(-32768, 32768, (sum(map(len, mesh[1])), 2))
+    return (numbers * (rng.random(numbers.shape) < 0.8)).astype(np.int16)
+
+
+def normals_of(mesh, **sharp):
+    points, offsets, corners, edges = arrays_of(mesh)
+    return sinew.Normals(len(points), offsets, corners, edges, **sharp)
+
+
+def expected_of(points, mesh, sharp, domain):
+    faces, edges = mesh[1:]
+    if domain == "face":
+        return reference.face_normals(points, faces)
+    if domain == "vertex":
+        return reference.vertex_normals(points, faces)
+    return reference.corner_normals(points, faces, edges, **sharp)
+
+
+@pytest.mark.parametrize("share", [(0.2, 0.1), (0.7, 0.0), (0.0, 0.4)])
+@pytest.mark.parametrize("domain", DOMAINS)
+def test_agrees_with_the_reference(domain, share):
+    mesh = mesh_of(1)
+    sharp = sharp_of(mesh, *share)
+    points = bent(mesh[0])
+    normals = normals_of(mesh, **sharp)
+    assert normals.domain == "corner"
+    got = normals.compute(points, domain)
+    assert got.dtype == np.float32
+    assert len(got) == getattr(normals, f"{domain}_count")
+    np.testing.assert_allclose(got, expected_of(points, mesh, sharp, domain), rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("share", [(0.0, 0.0), (0.2, 0.1), (0.0, 1.0)])
+@pytest.mark.parametrize("is_bent", [False, True])
+def test_custom_normals_agree_with_the_reference(share, is_bent):
+    mesh = mesh_of(1)
+    sharp, custom = sharp_of(mesh, *share), custom_of(mesh)
+    points = bent(mesh[0]) if is_bent else mesh[0]
+    normals = normals_of(mesh, **sharp, custom_normals=custom)
+    assert normals.domain == "corner"
+    expected = reference.custom_normals(points, mesh[1], mesh[2], custom, **sharp)
+    # Of edges almost along the normal the angle about it is known less well.
+    np.testing.assert_allclose(normals.compute(points), expected, rtol=0, atol=5e-5)
+    plain = normals_of(mesh, **sharp)
+    for domain in ("vertex", "face"):
+        np.testing.assert_array_equal(normals.compute(points, domain), plain.compute(points, domain))
+
+
+def test_its_own_domain_is_the_least_that_will_do():
+    mesh = mesh_of(2)
+    points = bent(mesh[0])
+    flat = {"sharp_faces": np.ones(len(mesh[1]), bool)}
+    for sharp, domain in (({}, "vertex"), (sharp_of(mesh), "corner"), (flat, "face")):
+        normals = normals_of(mesh, **sharp)
+        assert normals.domain == domain
+        np.testing.assert_array_equal(normals.compute(points), normals.compute(points, domain))
+    corners = normals_of(mesh).compute(points, "corner")
+    np.testing.assert_array_equal(corners, normals_of(mesh).compute(points)[np.concatenate(mesh[1])])
+    corners = normals_of(mesh, **flat).compute(points, "corner")
+    sizes = [len(face) for face in mesh[1]]
+    np.testing.assert_array_equal(corners, np.repeat(normals.compute(points), sizes, axis=0))
+
+
+def test_edges_are_needed_only_where_something_is_sharp():
+    mesh = mesh_of(2)
+    points, offsets, corners, edges = arrays_of(mesh)
+    normals = sinew.Normals(len(points), offsets, corners)
+    np.testing.assert_array_equal(normals.compute(points), normals_of(mesh).compute(points))
+    flat = np.arange(len(mesh[1])) == 4
+    with pytest.raises(ValueError, match="edges: expected every edge of each face"):
+        sinew.Normals(len(points), offsets, corners, sharp_faces=flat)
+    assert sinew.Normals(len(points), offsets, corners, edges, sharp_faces=flat).domain == "corner"
+
+
+def test_writes_in_place_and_on_any_number_of_threads():
+    mesh = mesh_of(2, size=140)
+    normals = normals_of(mesh, **sharp_of(mesh))
+    points = bent(mesh[0])
+    for domain in DOMAINS:
+        expected = normals.compute(points, domain, threads=1)
+        for threads in (None, 0, 2, np.int8(3), 10**30):
+            np.testing.assert_array_equal(normals.compute(points, domain, threads=threads), expected)
+        out = np.zeros_like(expected)
+        assert normals.compute(points.astype(np.float64).tolist(), domain, out) is out
+        np.testing.assert_array_equal(out, expected)
+
+
+@pytest.mark.parametrize("is_sharp", [False, True])
+def test_can_be_pickled(is_sharp):
+    mesh = mesh_of(4)
+    normals = normals_of(mesh, **(sharp_of(mesh) | {"custom_normals": custom_of(mesh)} if is_sharp else {}))
+    copy = pickle.loads(pickle.dumps(normals))
+    for domain in DOMAINS:
+        np.testing.assert_array_equal(copy.compute(mesh[0], domain), normals.compute(mesh[0], domain))
+    domain = "corner" if is_sharp else "vertex"
+    faces = len(mesh[1])
+    assert repr(copy) == repr(normals) == f"<sinew.Normals: 148 vertices, {faces} faces, domain {domain}>"
+
+
+def test_says_what_it_refuses():
+    mesh = mesh_of(7)
+    points, offsets, corners, edges = arrays_of(mesh)
+    for arguments, sharp, message in (
+        ((-1, offsets, corners, edges), {}, "vertex_count: expected an integer from 0 to 536870911, got -1"),
+        ((1.5, offsets, corners, edges), {}, "vertex_count: expected an integer .*, got float"),
+        ((100, offsets, corners, edges), {}, "corner_vertices: expected vertices from 0 to 99"),
+        ((148, offsets[:-1], corners, edges), {}, "face_offsets: expected to rise"),
+        ((148, offsets, corners, edges.ravel()), {}, r"edges: expected int32 \[edges, 2\]"),
+        ((148, offsets, corners, edges), {"sharp_edges": [True]}, "sharp_edges: expected none, or one for"),
+        (
+            (148, offsets, corners, edges),
+            {"sharp_faces": "x"},
+            r"sharp_faces: expected None or bool \[faces\]",
+        ),
+    ):
+        with pytest.raises(ValueError, match=message):
+            sinew.Normals(*arguments, **sharp)
+    normals = sinew.Normals(148, offsets, corners, edges)
+    with pytest.raises(ValueError, match=r"points: expected float32 \[148, 3\]"):
+        normals.compute(points[:-1])
+    with pytest.raises(ValueError, match='domain: expected None, "vertex", "corner" or "face", got'):
+        normals.compute(points, "edge")
+    with pytest.raises(ValueError, match="out: expected writable"):
+        normals.compute(points, out=np.zeros((148, 3)))
+    with pytest.raises(ValueError, match="out: expected another array than the points"):
+        normals.compute(points, out=points)
