@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The stage `delta_mush` on whole chunks: see skinning/delta_mush.h for what it computes.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "sinew/deform/kernels.h"
@@ -41,36 +43,50 @@ HWY_INLINE void smooth_numbers(D d, const float* point, float* to, std::size_t v
     hn::StoreU(hn::MulAdd(factor, hn::NegMulAdd(count, old, sum), old), d, to);
 }
 
+/// A run that is consecutive, several vertices at once, where all have the same factor.
+///
+/// kValence  neighbours of each vertex
+template <std::size_t kValence>
+HWY_INLINE void smooth_consecutive(const MushFrame& frame, const MushRun& run) {
+    const Full d;
+    const float* const point = numbers_of(frame.from + run.begin);
+    float* const to = numbers_of(frame.to + run.begin);
+    const float* neighbours[kValence];
+    for (std::size_t k = 0; k < kValence; ++k) {
+        neighbours[k] = numbers_of(frame.from + frame.mesh->neighbours[run.first_neighbour + k]);
+    }
+    const auto factor = hn::Set(d, frame.factors[run.begin]);
+    const auto smooth_at = [&](std::size_t at) HWY_ATTR {
+        smooth_numbers<kValence>(d, point + at, to + at, kValence, factor,
+                                 [&](std::size_t k) HWY_ATTR { return neighbours[k] + at; });
+    };
+    // The first and the last vector overlap others, so that those between are stored to whole cache lines.
+    const std::size_t lanes = hn::Lanes(d);
+    const std::size_t last = 4 * static_cast<std::size_t>(run.end - run.begin) - lanes;
+    smooth_at(0);
+    const std::size_t beyond_line = reinterpret_cast<std::uintptr_t>(to) / sizeof(float) % lanes;
+    for (std::size_t at = lanes - beyond_line; at < last; at += lanes) smooth_at(at);
+    smooth_at(last);
+}
+
 /// kValence  neighbours of each vertex; 0: those of the run
 template <std::size_t kValence>
 HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
-    const Four four;
-    const Full full;
-    const std::size_t valence = run.valence;
-    const std::int32_t* const first = frame.mesh->neighbours.data() + run.first_neighbour;
-    const float* const from = numbers_of(frame.from);
-    float* const to = numbers_of(frame.to);
-    const std::size_t end = 4 * static_cast<std::size_t>(run.end);
-    std::size_t at = 4 * static_cast<std::size_t>(run.begin);
-    const std::size_t begin = at;
-    if (run.is_consecutive && frame.is_uniform) {
-        // The numbers of several vertices at once.
-        const auto factor = hn::Set(full, frame.factors[run.begin]);
-        for (; at + hn::Lanes(full) <= end; at += hn::Lanes(full)) {
-            smooth_numbers<kValence>(full, from + at, to + at, valence, factor, [&](std::size_t k) HWY_ATTR {
-                return from + 4 * static_cast<std::size_t>(first[k]) + (at - begin);
-            });
-        }
+    if constexpr (kValence > 0) {
+        if (run.is_consecutive && frame.is_uniform) return smooth_consecutive<kValence>(frame, run);
     }
-    const std::size_t step = run.is_consecutive ? 0 : valence;
-    for (; at < end; at += hn::Lanes(four)) {
-        const std::size_t vertex = (at - begin) / 4;
-        const std::int32_t* const neighbours = first + vertex * step;
-        const std::size_t number = run.is_consecutive ? at - begin : at % 4;
-        smooth_numbers<kValence>(four, from + at, to + at, valence, hn::Set(four, frame.factors[at / 4]),
-                                 [&](std::size_t k) HWY_ATTR {
-                                     return from + 4 * static_cast<std::size_t>(neighbours[k]) + number;
-                                 });
+    const Four d;
+    const std::int32_t* neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    const std::size_t step = run.is_consecutive ? 0 : run.valence;
+    for (std::size_t i = run.begin; i < run.end; ++i, neighbours += step) {
+        const std::size_t behind = run.is_consecutive ? i - run.begin : 0;
+        for (std::size_t at = 0; at < 4; at += hn::Lanes(d)) {
+            smooth_numbers<kValence>(
+                d, numbers_of(frame.from + i) + at, numbers_of(frame.to + i) + at, run.valence,
+                hn::Set(d, frame.factors[i]), [&](std::size_t k) HWY_ATTR {
+                    return numbers_of(frame.from + static_cast<std::size_t>(neighbours[k]) + behind) + at;
+                });
+        }
     }
 }
 
@@ -318,8 +334,8 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
             store_lanes(d, add_scaled<D>(point, share, sum), finished, lane);
         }
         for (std::size_t i = 0; i < block.vertices; ++i) {
-            const float* const numbers = numbers_of(finished + i);
-            frame.points[mesh.vertices[block.first_vertex + i]] = {numbers[0], numbers[1], numbers[2]};
+            std::memcpy(&frame.points[mesh.vertices[block.first_vertex + i]], finished + i,
+                        sizeof(Vec3<float>));
         }
     }
 }
@@ -349,34 +365,36 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
 }
 
 /// Vertices [begin, begin + count) of a run, at most kLanes.
-HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, const MushRun& run, std::size_t begin,
-                                       std::size_t count) {
+///
+/// index_of(vertex, k)  the k-th neighbour of a vertex from `begin` on; kIsConsecutive: of the first alone
+template <bool kIsConsecutive, class Index>
+HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valence, std::size_t begin,
+                                       std::size_t count, const Index& index_of) {
     const Full d;
     using D = Full;
-    const std::int32_t* const first = frame.mesh->neighbours.data() + run.first_neighbour;
-    const std::size_t valence = run.valence;
-    const std::size_t from_run = begin - run.begin;
     const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
-    alignas(64) Float4 result[kLanes];
-    // In the order of the lanes; beyond the last vertex there is room.
+    // Beyond the last vertex there is room.
     alignas(64) float factors[kLanes];
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        factors[lane] = frame.factors[begin + (frame.is_uniform ? 0 : vertex_of(lane))];
+    for (std::size_t lane = 0; lane < kLanes && !frame.is_uniform; ++lane) {
+        factors[lane] = frame.factors[begin + vertex_of(lane)];
     }
+    alignas(64) Float4 rest[kLanes];
+    Float4* const result = count == kLanes ? frame.to + begin : rest;
     for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
         if (vertex_of(lane) >= count) continue;
         const Points<D> point = consecutive_points(d, frame.from + begin, lane);
         Points<D> sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
         auto lengths = hn::Zero(d);
         for (std::size_t k = 0; k < valence; ++k) {
-            const auto index_of = [&](std::size_t vertex) HWY_ATTR {
-                return first[(from_run + HWY_MIN(vertex, count - 1)) * valence + k];
-            };
-            const Points<D> neighbour =
-                run.is_consecutive
-                    ? consecutive_points(d, frame.from + static_cast<std::size_t>(first[k]) + from_run, lane)
-                    : collected_points(d, frame.from, index_of, lane);
-            const Points<D> edge = subtract<D>(neighbour, point);
+            Points<D> edge;
+            if constexpr (kIsConsecutive) {
+                const Float4* const neighbours = frame.from + static_cast<std::size_t>(index_of(0, k));
+                edge = subtract<D>(consecutive_points(d, neighbours, lane), point);
+            } else {
+                const auto of_vertex = [&](std::size_t vertex)
+                                           HWY_ATTR { return index_of(HWY_MIN(vertex, count - 1), k); };
+                edge = subtract<D>(collected_points(d, frame.from, of_vertex, lane), point);
+            }
             const auto squared = dot_of<D>(edge, edge);
             const auto length = hn::Mul(squared, inverse_length(d, squared));
             sum = add_scaled<D>(sum, length, edge);
@@ -384,10 +402,11 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, const MushRun& ru
         }
         const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
         const auto factor =
-            hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(hn::Load(d, factors + lane), lengths));
-        store_lanes(d, add_scaled<D>(point, factor, sum), result, lane);
+            frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
+        const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factor, lengths));
+        store_lanes(d, add_scaled<D>(point, share, sum), result, lane);
     }
-    for (std::size_t i = 0; i < count; ++i) frame.to[begin + i] = result[i];
+    if (result == rest) std::copy_n(rest, count, frame.to + begin);
 }
 
 /// An iteration by length.
@@ -395,12 +414,24 @@ void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end
     const MushMesh& mesh = *frame.mesh;
     for (std::size_t r = mesh.first_runs[begin]; r < mesh.first_runs[end]; ++r) {
         const MushRun& run = mesh.runs[r];
-        if (run.valence == 0) {
+        const std::size_t valence = run.valence;
+        if (valence == 0) {
             copy_run(frame, run);
             continue;
         }
+        const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
         for (std::size_t i = run.begin; i < run.end; i += kLanes) {
-            smooth_lanes_by_length(frame, run, i, HWY_MIN(kLanes, run.end - i));
+            const std::size_t count = HWY_MIN(kLanes, run.end - i);
+            if (run.is_consecutive) {
+                const auto behind = static_cast<std::int32_t>(i - run.begin);
+                smooth_lanes_by_length<true>(frame, valence, i, count,
+                                             [&](std::size_t, std::size_t k) HWY_ATTR { return neighbours[k] + behind; });
+            } else {
+                smooth_lanes_by_length<false>(frame, valence, i, count, [&](std::size_t vertex, std::size_t k) HWY_ATTR {
+                    return neighbours[vertex * valence + k];
+                });
+                neighbours += kLanes * valence;
+            }
         }
     }
 }

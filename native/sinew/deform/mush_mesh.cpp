@@ -299,9 +299,12 @@ private:
 
     void sort_neighbours() {
         for (const std::uint32_t vertex : mesh_.vertices) {
+            const std::size_t chunk = first_sorted_.size() / MushMesh::kChunk;
             first_sorted_.push_back(sorted_.size());
             for (const std::int32_t neighbour : neighbours_.of(vertex)) {
                 sorted_.push_back(place_[index(neighbour)]);
+                const std::size_t of_neighbour = index(sorted_.back()) / MushMesh::kChunk;
+                mesh_.reach = std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
             }
             std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
         }

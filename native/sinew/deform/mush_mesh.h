@@ -52,6 +52,7 @@ struct MushMesh {
     std::vector<std::uint32_t> vertices;  // [vertices] as the caller numbers them
     std::vector<MushRun> runs;
     std::vector<std::uint32_t> first_runs;  // [chunks + 1]
+    std::size_t reach = 1;                  // neighbours are at most so many chunks away; at least 1
     std::vector<std::int32_t> neighbours;
     std::vector<MushBlock> blocks;
     std::vector<std::uint32_t> first_blocks;  // [chunks + 1]
