@@ -210,20 +210,6 @@ HWY_INLINE Vec<D> dot_of(const Points<D>& a, const Points<D>& b) {
     return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
-/// 1 / sqrt(x), x positive and finite; a root and a division of 16 lanes take longer than the rest of a corner.
-template <class D>
-HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
-    // At least 12 digits, by one of Newton's steps but the last two or three of 24.
-    const auto root = hn::ApproximateReciprocalSqrt(x);
-    const auto product = hn::Mul(x, root);
-    const auto half = hn::Mul(root, hn::Set(d, 0.5f));
-    return hn::Mul(half, hn::NegMulAdd(product, root, hn::Set(d, 3.0f)));
-#else
-    return hn::Div(hn::Set(d, 1.0f), hn::Sqrt(x));
-#endif
-}
-
 /// 1 / length of a vector by its square; 0 of one without a direction.
 template <class D>
 HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
