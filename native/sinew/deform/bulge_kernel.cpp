@@ -4,6 +4,7 @@
 #include "sinew/deform/bulge_kernel.h"
 
 #include <array>
+#include <limits>
 
 #include "sinew/deform/targets.h"
 
@@ -22,24 +23,20 @@ template <class D>
 HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
     const Block& block = from.blocks[b];
     const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
-    constexpr std::size_t kMax = hn::MaxLanes(D());
-    if constexpr (kMax == 1) {
+    if constexpr (hn::MaxLanes(D()) == 1) {
         const Vec3<float>& point = from.points[*vertices];
         return {hn::Set(d, point.x), hn::Set(d, point.y), hn::Set(d, point.z)};
     } else {
-        Points<D> points;
-        if (block.consecutive) {
-            hn::LoadInterleaved3(d, &from.points[block.output + lane].x, points.x, points.y, points.z);
-            return points;
-        }
-        alignas(64) float numbers[3][kMax];
-        for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-            const Vec3<float>& point = from.points[vertices[i]];
-            numbers[0][i] = point.x;
-            numbers[1][i] = point.y;
-            numbers[2][i] = point.z;
-        }
-        return {hn::Load(d, numbers[0]), hn::Load(d, numbers[1]), hn::Load(d, numbers[2])};
+        if (block.consecutive) return load_consecutive(d, &from.points[block.output + lane].x);
+#if HWY_TARGET == HWY_AVX3
+        if (block.runs > 0) return load_runs(d, from.runs + block.output, block.runs, &from.points->x);
+#endif
+        const hn::RebindToSigned<D> integers;
+        const auto vertex = hn::LoadU(integers, vertices);
+        const auto first = hn::Add(vertex, hn::Add(vertex, vertex));
+        const float* const points = &from.points->x;
+        return {hn::GatherIndex(d, points, first), hn::GatherIndex(d, points + 1, first),
+                hn::GatherIndex(d, points + 2, first)};
     }
 }
 
@@ -90,7 +87,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
             stretched = hn::IfThenElse(heavier, stretch, stretched);
         }
     }
-    const float* const distances = frame.distances[b].of[static_cast<std::size_t>(kForm)].lane.data() + lane;
+    const float* const distances = frame.distances[static_cast<std::size_t>(kForm)][b].lane.data() + lane;
     const Vec<D> allowed = hn::Mul(hn::Load(d, distances), stretched);
     const Vec<D> squared = squared_length(to_bones);
     const auto bulges = hn::Gt(squared, hn::Mul(allowed, allowed));
@@ -98,7 +95,8 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     if (!changes) return point;
     Vec<D> amount = hn::Set(d, frame.strength);
     if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
-    const Vec<D> less = hn::Sub(hn::Set(d, 1.0f), hn::Div(allowed, hn::Sqrt(squared)));
+    const Vec<D> finite = hn::Min(squared, hn::Set(d, std::numeric_limits<float>::max()));
+    const Vec<D> less = hn::NegMulAdd(allowed, inverse_root(d, finite), hn::Set(d, 1.0f));
     const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
     if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
     const float* const rows = frame.model_from_bones->value.data();
@@ -234,8 +232,8 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
                 if (weight > most) of_heaviest = distance;
                 most = weight > most ? weight : most;
             }
-            frame.distances[b].of[0].lane[lane] = kAllowance * mean;
-            frame.distances[b].of[1].lane[lane] = kAllowance * of_heaviest;
+            frame.distances[0][b].lane[lane] = kAllowance * mean;
+            frame.distances[1][b].lane[lane] = kAllowance * of_heaviest;
         }
     }
 }
@@ -264,7 +262,7 @@ BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcep
     const Vec3<double>& head = segment.head;
     const Vec3<double> along = segment.tail - head;
     const double squared = glm::dot(along, along);
-    const Vec3<double> per_length = squared > 0.0 ? along / squared : Vec3<double>(0.0);
+    const Vec3<double> per_length = along * (squared > 0.0 ? 1.0 / squared : 0.0);
     return {float4(head.x, head.y, head.z, stretch), float4(along.x, along.y, along.z, 0.0),
             float4(per_length.x, per_length.y, per_length.z, 0.0)};
 }

@@ -16,16 +16,11 @@ struct BulgeBone {
     Float4 per_length;
 };
 
-/// Distances at rest, of each form, with the allowance.
-struct BulgeDistances {
-    Lanes<float> of[2];
-};
-
 /// What the kernels of one call read and write.
 struct BulgeFrame {
     const PackedMesh* mesh;
     const BulgeBone* bones;       // of PackedMesh::used_bones
-    BulgeDistances* distances;    // [blocks]
+    Lanes<float>* distances[2];   // of each form: [blocks] at rest, with the allowance
     const Lanes<float>* weights;  // [blocks]; null: all 1
     BulgeForm form;
     float strength;

@@ -83,7 +83,7 @@ struct BulgeLimit::State {
     std::size_t bone_count = 0;
     std::vector<BoneSegment<float>> segments;  // of mesh.used_bones
     std::vector<Lanes<float>> weights;         // [blocks], or none
-    std::vector<BulgeDistances> distances;
+    std::vector<Lanes<float>> distances[2];    // as of BulgeFrame
     Affine<float> bones_from_model;
     bool same_space = true;
     Float4 to_bones[kDisplacementRows];
@@ -107,7 +107,7 @@ BulgeLimit::State::State(const BulgeLimitData& data) {
         segments.push_back(data.segments[static_cast<std::size_t>(bone)]);
     }
     bones.resize(segments.size());
-    distances.resize(mesh.blocks.size());
+    for (std::vector<Lanes<float>>& of_form : distances) of_form.resize(mesh.blocks.size());
     if (!data.weights.empty()) {
         weights = pack_values(mesh, data.weights);
         for (Lanes<float>& block : weights) {
@@ -121,7 +121,7 @@ BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
     // Distances are only written by measure(), which no other call runs beside.
     return {&mesh,
             bones.data(),
-            const_cast<BulgeDistances*>(distances.data()),
+            {const_cast<Lanes<float>*>(distances[0].data()), const_cast<Lanes<float>*>(distances[1].data())},
             weights.empty() ? nullptr : weights.data(),
             BulgeForm::continuous,
             1.0f,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -17,6 +18,9 @@ namespace {
 
 // Below this, waking a second thread at each iteration costs more than it saves.
 constexpr std::size_t kVerticesWorthAThread = 16384;
+
+// So many iterations go over the mesh one close behind the other, while what they read is in the cache.
+constexpr std::size_t kIterationsTogether = 8;
 
 // With a radius, the share of vertices whose edges may be too short for the number of iterations.
 constexpr double kShareOfShortest = 0.1;
@@ -179,19 +183,87 @@ void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMush
     kernel.take_details(frame, kept.data(), details.data(), 0, mesh.chunk_count());
 }
 
-std::size_t DeltaMush::State::smooth(const MushKernel& kernel, std::size_t threads) const noexcept {
-    const bool by_length = settings.type == SmoothType::length_weighted;
-    struct Work {
-        decltype(kernel.smooth) run;
-        MushFrame frame;
-    } work{by_length ? kernel.smooth_by_length : kernel.smooth,
-           {&mesh, nullptr, nullptr, factors.data(), is_uniform, nullptr, 0.0f, nullptr}};
-    for (std::size_t i = 0; i < iterations; ++i) {
-        work.frame.from = smoothed[i % 2].data();
-        work.frame.to = smoothed[1 - i % 2].data();
+/// Iterations that go over the mesh together. Each chunk reads what the iteration before made of those at most
+/// mesh.reach beside it, and then writes over what the one before that made of itself.
+class Iterations {
+public:
+    Iterations(const MushMesh& mesh, std::size_t threads) noexcept
+        : chunks_(mesh.chunk_count()),
+          reach_(mesh.reach),
+          parts_(std::min(threads, chunks_)),
+          most_(std::min(kIterationsTogether, 1 + (parts_ > 1 ? chunks_ / parts_ / (2 * reach_) : kIterationsTogether))) {}
+
+    /// At most so many can be run together.
+    [[nodiscard]] std::size_t most() const noexcept { return most_; }
+
+    /// Calls run(iteration, chunk) for each of `count`.
+    template <class Run>
+    void run(std::size_t count, const Run& run) const {
+        struct Work {
+            const Iterations& self;
+            std::size_t count;
+            const Run& run;
+        } const work{*this, count, run};
         parallel_for(
-            mesh.chunk_count(), threads,
-            [&work](std::size_t begin, std::size_t end) { work.run(work.frame, begin, end); }, 1);
+            parts_, parts_,
+            [&work](std::size_t begin, std::size_t end) {
+                for (std::size_t part = begin; part < end; ++part) work.self.run_part(part, work.count, work.run);
+            },
+            1);
+        if (parts_ < 2 || count < 2) return;
+        parallel_for(
+            parts_ - 1, parts_,
+            [&work](std::size_t begin, std::size_t end) {
+                for (std::size_t part = begin; part < end; ++part) work.self.run_between(part, work.count, work.run);
+            },
+            1);
+    }
+
+private:
+    [[nodiscard]] std::size_t begin(std::size_t part) const noexcept { return chunks_ * part / parts_; }
+
+    /// What needs no chunk of another part: with each iteration fewer.
+    template <class Run>
+    void run_part(std::size_t part, std::size_t count, const Run& run) const {
+        const std::size_t first = begin(part);
+        const std::size_t last = begin(part + 1);
+        for (std::size_t front = first; front < last + reach_ * (count - 1); ++front) {
+            for (std::size_t i = 0; i < count && front >= first + reach_ * i; ++i) {
+                const std::size_t chunk = front - reach_ * i;
+                const bool is_before = part > 0 && chunk < first + reach_ * i;
+                const bool is_behind = chunk + (part + 1 < parts_ ? reach_ * i : 0) >= last;
+                if (!is_before && !is_behind) run(i, chunk);
+            }
+        }
+    }
+
+    /// What is missing then between a part and the next.
+    template <class Run>
+    void run_between(std::size_t part, std::size_t count, const Run& run) const {
+        const std::size_t middle = begin(part + 1);
+        for (std::size_t i = 1; i < count; ++i) {
+            for (std::size_t chunk = middle - reach_ * i; chunk < middle + reach_ * i; ++chunk) run(i, chunk);
+        }
+    }
+
+    std::size_t chunks_;
+    std::size_t reach_;
+    std::size_t parts_;
+    std::size_t most_;
+};
+
+std::size_t DeltaMush::State::smooth(const MushKernel& kernel, std::size_t threads) const noexcept {
+    if (mesh.vertices.empty()) return 0;
+    const auto smooth_chunk =
+        settings.type == SmoothType::length_weighted ? kernel.smooth_by_length : kernel.smooth;
+    const Iterations together(mesh, threads);
+    for (std::size_t first = 0; first < iterations; first += together.most()) {
+        together.run(std::min(together.most(), iterations - first), [&](std::size_t i, std::size_t chunk) {
+            const std::size_t from = (first + i) % 2;
+            const MushFrame frame{&mesh, smoothed[from].data(), smoothed[1 - from].data(), factors.data(),
+                                  is_uniform, nullptr, 0.0f, nullptr};
+            smooth_chunk(frame, chunk, chunk + 1);
+        });
     }
     return iterations % 2;
 }
@@ -237,7 +309,8 @@ void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
             const std::vector<std::uint32_t>& vertices = work.state.mesh.vertices;
             end = std::min(end * MushMesh::kChunk, vertices.size());
             for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
-                work.state.smoothed[0][i] = float4_of(work.frame.points[vertices[i]]);
+                // The fourth number is 0 always.
+                std::memcpy(&work.state.smoothed[0][i], &work.frame.points[vertices[i]], sizeof(Vec3<float>));
             }
         },
         1);

@@ -120,6 +120,21 @@ HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, 
     return add_scaled<D>(start, scale, cross<D>(axis, inner));
 }
 
+/// 1 / sqrt(x), x positive and finite. A root and a division of 16 lanes take as long as some twenty
+/// other operations.
+template <class D>
+HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+    // At least 12 digits, by one of Newton's steps but the last two or three of 24.
+    const auto root = hn::ApproximateReciprocalSqrt(x);
+    const auto product = hn::Mul(x, root);
+    const auto half = hn::Mul(root, hn::Set(d, 0.5f));
+    return hn::Mul(half, hn::NegMulAdd(product, root, hn::Set(d, 3.0f)));
+#else
+    return hn::Div(hn::Set(d, 1.0f), hn::Sqrt(x));
+#endif
+}
+
 #if HWY_TARGET == HWY_AVX3
 
 /// x y z x y z ... of the points, in three vectors.
@@ -146,6 +161,38 @@ HWY_INLINE Interleaved interleave(const Points<Full>& p) {
         result.part[i].raw = _mm512_mask_blend_ps(kEveryThirdFrom[(5 - i) % 3], xy, z);
     }
     return result;
+}
+
+/// Undoes interleave(), in the same way.
+HWY_INLINE Points<Full> deinterleave(const Interleaved& from) {
+    alignas(64) static constexpr std::int32_t kFrom[3][16] = {
+        {0, 3, 6, 9, 12, 15, 2, 5, 8, 11, 14, 1, 4, 7, 10, 13},
+        {1, 4, 7, 10, 13, 0, 3, 6, 9, 12, 15, 2, 5, 8, 11, 14},
+        {2, 5, 8, 11, 14, 1, 4, 7, 10, 13, 0, 3, 6, 9, 12, 15}};
+    constexpr __mmask16 kEveryThirdFrom[3] = {0x9249, 0x2492, 0x4924};
+    const auto coordinate = [&](int c) HWY_ATTR {
+        __m512 all = _mm512_mask_blend_ps(kEveryThirdFrom[(c + 2) % 3], from.part[0].raw, from.part[1].raw);
+        all = _mm512_mask_blend_ps(kEveryThirdFrom[(c + 1) % 3], all, from.part[2].raw);
+        return Vec<Full>{_mm512_permutexvar_ps(_mm512_load_si512(kFrom[c]), all)};
+    };
+    return {coordinate(0), coordinate(1), coordinate(2)};
+}
+
+HWY_INLINE Points<Full> load_consecutive(Full d, const float* from) {
+    return deinterleave({{hn::LoadU(d, from), hn::LoadU(d, from + kLanes), hn::LoadU(d, from + 2 * kLanes)}});
+}
+
+/// Whole vectors with all but the run's own floats masked out. Lanes that repeat the last vertex are 0.
+HWY_INLINE Points<Full> load_runs(Full d, const Run* runs, std::size_t count, const float* points) {
+    Interleaved interleaved{{hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
+    for (std::size_t r = 0; r < count; ++r) {
+        const float* const from = points + 3 * static_cast<std::ptrdiff_t>(runs[r].origin);
+        for (std::size_t i = 0; i < 3; ++i) {
+            __m512& part = interleaved.part[i].raw;
+            part = _mm512_mask_loadu_ps(part, runs[r].floats[i], from + kLanes * i);
+        }
+    }
+    return deinterleave(interleaved);
 }
 
 HWY_INLINE void store_consecutive(Full d, const Points<Full>& p, float* to) {
@@ -177,6 +224,13 @@ inline HWY_NOINLINE void scatter_points(Full d, const std::int32_t* vertices, Ve
 }
 
 #else
+
+template <class D>
+HWY_INLINE Points<D> load_consecutive(D d, const float* from) {
+    Points<D> points;
+    hn::LoadInterleaved3(d, from, points.x, points.y, points.z);
+    return points;
+}
 
 template <class D>
 HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The stage `delta_mush` on whole chunks: see skinning/delta_mush.h for what it computes.
 // This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "sinew/deform/kernels.h"
@@ -41,36 +43,50 @@ HWY_INLINE void smooth_numbers(D d, const float* point, float* to, std::size_t v
     hn::StoreU(hn::MulAdd(factor, hn::NegMulAdd(count, old, sum), old), d, to);
 }
 
+/// A run that is consecutive, several vertices at once, where all have the same factor.
+///
+/// kValence  neighbours of each vertex
+template <std::size_t kValence>
+HWY_INLINE void smooth_consecutive(const MushFrame& frame, const MushRun& run) {
+    const Full d;
+    const float* const point = numbers_of(frame.from + run.begin);
+    float* const to = numbers_of(frame.to + run.begin);
+    const float* neighbours[kValence];
+    for (std::size_t k = 0; k < kValence; ++k) {
+        neighbours[k] = numbers_of(frame.from + frame.mesh->neighbours[run.first_neighbour + k]);
+    }
+    const auto factor = hn::Set(d, frame.factors[run.begin]);
+    const auto smooth_at = [&](std::size_t at) HWY_ATTR {
+        smooth_numbers<kValence>(d, point + at, to + at, kValence, factor,
+                                 [&](std::size_t k) HWY_ATTR { return neighbours[k] + at; });
+    };
+    // The first and the last vector overlap others, so that those between are stored to whole cache lines.
+    const std::size_t lanes = hn::Lanes(d);
+    const std::size_t last = 4 * static_cast<std::size_t>(run.end - run.begin) - lanes;
+    smooth_at(0);
+    const std::size_t beyond_line = reinterpret_cast<std::uintptr_t>(to) / sizeof(float) % lanes;
+    for (std::size_t at = lanes - beyond_line; at < last; at += lanes) smooth_at(at);
+    smooth_at(last);
+}
+
 /// kValence  neighbours of each vertex; 0: those of the run
 template <std::size_t kValence>
 HWY_INLINE void smooth_run(const MushFrame& frame, const MushRun& run) {
-    const Four four;
-    const Full full;
-    const std::size_t valence = run.valence;
-    const std::int32_t* const first = frame.mesh->neighbours.data() + run.first_neighbour;
-    const float* const from = numbers_of(frame.from);
-    float* const to = numbers_of(frame.to);
-    const std::size_t end = 4 * static_cast<std::size_t>(run.end);
-    std::size_t at = 4 * static_cast<std::size_t>(run.begin);
-    const std::size_t begin = at;
-    if (run.is_consecutive && frame.is_uniform) {
-        // The numbers of several vertices at once.
-        const auto factor = hn::Set(full, frame.factors[run.begin]);
-        for (; at + hn::Lanes(full) <= end; at += hn::Lanes(full)) {
-            smooth_numbers<kValence>(full, from + at, to + at, valence, factor, [&](std::size_t k) HWY_ATTR {
-                return from + 4 * static_cast<std::size_t>(first[k]) + (at - begin);
-            });
-        }
+    if constexpr (kValence > 0) {
+        if (run.is_consecutive && frame.is_uniform) return smooth_consecutive<kValence>(frame, run);
     }
-    const std::size_t step = run.is_consecutive ? 0 : valence;
-    for (; at < end; at += hn::Lanes(four)) {
-        const std::size_t vertex = (at - begin) / 4;
-        const std::int32_t* const neighbours = first + vertex * step;
-        const std::size_t number = run.is_consecutive ? at - begin : at % 4;
-        smooth_numbers<kValence>(four, from + at, to + at, valence, hn::Set(four, frame.factors[at / 4]),
-                                 [&](std::size_t k) HWY_ATTR {
-                                     return from + 4 * static_cast<std::size_t>(neighbours[k]) + number;
-                                 });
+    const Four d;
+    const std::int32_t* neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    const std::size_t step = run.is_consecutive ? 0 : run.valence;
+    for (std::size_t i = run.begin; i < run.end; ++i, neighbours += step) {
+        const std::size_t behind = run.is_consecutive ? i - run.begin : 0;
+        for (std::size_t at = 0; at < 4; at += hn::Lanes(d)) {
+            smooth_numbers<kValence>(
+                d, numbers_of(frame.from + i) + at, numbers_of(frame.to + i) + at, run.valence,
+                hn::Set(d, frame.factors[i]), [&](std::size_t k) HWY_ATTR {
+                    return numbers_of(frame.from + static_cast<std::size_t>(neighbours[k]) + behind) + at;
+                });
+        }
     }
 }
 
@@ -95,34 +111,94 @@ void smooth(const MushFrame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Points of a block's vertices, which follow each other.
+/// The vertex in a lane, of up to kLanes that follow each other. A vector of each coordinate is made of four vectors of
+/// points by exchanging numbers within quarters of a vector of 16, which is cheaper than across. Vectors of all lengths
+/// have this order, as details are kept in it.
+HWY_INLINE std::size_t vertex_of(std::size_t lane) { return 4 * (lane % 4) + lane / 4; }
+
+#if HWY_TARGET == HWY_SCALAR
+
+/// Points of vertices in lanes from `lane` on, of kLanes that follow each other.
 template <class D>
-HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t first) {
-    Points<D> p;
-    Vec<D> rest;
-    hn::LoadInterleaved4(d, numbers_of(points + first), p.x, p.y, p.z, rest);
-    return p;
+HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
+    const float* const numbers = numbers_of(points + vertex_of(lane));
+    return {hn::Set(d, numbers[0]), hn::Set(d, numbers[1]), hn::Set(d, numbers[2])};
 }
 
-/// By way of memory, which is faster than to gather each number.
-///
-/// index_of(lane)  of the point
+/// index_of(vertex)  of the point
 template <class D, class Index>
-HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of) {
-    alignas(64) Float4 collected[kLanes];
-    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-        collected[lane] = points[static_cast<std::size_t>(index_of(lane))];
-    }
-    return consecutive_points(d, collected, 0);
+HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
+    return consecutive_points(d, points + static_cast<std::size_t>(index_of(vertex_of(lane))), 0);
 }
 
-/// Points of a block from `lane` on.
 template <class D>
-HWY_INLINE Points<D> points_at(D d, const Float4* points, const Lanes<std::int32_t>& indices,
-                               std::size_t lane) {
-    const std::int32_t* const of_lanes = indices.lane.data() + lane;
-    return collected_points(d, points, [of_lanes](std::size_t i) HWY_ATTR { return of_lanes[i]; });
+HWY_INLINE void store_lanes(D, const Points<D>& p, Float4* to, std::size_t lane) {
+    to[vertex_of(lane)] = {{hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z), 0.0f}};
 }
+
+#else
+
+/// The first or second halves of quarters, those of `a` and `b` alternating.
+template <class D>
+HWY_INLINE Vec<D> first_halves(D d, Vec<D> a, Vec<D> b) {
+    const hn::RepartitionToWide<D> wide;
+    return hn::BitCast(d, hn::InterleaveLower(wide, hn::BitCast(wide, a), hn::BitCast(wide, b)));
+}
+template <class D>
+HWY_INLINE Vec<D> second_halves(D d, Vec<D> a, Vec<D> b) {
+    const hn::RepartitionToWide<D> wide;
+    return hn::BitCast(d, hn::InterleaveUpper(wide, hn::BitCast(wide, a), hn::BitCast(wide, b)));
+}
+
+/// points(i)  the i-th of four vectors
+template <class D, class OfPoints>
+HWY_INLINE Points<D> to_lanes(D d, const OfPoints& points) {
+    const Vec<D> a = points(0), b = points(1), e = points(2), f = points(3);
+    const Vec<D> xy_ab = hn::InterleaveLower(d, a, b), xy_ef = hn::InterleaveLower(d, e, f);
+    const Vec<D> z_ab = hn::InterleaveUpper(d, a, b), z_ef = hn::InterleaveUpper(d, e, f);
+    return {first_halves(d, xy_ab, xy_ef), second_halves(d, xy_ab, xy_ef), first_halves(d, z_ab, z_ef)};
+}
+
+/// Points of vertices in lanes from `lane` on, of kLanes that follow each other.
+template <class D>
+HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
+    return to_lanes(
+        d, [&](std::size_t i) HWY_ATTR { return hn::LoadU(d, numbers_of(points + 4 * i + vertex_of(lane))); });
+}
+
+/// The point of `vertex` and of those behind it.
+template <class D, class Index>
+HWY_INLINE Vec<D> collected(D d, const Float4* points, const Index& index_of, std::size_t vertex) {
+    if constexpr (hn::MaxLanes(D()) <= 4) {
+        return hn::LoadU(d, numbers_of(points + static_cast<std::size_t>(index_of(vertex))));
+    } else {
+        const hn::Half<D> half;
+        return hn::Combine(d, collected(half, points, index_of, vertex + hn::MaxLanes(D()) / 8),
+                           collected(half, points, index_of, vertex));
+    }
+}
+
+/// index_of(vertex)  of the point
+template <class D, class Index>
+HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
+    return to_lanes(d, [&](std::size_t i) HWY_ATTR {
+        return collected(d, points, index_of, 4 * i + vertex_of(lane));
+    });
+}
+
+template <class D>
+HWY_INLINE void store_lanes(D d, const Points<D>& p, Float4* to, std::size_t lane) {
+    const Vec<D> xy_low = hn::InterleaveLower(d, p.x, p.y), xy_high = hn::InterleaveUpper(d, p.x, p.y);
+    const Vec<D> zero = hn::Zero(d);
+    const Vec<D> z_low = hn::InterleaveLower(d, p.z, zero), z_high = hn::InterleaveUpper(d, p.z, zero);
+    float* const numbers = numbers_of(to + vertex_of(lane));
+    hn::StoreU(first_halves(d, xy_low, z_low), d, numbers);
+    hn::StoreU(second_halves(d, xy_low, z_low), d, numbers + 16);
+    hn::StoreU(first_halves(d, xy_high, z_high), d, numbers + 32);
+    hn::StoreU(second_halves(d, xy_high, z_high), d, numbers + 48);
+}
+
+#endif
 
 template <class D>
 HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
@@ -134,34 +210,18 @@ HWY_INLINE Vec<D> dot_of(const Points<D>& a, const Points<D>& b) {
     return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
+/// 1 / length of a vector by its square; 0 of one without a direction.
 template <class D>
-HWY_INLINE Points<D> cross_of(const Points<D>& a, const Points<D>& b) {
-    return {hn::NegMulAdd(a.z, b.y, hn::Mul(a.y, b.z)), hn::NegMulAdd(a.x, b.z, hn::Mul(a.z, b.x)),
-            hn::NegMulAdd(a.y, b.x, hn::Mul(a.x, b.y))};
-}
-
-/// 1 / sqrt(x), x positive and finite; a root and a division of 16 lanes take longer than the rest of a corner.
-template <class D>
-HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
-    // 12 digits, by two of Newton's steps all of them.
-    auto root = hn::ApproximateReciprocalSqrt(x);
-    const auto half = hn::Mul(x, hn::Set(d, 0.5f));
-    for (int step = 0; step < 2; ++step) {
-        root = hn::Mul(root, hn::NegMulAdd(hn::Mul(half, root), root, hn::Set(d, 1.5f)));
-    }
-    return root;
-#else
-    return hn::Div(hn::Set(d, 1.0f), hn::Sqrt(x));
-#endif
+HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
+    const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushStage::kShortest)));
+    return hn::IfThenElseZero(is_long, inverse_root(d, squared));
 }
 
 template <class D>
 HWY_INLINE Points<D> unit(D d, const Points<D>& v) {
     const auto squared = dot_of<D>(v, v);
-    const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushStage::kShortest)));
     const auto is_finite = hn::Le(squared, hn::Set(d, std::numeric_limits<float>::max()));
-    const auto inverse = hn::IfThenElseZero(hn::And(is_long, is_finite), inverse_root(d, squared));
+    const auto inverse = hn::IfThenElseZero(is_finite, inverse_length(d, squared));
     return {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
 }
 
@@ -172,49 +232,62 @@ HWY_INLINE Vec<D> angle(D d, Vec<D> cosine) {
     auto sum = hn::MulAdd(m, hn::Set(d, -0.02164095f), hn::Set(d, 0.077980478f));
     sum = hn::MulAdd(m, sum, hn::Set(d, -0.213300989f));
     sum = hn::MulAdd(m, sum, hn::Set(d, 1.5707963267f));
-    const auto of_size = hn::Mul(hn::Sqrt(hn::Sub(one, m)), sum);
+    const auto rest = hn::Sub(one, m);
+    const auto of_size = hn::Mul(hn::Mul(rest, inverse_length(d, rest)), sum);
     const auto is_negative = hn::Lt(cosine, hn::Zero(d));
     return hn::IfThenElse(is_negative, hn::Sub(hn::Set(d, 3.14159265358979f), of_size), of_size);
 }
 
+/// The frame of a corner: axes of any length, and what makes them unit vectors; and how much it counts.
 template <class D>
 struct CornerLanes {
     Points<D> x, y, z;
+    Vec<D> unit_x, unit_y, unit_z;
     Vec<D> weight;
 };
 
+/// Of the corner between the spokes to the next vertex of the face and to the one before, which are unit vectors.
 template <class D>
-HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& previous, const Points<D>& current,
-                                    const Points<D>& next) {
-    const Points<D> a = unit(d, subtract<D>(previous, current));
-    const Points<D> b = unit(d, subtract<D>(current, next));
-    const auto straight = hn::Set(d, static_cast<float>(DeltaMushStage::kStraight));
-    const Points<D> apart = subtract<D>(a, b);
-    const auto is_bent =
-        hn::Or(hn::Gt(hn::Abs(apart.x), straight),
-               hn::Or(hn::Gt(hn::Abs(apart.y), straight), hn::Gt(hn::Abs(apart.z), straight)));
-    const Points<D> z = unit(d, cross_of<D>(a, b));
-    const Points<D> x = unit(d, Points<D>{hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)});
-    return {x, cross_of<D>(z, x), z, hn::IfThenElseZero(is_bent, angle(d, dot_of<D>(a, b)))};
+HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>& previous) {
+    // The definition's a is `previous`, its b is -next. So y, along (a x b) x (a + b), goes along b - a, and of unit
+    // vectors |a - b| |a + b| is 2 |a x b|.
+    CornerLanes<D> corner;
+    corner.x = subtract<D>(previous, next);
+    corner.y = add<D>(previous, next);
+    corner.z = cross<D>(next, previous);
+    const auto squared_x = dot_of<D>(corner.x, corner.x);
+    corner.unit_x = inverse_length(d, squared_x);
+    corner.unit_z = inverse_length(d, dot_of<D>(corner.z, corner.z));
+    corner.unit_y = hn::Mul(hn::Mul(hn::Set(d, -0.5f), corner.unit_z), hn::Mul(squared_x, corner.unit_x));
+    const auto largest = hn::Max(hn::Abs(corner.y.x), hn::Max(hn::Abs(corner.y.y), hn::Abs(corner.y.z)));
+    const auto is_bent = hn::Gt(largest, hn::Set(d, static_cast<float>(DeltaMushStage::kStraight)));
+    corner.weight = hn::IfThenElseZero(is_bent, angle(d, hn::Neg(dot_of<D>(previous, next))));
+    return corner;
 }
 
 /// Calls call(index of the details, corner) for each corner of the vertices of a block from `lane` on.
 template <class D, class Call>
 HWY_INLINE void for_each_corner(D d, const MushFrame& frame, const MushBlock& block, std::size_t lane,
-                                const Points<D>& current, const Call& call) {
-    for (std::size_t k = 0; k < block.corners; ++k) {
-        Points<D> previous;
-        Points<D> next;
+                                const Points<D>& point, const Call& call) {
+    const auto spoke = [&](std::size_t k) HWY_ATTR {
         if (block.is_consecutive) {
-            const FirstEnds& first = frame.mesh->first_ends[block.first_ends + k];
-            previous = consecutive_points(d, frame.from, static_cast<std::size_t>(first.previous) + lane);
-            next = consecutive_points(d, frame.from, static_cast<std::size_t>(first.next) + lane);
-        } else {
-            const MushEnds& ends = frame.mesh->ends[block.first_ends + k];
-            previous = points_at(d, frame.from, ends.previous, lane);
-            next = points_at(d, frame.from, ends.next, lane);
+            const auto first = static_cast<std::size_t>(frame.mesh->first_spokes[block.first_spoke + k]);
+            return unit(d, subtract<D>(consecutive_points(d, frame.from + first, lane), point));
         }
-        call(block.first_detail + k, corner_of(d, previous, current, next));
+        const std::int32_t* const ends = frame.mesh->spokes[block.first_spoke + k].lane.data();
+        const auto index_of = [ends](std::size_t vertex) HWY_ATTR { return ends[vertex]; };
+        return unit(d, subtract<D>(collected_points(d, frame.from, index_of, lane), point));
+    };
+    if (block.corners == 0) return;
+    const bool is_shared = block.spokes < 2 * block.corners;
+    const Points<D> first = spoke(0);
+    Points<D> next = first;
+    for (std::size_t k = 0; k < block.corners; ++k) {
+        if (!is_shared && k > 0) next = spoke(2 * k);
+        const std::size_t after = is_shared ? k + 1 : 2 * k + 1;
+        const Points<D> previous = after < block.spokes ? spoke(after) : first;
+        call(block.first_detail + k, corner_of(d, next, previous));
+        next = previous;
     }
 }
 
@@ -222,36 +295,33 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
     const Full d;
     using D = Full;
     const MushMesh& mesh = *frame.mesh;
-    HWY_ALIGN float finished[3 * kLanes];
+    alignas(64) Float4 finished[kLanes];
     for (std::size_t b = mesh.first_blocks[begin]; b < mesh.first_blocks[end]; ++b) {
         const MushBlock& block = mesh.blocks[b];
-        for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {
-            const Points<D> point = consecutive_points(d, frame.from, block.first_vertex + lane);
+        for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+            if (vertex_of(lane) >= block.vertices) continue;
+            const Points<D> point = consecutive_points(d, frame.from + block.first_vertex, lane);
             Points<D> sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
             auto weights = hn::Zero(d);
-            for_each_corner(d, frame, block, lane, point,
-                            [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
-                                const MushDetails& details = frame.details[k];
-                                const auto weight = corner.weight;
-                                const auto x = hn::Mul(weight, hn::Load(d, details.x.lane.data() + lane));
-                                const auto y = hn::Mul(weight, hn::Load(d, details.y.lane.data() + lane));
-                                const auto z = hn::Mul(weight, hn::Load(d, details.z.lane.data() + lane));
-                                const auto add = [&](Vec<D> to, Vec<D> ax, Vec<D> ay, Vec<D> az) HWY_ATTR {
-                                    return hn::MulAdd(ax, x, hn::MulAdd(ay, y, hn::MulAdd(az, z, to)));
-                                };
-                                sum.x = add(sum.x, corner.x.x, corner.y.x, corner.z.x);
-                                sum.y = add(sum.y, corner.x.y, corner.y.y, corner.z.y);
-                                sum.z = add(sum.z, corner.x.z, corner.y.z, corner.z.z);
-                                weights = hn::Add(weights, weight);
-                            });
+            for_each_corner(
+                d, frame, block, lane, point, [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
+                    const MushDetails& details = frame.details[k];
+                    const auto along = [&](const Lanes<float>& detail, Vec<D> to_unit) HWY_ATTR {
+                        return hn::Mul(hn::Load(d, detail.lane.data() + lane),
+                                       hn::Mul(corner.weight, to_unit));
+                    };
+                    sum = add_scaled<D>(sum, along(details.x, corner.unit_x), corner.x);
+                    sum = add_scaled<D>(sum, along(details.y, corner.unit_y), corner.y);
+                    sum = add_scaled<D>(sum, along(details.z, corner.unit_z), corner.z);
+                    weights = hn::Add(weights, corner.weight);
+                });
             const auto share =
                 hn::IfThenElseZero(hn::Gt(weights, hn::Zero(d)), hn::Div(hn::Set(d, frame.scale), weights));
-            hn::StoreInterleaved3(hn::MulAdd(share, sum.x, point.x), hn::MulAdd(share, sum.y, point.y),
-                                  hn::MulAdd(share, sum.z, point.z), d, finished + 3 * lane);
+            store_lanes(d, add_scaled<D>(point, share, sum), finished, lane);
         }
         for (std::size_t i = 0; i < block.vertices; ++i) {
-            frame.points[mesh.vertices[block.first_vertex + i]] = {finished[3 * i], finished[3 * i + 1],
-                                                                   finished[3 * i + 2]};
+            std::memcpy(&frame.points[mesh.vertices[block.first_vertex + i]], finished + i,
+                        sizeof(Vec3<float>));
         }
     }
 }
@@ -264,68 +334,90 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
     for (std::size_t b = mesh.first_blocks[begin]; b < mesh.first_blocks[end]; ++b) {
         const MushBlock& block = mesh.blocks[b];
         for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-            const Points<D> point = consecutive_points(d, frame.from, block.first_vertex + lane);
+            const Points<D> point = consecutive_points(d, frame.from + block.first_vertex, lane);
             const Points<D> taken =
-                subtract<D>(consecutive_points(d, rest, block.first_vertex + lane), point);
-            for_each_corner(d, frame, block, lane, point,
-                            [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
-                                hn::Store(dot_of<D>(corner.x, taken), d, details[k].x.lane.data() + lane);
-                                hn::Store(dot_of<D>(corner.y, taken), d, details[k].y.lane.data() + lane);
-                                hn::Store(dot_of<D>(corner.z, taken), d, details[k].z.lane.data() + lane);
-                            });
+                subtract<D>(consecutive_points(d, rest + block.first_vertex, lane), point);
+            const auto store = [&](Vec<D> detail, Lanes<float>& to) HWY_ATTR {
+                hn::Store(detail, d, to.lane.data() + lane);
+            };
+            for_each_corner(
+                d, frame, block, lane, point, [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
+                    store(hn::Mul(corner.unit_x, dot_of<D>(corner.x, taken)), details[k].x);
+                    store(hn::Mul(corner.unit_y, dot_of<D>(corner.y, taken)), details[k].y);
+                    store(hn::Mul(corner.unit_z, dot_of<D>(corner.z, taken)), details[k].z);
+                });
         }
     }
 }
 
-/// Vertices [begin, begin + count) of a run, at most as many as lanes.
-HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, const MushRun& run, std::size_t begin,
-                                       std::size_t count) {
+/// Vertices [begin, begin + count) of a run, at most kLanes.
+///
+/// index_of(vertex, k)  the k-th neighbour of a vertex from `begin` on; kIsConsecutive: of the first alone
+template <bool kIsConsecutive, class Index>
+HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valence, std::size_t begin,
+                                       std::size_t count, const Index& index_of) {
     const Full d;
     using D = Full;
-    const std::int32_t* const first = frame.mesh->neighbours.data() + run.first_neighbour;
-    const std::size_t valence = run.valence;
-    const std::size_t from_run = begin - run.begin;
-    const Points<D> point = consecutive_points(d, frame.from, begin);
-    Points<D> sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-    auto lengths = hn::Zero(d);
-    for (std::size_t k = 0; k < valence; ++k) {
-        const auto of_lane = [&](std::size_t lane) HWY_ATTR {
-            return first[(from_run + HWY_MIN(lane, count - 1)) * valence + k];
-        };
-        const Points<D> neighbour =
-            run.is_consecutive
-                ? consecutive_points(d, frame.from, static_cast<std::size_t>(first[k]) + from_run)
-                : collected_points(d, frame.from, of_lane);
-        const Points<D> edge = subtract<D>(neighbour, point);
-        const auto length = hn::Sqrt(dot_of<D>(edge, edge));
-        sum.x = hn::MulAdd(length, edge.x, sum.x);
-        sum.y = hn::MulAdd(length, edge.y, sum.y);
-        sum.z = hn::MulAdd(length, edge.z, sum.z);
-        lengths = hn::Add(lengths, length);
-    }
     const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
-    const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
-    // Beyond the last vertex there is room for a vector.
-    const auto factors = hn::LoadU(d, frame.factors + begin);
-    const auto factor = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factors, lengths));
-    alignas(64) Float4 result[kLanes];
-    hn::StoreInterleaved4(hn::MulAdd(factor, sum.x, point.x), hn::MulAdd(factor, sum.y, point.y),
-                          hn::MulAdd(factor, sum.z, point.z), hn::Zero(d), d, numbers_of(result));
-    for (std::size_t lane = 0; lane < count; ++lane) frame.to[begin + lane] = result[lane];
+    // Beyond the last vertex there is room.
+    alignas(64) float factors[kLanes];
+    for (std::size_t lane = 0; lane < kLanes && !frame.is_uniform; ++lane) {
+        factors[lane] = frame.factors[begin + vertex_of(lane)];
+    }
+    alignas(64) Float4 rest[kLanes];
+    Float4* const result = count == kLanes ? frame.to + begin : rest;
+    for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+        if (vertex_of(lane) >= count) continue;
+        const Points<D> point = consecutive_points(d, frame.from + begin, lane);
+        Points<D> sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+        auto lengths = hn::Zero(d);
+        for (std::size_t k = 0; k < valence; ++k) {
+            Points<D> edge;
+            if constexpr (kIsConsecutive) {
+                const Float4* const neighbours = frame.from + static_cast<std::size_t>(index_of(0, k));
+                edge = subtract<D>(consecutive_points(d, neighbours, lane), point);
+            } else {
+                const auto of_vertex = [&](std::size_t vertex)
+                                           HWY_ATTR { return index_of(HWY_MIN(vertex, count - 1), k); };
+                edge = subtract<D>(collected_points(d, frame.from, of_vertex, lane), point);
+            }
+            const auto squared = dot_of<D>(edge, edge);
+            const auto length = hn::Mul(squared, inverse_length(d, squared));
+            sum = add_scaled<D>(sum, length, edge);
+            lengths = hn::Add(lengths, length);
+        }
+        const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
+        const auto factor =
+            frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
+        const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factor, lengths));
+        store_lanes(d, add_scaled<D>(point, share, sum), result, lane);
+    }
+    if (result == rest) std::copy_n(rest, count, frame.to + begin);
 }
 
 /// An iteration by length.
 void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end) {
     const MushMesh& mesh = *frame.mesh;
-    const std::size_t lanes = hn::Lanes(Full());
     for (std::size_t r = mesh.first_runs[begin]; r < mesh.first_runs[end]; ++r) {
         const MushRun& run = mesh.runs[r];
-        if (run.valence == 0) {
+        const std::size_t valence = run.valence;
+        if (valence == 0) {
             copy_run(frame, run);
             continue;
         }
-        for (std::size_t i = run.begin; i < run.end; i += lanes) {
-            smooth_lanes_by_length(frame, run, i, HWY_MIN(lanes, run.end - i));
+        const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
+        for (std::size_t i = run.begin; i < run.end; i += kLanes) {
+            const std::size_t count = HWY_MIN(kLanes, run.end - i);
+            if (run.is_consecutive) {
+                const auto behind = static_cast<std::int32_t>(i - run.begin);
+                smooth_lanes_by_length<true>(frame, valence, i, count,
+                                             [&](std::size_t, std::size_t k) HWY_ATTR { return neighbours[k] + behind; });
+            } else {
+                smooth_lanes_by_length<false>(frame, valence, i, count, [&](std::size_t vertex, std::size_t k) HWY_ATTR {
+                    return neighbours[vertex * valence + k];
+                });
+                neighbours += kLanes * valence;
+            }
         }
     }
 }

@@ -13,26 +13,6 @@ namespace {
 // A run costs about as much as some vertices.
 constexpr std::size_t kFewestConsecutive = 8;
 
-/// Vertices breadth-first, each part of the mesh from its first vertex on, so that neighbours are near each other.
-std::vector<std::uint32_t> breadth_first(const ByVertex& neighbours, std::size_t count) {
-    std::vector<std::uint32_t> order;
-    order.reserve(count);
-    std::vector<std::uint8_t> seen(count);
-    for (std::size_t first = 0; first < count; ++first) {
-        if (seen[first] != 0) continue;
-        seen[first] = 1;
-        order.push_back(static_cast<std::uint32_t>(first));
-        for (std::size_t at = order.size() - 1; at < order.size(); ++at) {
-            for (const std::int32_t neighbour : neighbours.of(order[at])) {
-                if (seen[index(neighbour)] != 0) continue;
-                seen[index(neighbour)] = 1;
-                order.push_back(static_cast<std::uint32_t>(neighbour));
-            }
-        }
-    }
-    return order;
-}
-
 /// How many faces each edge has. Throws where an edge of a face is not among the edges.
 std::vector<std::uint32_t> faces_of_edges(const MeshTopology& topology, const CornerNeighbours& around,
                                           const ByVertex& edge_ends) {
@@ -41,6 +21,124 @@ std::vector<std::uint32_t> faces_of_edges(const MeshTopology& topology, const Co
     return faces;
 }
 
+/// The vertices that the spokes of each vertex lead to, as MushBlock has them.
+class Fans {
+public:
+    Fans(const MeshTopology& topology, const CornerNeighbours& around, const ByVertex& corners) {
+        const auto vertex_at = [&](std::int32_t corner) {
+            return topology.corner_vertices[index(corner)];
+        };
+        for (std::size_t vertex = 0; vertex + 1 < corners.offsets.size(); ++vertex) {
+            corners_.clear();
+            for (const std::int32_t corner : corners.of(vertex)) {
+                corners_.push_back({vertex_at(around.next[index(corner)]),
+                                    vertex_at(around.previous[index(corner)])});
+            }
+            spokes_.offsets.push_back(spokes_.items.size());
+            add_fan();
+        }
+        spokes_.offsets.push_back(spokes_.items.size());
+    }
+
+    [[nodiscard]] std::span<const std::int32_t> of(std::size_t vertex) const { return spokes_.of(vertex); }
+
+private:
+    /// A corner of a vertex, by the two others. In the face beside it `previous` is the next.
+    struct Corner {
+        std::int32_t next;
+        std::int32_t previous;
+    };
+
+    void add_fan() {
+        if (corners_.empty() || add_chain()) return;
+        for (const Corner& corner : corners_) {
+            spokes_.items.insert(spokes_.items.end(), {corner.next, corner.previous});
+        }
+    }
+
+    /// Whether the faces of the corners lie side by side, in one row or all around; if so it adds their spokes.
+    bool add_chain() {
+        std::ranges::sort(corners_, {}, &Corner::next);
+        previous_.clear();
+        for (const Corner& corner : corners_) previous_.push_back(corner.previous);
+        std::ranges::sort(previous_);
+        const auto is_first = [&](const Corner& corner) {
+            return !std::ranges::binary_search(previous_, corner.next);
+        };
+        auto at = std::ranges::find_if(corners_, is_first);
+        if (at == corners_.end()) at = corners_.begin();
+        chain_.assign(1, at->next);
+        for (std::size_t count = 1; count < corners_.size(); ++count) {
+            chain_.push_back(at->previous);
+            at = std::ranges::lower_bound(corners_, at->previous, {}, &Corner::next);
+            if (at == corners_.end() || at->next != chain_.back()) return false;
+        }
+        const bool is_closed = at->previous == chain_.front();
+        if (!is_closed) chain_.push_back(at->previous);
+        previous_.assign(chain_.begin(), chain_.end());
+        std::ranges::sort(previous_);
+        if (std::ranges::adjacent_find(previous_) != previous_.end()) return false;
+        spokes_.items.insert(spokes_.items.end(), chain_.begin(), chain_.end());
+        return true;
+    }
+
+    ByVertex spokes_;
+    // Of one vertex.
+    std::vector<Corner> corners_;
+    std::vector<std::int32_t> previous_;
+    std::vector<std::int32_t> chain_;
+};
+
+/// Vertices breadth-first, so that neighbours are near each other. Those of a vertex come in the order of its faces
+/// around it, from where it was reached: then a grid is passed in rows, whatever the order of its vertices.
+class BreadthFirst {
+public:
+    BreadthFirst(const ByVertex& neighbours, const Fans& fans, std::size_t count)
+        : neighbours_(neighbours), fans_(fans), parents_(count, -1) {
+        order_.reserve(count);
+    }
+
+    std::vector<std::uint32_t> order() {
+        for (std::size_t vertex = 0; vertex < parents_.size(); ++vertex) {
+            if (parents_[vertex] >= 0) continue;
+            const std::size_t begin = order_.size();
+            visit_from(vertex);
+            // Once more from the vertex that was reached last, at an end of this part of the mesh: fewer lie between
+            // neighbours.
+            const std::size_t last = order_.back();
+            for (std::size_t i = begin; i < order_.size(); ++i) parents_[order_[i]] = -1;
+            order_.resize(begin);
+            visit_from(last);
+        }
+        return std::move(order_);
+    }
+
+private:
+    void visit_from(std::size_t first) {
+        std::size_t at = order_.size();
+        reach(first, first);
+        for (; at < order_.size(); ++at) {
+            const std::size_t vertex = order_[at];
+            const auto fan = fans_.of(vertex);
+            const auto from = std::ranges::find(fan, parents_[vertex]);
+            for (auto i = from; i != fan.end(); ++i) reach(index(*i), vertex);
+            for (auto i = fan.begin(); i != from; ++i) reach(index(*i), vertex);
+            for (const std::int32_t neighbour : neighbours_.of(vertex)) reach(index(neighbour), vertex);
+        }
+    }
+
+    void reach(std::size_t vertex, std::size_t from) {
+        if (parents_[vertex] >= 0) return;
+        parents_[vertex] = static_cast<std::int32_t>(from);
+        order_.push_back(static_cast<std::uint32_t>(vertex));
+    }
+
+    const ByVertex& neighbours_;
+    const Fans& fans_;
+    std::vector<std::int32_t> parents_;  // where each vertex was reached from; -1: not yet
+    std::vector<std::uint32_t> order_;
+};
+
 class Maker {
 public:
     Maker(const MeshTopology& topology, std::size_t vertex_count)
@@ -48,15 +146,16 @@ public:
           around_(corners_around(topology)),
           edge_ends_(by_vertex(topology.edges, vertex_count)),
           neighbours_{edge_ends_.offsets, {}},
-          corners_(by_vertex(topology.corner_vertices, vertex_count)) {
+          corners_(by_vertex(topology.corner_vertices, vertex_count)),
+          fans_(topology, around_, corners_) {
         for (const std::int32_t end : edge_ends_.items) {
             neighbours_.items.push_back(topology.edges[index(end) ^ 1]);
         }
-        mesh_.vertices = breadth_first(neighbours_, vertex_count);
+        mesh_.vertices = BreadthFirst(neighbours_, fans_, vertex_count).order();
         for (std::size_t begin = 0; begin < vertex_count; begin += MushMesh::kChunk) {
             const auto first = mesh_.vertices.begin() + static_cast<std::ptrdiff_t>(begin);
             const auto kind = [this](std::uint32_t v) {
-                return std::tuple(neighbours_.of(v).size(), corners_.of(v).size());
+                return std::tuple(neighbours_.of(v).size(), corners_.of(v).size(), fans_.of(v).size());
             };
             std::ranges::stable_sort(
                 first, first + static_cast<std::ptrdiff_t>(std::min(MushMesh::kChunk, vertex_count - begin)),
@@ -87,8 +186,10 @@ private:
     [[nodiscard]] std::size_t valence(std::size_t i) const {
         return neighbours_.of(mesh_.vertices[i]).size();
     }
-    [[nodiscard]] std::span<const std::int32_t> corners(std::size_t i) const {
-        return corners_.of(mesh_.vertices[i]);
+    /// How many corners and spokes.
+    [[nodiscard]] std::pair<std::size_t, std::size_t> fan_size(std::size_t i) const {
+        const std::size_t vertex = mesh_.vertices[i];
+        return {corners_.of(vertex).size(), fans_.of(vertex).size()};
     }
 
     void mark_boundary() {
@@ -106,9 +207,12 @@ private:
 
     void sort_neighbours() {
         for (const std::uint32_t vertex : mesh_.vertices) {
+            const std::size_t chunk = first_sorted_.size() / MushMesh::kChunk;
             first_sorted_.push_back(sorted_.size());
             for (const std::int32_t neighbour : neighbours_.of(vertex)) {
                 sorted_.push_back(place_[index(neighbour)]);
+                const std::size_t of_neighbour = index(sorted_.back()) / MushMesh::kChunk;
+                mesh_.reach = std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
             }
             std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
         }
@@ -143,60 +247,51 @@ private:
         }
     }
 
-    /// The two other vertices of each of a vertex's corners, in an order that is alike for vertices side by side.
-    [[nodiscard]] std::vector<std::pair<std::int32_t, std::int32_t>> corner_ends(std::size_t i) const {
-        std::vector<std::pair<std::int32_t, std::int32_t>> ends;
-        for (const std::int32_t corner : corners(i)) {
-            ends.emplace_back(place_of(around_.previous[index(corner)]),
-                              place_of(around_.next[index(corner)]));
+    /// Where the spokes of a vertex lead, beginning alike for vertices side by side.
+    std::span<const std::int32_t> spokes(std::size_t i) {
+        const auto [corners, count] = fan_size(i);
+        spokes_.clear();
+        for (const std::int32_t vertex : fans_.of(mesh_.vertices[i])) {
+            spokes_.push_back(place_[index(vertex)]);
         }
-        std::ranges::sort(ends);
-        return ends;
+        if (count == corners) std::ranges::rotate(spokes_, std::ranges::min_element(spokes_));
+        return spokes_;
     }
 
     void add_blocks(std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end;) {
             std::size_t after = i + 1;
-            while (after < end && after < i + kLanes && corners(after).size() == corners(i).size()) ++after;
+            while (after < end && after < i + kLanes && fan_size(after) == fan_size(i)) ++after;
             add_block(i, after);
             i = after;
         }
     }
 
     void add_block(std::size_t begin, std::size_t end) {
-        const std::size_t corner_count = corners(begin).size();
-        std::vector<MushEnds> made(corner_count);
+        const auto [corner_count, spoke_count] = fan_size(begin);
+        const std::size_t first = mesh_.spokes.size();
+        mesh_.spokes.resize(first + spoke_count);
+        const std::span<Lanes<std::int32_t>> added(mesh_.spokes.begin() + static_cast<std::ptrdiff_t>(first),
+                                                   mesh_.spokes.end());
         bool is_consecutive = true;
         for (std::size_t v = begin; v < end; ++v) {
-            const auto ends = corner_ends(v);
-            for (std::size_t k = 0; k < corner_count; ++k) {
-                MushEnds& corner = made[k];
+            const std::size_t lane = v - begin;
+            const auto of_vertex = spokes(v);
+            for (std::size_t k = 0; k < spoke_count; ++k) {
                 // Lanes without a vertex repeat the last.
-                for (std::size_t lane = v - begin; lane < (v + 1 < end ? v - begin + 1 : kLanes); ++lane) {
-                    corner.previous.lane[lane] = ends[k].first;
-                    corner.next.lane[lane] = ends[k].second;
-                }
-                const auto step = static_cast<std::int32_t>(v - begin);
-                is_consecutive &= corner.previous.lane[0] + step == ends[k].first &&
-                                  corner.next.lane[0] + step == ends[k].second;
+                std::fill(added[k].lane.begin() + static_cast<std::ptrdiff_t>(lane), added[k].lane.end(),
+                          of_vertex[k]);
+                is_consecutive &= added[k].lane[0] + static_cast<std::int32_t>(lane) == of_vertex[k];
             }
         }
         mesh_.blocks.push_back({static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end - begin),
-                                static_cast<std::uint32_t>(corner_count), is_consecutive,
-                                is_consecutive ? mesh_.first_ends.size() : mesh_.ends.size(),
-                                mesh_.detail_count});
+                                static_cast<std::uint32_t>(corner_count),
+                                static_cast<std::uint32_t>(spoke_count), is_consecutive,
+                                is_consecutive ? mesh_.first_spokes.size() : first, mesh_.detail_count});
         mesh_.detail_count += corner_count;
-        if (!is_consecutive) {
-            mesh_.ends.insert(mesh_.ends.end(), made.begin(), made.end());
-            return;
-        }
-        for (const MushEnds& corner : made) {
-            mesh_.first_ends.push_back({corner.previous.lane[0], corner.next.lane[0]});
-        }
-    }
-
-    [[nodiscard]] std::int32_t place_of(std::int32_t corner) const {
-        return place_[index(topology_.corner_vertices[index(corner)])];
+        if (!is_consecutive) return;
+        for (const Lanes<std::int32_t>& spoke : added) mesh_.first_spokes.push_back(spoke.lane[0]);
+        mesh_.spokes.resize(first);
     }
 
     const MeshTopology& topology_;
@@ -204,6 +299,8 @@ private:
     ByVertex edge_ends_;  // indices into the edges' vertices
     ByVertex neighbours_;
     ByVertex corners_;
+    Fans fans_;
+    std::vector<std::int32_t> spokes_;  // of one vertex
     std::vector<std::int32_t> place_;   // of each vertex in the order of the mesh
     std::vector<std::int32_t> sorted_;  // the places of each vertex's neighbours, rising
     std::vector<std::size_t> first_sorted_;

@@ -22,29 +22,22 @@ struct MushRun {
         first_neighbour;  // of MushMesh::neighbours: [end - begin][valence], or [valence] of the first
 };
 
-/// Up to kLanes vertices of as many corners that follow each other.
+/// Up to kLanes vertices of as many corners and spokes that follow each other.
+///
+/// A spoke leads from a vertex to another of its face. Corner k lies between spokes k and k + 1, the first again after
+/// the last; where faces do not meet so, each corner has two spokes of its own: 2 k and 2 k + 1.
 struct MushBlock {
     std::uint32_t first_vertex;
     std::uint32_t vertices;
     std::uint32_t corners;
-    bool is_consecutive;     // as of MushRun, in each corner
-    std::size_t first_ends;  // of MushMesh::first_ends where it is consecutive, else of MushMesh::ends
+    std::uint32_t spokes;
+    bool is_consecutive;      // as of MushRun, in each spoke
+    std::size_t first_spoke;  // of MushMesh::first_spokes where it is consecutive, else of MushMesh::spokes
     std::size_t first_detail;
 };
 
-/// The two other vertices of a corner of each vertex of a block.
-struct MushEnds {
-    Lanes<std::int32_t> previous;
-    Lanes<std::int32_t> next;
-};
-
-/// Those of its first vertex, where it is consecutive.
-struct FirstEnds {
-    std::int32_t previous;
-    std::int32_t next;
-};
-
-/// What the smoothing takes from a corner of each vertex of a block, in the corner's frame.
+/// What the smoothing takes from a corner of each vertex of a block, in the corner's frame. In the order of the kernels'
+/// lanes.
 struct MushDetails {
     Lanes<float> x;
     Lanes<float> y;
@@ -59,11 +52,12 @@ struct MushMesh {
     std::vector<std::uint32_t> vertices;  // [vertices] as the caller numbers them
     std::vector<MushRun> runs;
     std::vector<std::uint32_t> first_runs;  // [chunks + 1]
+    std::size_t reach = 1;                  // neighbours are at most so many chunks away; at least 1
     std::vector<std::int32_t> neighbours;
     std::vector<MushBlock> blocks;
     std::vector<std::uint32_t> first_blocks;  // [chunks + 1]
-    std::vector<MushEnds> ends;
-    std::vector<FirstEnds> first_ends;
+    std::vector<Lanes<std::int32_t>> spokes;  // where they lead
+    std::vector<std::int32_t> first_spokes;   // of a block's first vertex, where it is consecutive
     std::size_t detail_count = 0;           // of all blocks
     std::vector<std::uint8_t> on_boundary;  // [vertices] an edge of one face ends there
 
