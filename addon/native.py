@@ -1,20 +1,58 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the native library loads in this Blender, and why not."""
+"""Whether the native library loads in this Blender and is that of this extension, and why not."""
 
 from __future__ import annotations
 
 import platform
 import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+# What the extension uses of the library.
+NAMES = (
+    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Method", "Parameter", "Skeleton", "Stage"),
+    *("affine", "centres_of_rotation", "dual_quat", "interpolate", "keep_thread_state", "methods"),
+    *("quat_vec", "spline", "stages"),
+)
 
 
 def load_error() -> str | None:
-    """None where `sinew` imports, else one sentence for the panel."""
+    """None where `sinew` imports and has what the extension needs, else one sentence for the panel."""
     try:
-        import sinew  # noqa: F401
+        import sinew
     except ImportError as error:
         version = f"{sys.version_info.major}.{sys.version_info.minor}"
         return (
             f"Sinew's native library does not load in this Blender (Python {version}, {platform.system()} "
             f"{platform.machine()}): {error}. Install the Sinew zip made for this system"
         )
-    return None
+    return _age_error(sinew)
+
+
+def _age_error(library: ModuleType) -> str | None:
+    """One sentence where the library is older than the extension."""
+    own, found = _own_version(), getattr(library, "__version__", "")
+    missing = [name for name in NAMES if not hasattr(library, name)]
+    if not missing and (not own or _numbers(found) >= _numbers(own)):
+        return None
+    what = f" lacks {', '.join(missing)}, and" if missing else ""
+    place = Path(library.__file__ or "").parent
+    return (
+        f"The library sinew {found or 'of no version'} in {place}{what} is older than this extension "
+        f"({own or 'of no version'}): install the one that comes with it, and restart Blender"
+    )
+
+
+def _own_version() -> str:
+    """Of the extension; empty where it lies somewhere without its manifest."""
+    try:
+        text = Path(__file__).with_name("blender_manifest.toml").read_text(encoding="utf-8")
+        return str(tomllib.loads(text)["version"])
+    except (OSError, KeyError, ValueError):
+        return ""
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """To compare by: what is no number is less than any."""
+    return tuple(int(part) if part.isdigit() else -1 for part in version.split("."))

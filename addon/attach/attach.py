@@ -105,6 +105,7 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
         obj.modifiers.active = active
     settings.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
+    properties.make_groups(settings)
     for modifier, replaced in replaced_modifiers(obj):
         replaced.armature = modifier.object
         if method is None and method_of(modifier) != settings.method:

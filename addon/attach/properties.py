@@ -348,6 +348,13 @@ def copy_groups(source: SinewSettings, target: SinewSettings, names: Iterable[st
             copy(getattr(source, name), getattr(target, name))
 
 
+def make_groups(settings: SinewSettings) -> None:
+    """Has the object all groups of settings, which are made by being read: Blender 5.2 can not give a library
+    override one that its library lacks."""
+    for name in (*STAGE_GROUPS, *METHOD_GROUPS):
+        getattr(settings, name)
+
+
 def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:
     """Sets what Sinew keeps for itself: telling Blender would touch the object's mesh, as its weights' change
     does."""

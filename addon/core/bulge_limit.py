@@ -44,6 +44,8 @@ class BulgeLimit:
         self._link = -1
         self._rest_points: np.ndarray | None = None
         self._space: np.ndarray | None = None
+        # By the number of the Armature modifier.
+        self._inverses: dict[int, np.ndarray] = {}
 
     def apply(
         self, points: np.ndarray, values: Mapping[str, Any], rest_points: np.ndarray, frames: Sequence[Any]
@@ -52,12 +54,20 @@ class BulgeLimit:
         if link is None:
             return
         frame, bones = frames[link], self._mesh.weightings[link].bones
-        motions = frame.pose.astype(np.float64) @ np.linalg.inv(bones.rest.astype(np.float64))
+        motions = frame.pose.astype(np.float64) @ self._rest_inverses(link)
         if frame.scale_rule == IGNORED.name:
             motions = sinew.affine.split_scale(motions, bones.rest_axes.astype(np.float64)).rigid
         self._bind(link, rest_points, frame.bones_from_model).apply(
             points, motions.astype(np.float32), points, strength=values["strength"], form=values["form"]
         )
+
+    def _rest_inverses(self, link: int) -> np.ndarray:
+        """float64 [bones + joints, 4, 4]. Inverted once: numpy does it with threads of its own, for which a
+        frame would wait on a busy machine."""
+        if link not in self._inverses:
+            rest = self._mesh.weightings[link].bones.rest
+            self._inverses[link] = np.linalg.inv(rest.astype(np.float64))
+        return self._inverses[link]
 
     def _bind(self, link: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> sinew.BulgeLimit:
         weighting = self._mesh.weightings[link]

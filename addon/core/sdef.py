@@ -15,6 +15,9 @@ MISSING = (
     f"The mesh lacks the shape keys {KEYS[0]}, {KEYS[1]} and {KEYS[2]}: all vertices are blended linearly"
 )
 
+ELSEWHERE = "mmd_sdef_skinning"
+"""The shape key by which mmd_tools itself deforms what it has taken from the Armature modifier by a mask."""
+
 
 def vertex_data(
     points: np.ndarray, keys: np.ndarray, influences: Influences, group_of_bone: np.ndarray

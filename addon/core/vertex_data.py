@@ -133,10 +133,12 @@ class VertexData:
             return True
         with self._lock:
             entry = self._entries.get(method)
-            is_ready = entry is not None and entry.made is not None
+            made = None if entry is None else entry.made
+            is_ready = made is not None
             if precomputations.waits:
                 # What is outdated is then made anew, which takes triangles.
-                is_ready = self.triangles is not None or (is_ready and not entry.is_outdated)
+                is_outdated = entry is not None and entry.is_outdated
+                is_ready = self.triangles is not None or (is_ready and not is_outdated)
             if not is_ready:
                 self.missed.add(method)
             return is_ready

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..attach import attach, properties, stack, stage_settings
 from ..attach.modifier_options import ModifierOptions, differences
+from ..core import sdef
 from ..core.errors import SinewError
 from ..core.rig import RigFacts, Weighting, describe_rig
 from ..core.spaces import transformed
@@ -35,7 +36,19 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    return facts.with_warnings([*differences(obj), *_missing_groups(obj)])
+    return facts.with_warnings([*differences(obj), *_missing_groups(obj), *_other_sdef(obj)])
+
+
+def _other_sdef(obj: bpy.types.Object) -> list[str]:
+    """A sentence where mmd_tools' own SDEF is at work on the mesh."""
+    keys = obj.data.shape_keys
+    block = None if keys is None else keys.key_blocks.get(sdef.ELSEWHERE)
+    if block is None or block.mute:
+        return []
+    return [
+        f"mmd_tools deforms a part of this mesh by its shape key {sdef.ELSEWHERE}: unbind its SDEF, then "
+        "Sinew deforms all of it"
+    ]
 
 
 def _missing_groups(obj: bpy.types.Object) -> list[str]:

@@ -113,6 +113,17 @@ def _draw_mix(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
     layout.prop_search(mix, "group", obj, "vertex_groups", text="By")
     if not mix.group:
         draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
+    _draw_make_group(layout, obj, "mix")
+
+
+def _draw_make_group(layout: bpy.types.UILayout, obj: bpy.types.Object, stage: str) -> None:
+    """A button where the stage lacks the vertex group that it names, or the mix any."""
+    name = getattr(properties.of(obj), stage).group
+    if name in obj.vertex_groups or not (name or stage == "mix"):
+        return
+    text = f"Make Vertex Group {name}" if name else "Make a Vertex Group"
+    button = layout.operator("sinew.make_group", text=text, icon="GROUP_VERTEX")
+    button.name, button.stage = obj.name, stage
 
 
 def _draw_stage(
@@ -128,6 +139,7 @@ def _draw_stage(
     for parameter in others:
         if parameter.kind == "vertex_group":
             column.prop_search(group, parameter.id, obj, "vertex_groups")
+            _draw_make_group(column, obj, stage.name)
         else:
             column.prop(group, parameter.id)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import bpy
 
-from ..attach import attach, corrective_smooth, properties
+from ..attach import attach, corrective_smooth, properties, stage_settings
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..deform import session
@@ -161,4 +161,48 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, bpy.types.Operator):
             return _for_each(self, objects, corrective_smooth.take_over, "Took over Corrective Smooth of")
 
 
-CLASSES = (SINEW_OT_add, SINEW_OT_rebind, SINEW_OT_remove, SINEW_OT_take_over_smooth)
+class SINEW_OT_make_group(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.make_group"
+    bl_label = "Make Vertex Group"
+    bl_description = (
+        "Make the vertex group that says where the stage acts, and choose it. The shape stays as it is until "
+        "you paint: for a mix it has no weights, for other stages all"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Of the object")
+    stage: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Name of the stage")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if self.stage not in stage_settings.STAGES:
+            self.report({"ERROR"}, f"There is no stage {self.stage!r}")
+            return {"CANCELLED"}
+        objects = [obj for obj in sinew_targets(context) if self.name in ("", obj.name)]
+        with session.changing(context):
+            return _for_each(self, objects, self._make, "Made the vertex group of")
+
+    def _make(self, obj: bpy.types.Object) -> None:
+        stage, settings = stage_settings.STAGES[self.stage], getattr(properties.of(obj), self.stage)
+        if obj.data.library is not None or obj.data.is_editmode:
+            why = (
+                "in edit mode; leave it"
+                if obj.data.is_editmode
+                else "linked from another file; make it local"
+            )
+            raise SinewError(f"{obj.name}: its mesh is {why} first")
+        name = settings.group or stage.label
+        group = obj.vertex_groups.get(name) if settings.group else None
+        if group is None:
+            group = obj.vertex_groups.new(name=name)
+            if stage.name != "mix":
+                group.add(range(len(obj.data.vertices)), 1.0, "REPLACE")
+        settings.group = group.name
+
+
+CLASSES = (
+    SINEW_OT_add,
+    SINEW_OT_rebind,
+    SINEW_OT_remove,
+    SINEW_OT_take_over_smooth,
+    SINEW_OT_make_group,
+)

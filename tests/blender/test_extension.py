@@ -129,6 +129,38 @@ sinew_addon.unregister()
 """
 
 
+OLDER_LIBRARY = """
+import sys
+import sinew
+exec(sys.argv[1])
+import bpy, sinew_addon
+from sinew_addon import cli
+sinew_addon.register()
+assert bpy.types.SINEW_PT_unavailable.bl_category == "Sinew"
+assert not hasattr(bpy.types.Object, "sinew")
+sinew_addon.unregister()
+sys.exit(cli.main(["methods"]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ("sinew.__version__ = '0.0.9'", "The library sinew 0.0.9 in "),
+        ("del sinew.BulgeLimit, sinew.stages", " lacks BulgeLimit, stages, and is older than this extension"),
+    ],
+)
+@pytest.mark.once
+def test_an_older_library_is_named_in_one_sentence(change, sentence):
+    result = subprocess.run(
+        [sys.executable, "-c", OLDER_LIBRARY, change], capture_output=True, text=True, timeout=120
+    )
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert "Traceback" not in result.stderr
+    assert sentence in result.stderr
+    assert "install the one that comes with it" in result.stderr
+
+
 def test_without_the_library_the_panel_says_why_and_files_keep_their_settings(tmp_path):
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "qv")

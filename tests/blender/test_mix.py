@@ -162,3 +162,41 @@ def test_saved_copied_and_removed(tmp_path):
     assert whole_file.differences(before, whole_file.of_open_file()) == []
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert scenes.worst(scenes.shapes(bpy.data.objects["Arm"], FRAMES), expected) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["", "not there"])
+def test_a_button_makes_the_group_that_is_missing(name):
+    """Nothing changes before somebody paints."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "lbs")
+    bpy.context.scene.frame_set(11)
+    mix = properties.of(obj).mix
+    mix.method, mix.group = "dq", name
+    before = scenes.final_points(obj)
+    if name:
+        assert any("nothing is mixed" in text for text in session.state_of(obj).bound.facts.warnings)
+    assert bpy.ops.sinew.make_group(name=obj.name, stage="mix") == {"FINISHED"}
+    assert mix.group == (name or "Mix")
+    assert session.state_of(obj).bound.facts.warnings == ()
+    assert scenes.worst(scenes.final_points(obj), before) == 0.0
+    obj.vertex_groups[mix.group].add(range(len(obj.data.vertices)), 1.0, "REPLACE")
+    assert scenes.worst(scenes.final_points(obj), before) > 0.01
+
+
+@pytest.mark.parametrize("stage", ["bulge_limit", "delta_mush"])
+def test_a_button_makes_the_group_of_a_stage(stage):
+    """Which acts everywhere until somebody paints, as without one."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    without = scenes.final_points(obj)
+    settings = getattr(properties.of(obj), stage)
+    settings.group, settings.enabled = "not there", True
+    before = scenes.final_points(obj)
+    assert scenes.worst(without, before) > 0.001
+    assert bpy.ops.sinew.make_group(name=obj.name, stage=stage) == {"FINISHED"}
+    assert scenes.worst(scenes.final_points(obj), before) < 1e-6
+    obj.vertex_groups["not there"].remove(range(len(obj.data.vertices)))
+    assert scenes.worst(scenes.final_points(obj), without) < 1e-6
+    with pytest.raises(RuntimeError, match="no stage 'none'"):
+        bpy.ops.sinew.make_group(name=obj.name, stage="none")

@@ -172,3 +172,15 @@ def test_it_is_mixed_with_another_method(route):
     obj.vertex_groups.remove(group)
     expected = linear + 0.25 * (expected_points(obj) - linear)
     assert scenes.worst(mixed, expected) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_that_mmd_tools_deforms_it_too_is_said():
+    """Where it is bound, it masks the Armature modifier and deforms the rest by a shape key with a driver."""
+    obj = make_model()[0]
+    scenes.add_sinew(obj, "sdef")
+    key = obj.shape_key_add(name="mmd_sdef_skinning", from_mix=False)
+    session.rebind(obj, bpy.context)
+    assert any("unbind its SDEF" in text for text in session.state_of(obj).bound.facts.warnings)
+    key.mute = True
+    session.rebind(obj, bpy.context)
+    assert not any("unbind" in text for text in session.state_of(obj).bound.facts.warnings)

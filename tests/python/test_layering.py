@@ -239,3 +239,19 @@ def test_a_wrong_room_is_seen(path, text):
 )
 def test_a_right_room_is_let_through(path, text):
     assert wrong_rooms(text, Path(path)) == set()
+
+
+def test_what_the_extension_uses_of_the_library_is_looked_for_when_it_starts():
+    """addon/native.py says so in a sentence where an older library lacks it."""
+    addon = ROOT / "addon"
+    tree = ast.parse((addon / "native.py").read_text(encoding="utf-8"))
+    names = next(n.value for n in tree.body if isinstance(n, ast.Assign) and n.targets[0].id == "NAMES")
+    listed = {node.value for node in ast.walk(names) if isinstance(node, ast.Constant)}
+    used = set()
+    for path in sources(addon, ".py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module == "sinew" and not node.level:
+                used |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "sinew":
+                used.add(node.attr)
+    assert used - {"__version__", "__file__"} == listed
