@@ -547,6 +547,7 @@ class SkinnedNormals:
         vectors; the same of tangents, or None.
 
         Arguments are those of Deformer.deform. Where the blend mirrors, a normal is on the side that the
-        order of a face's vertices gives. Where it flattens the plane of a normal to a line, that is 0. The GIL
-        is released for large meshes. Raises ValueError that names the argument, what was wanted and what came.
+        order of a face's vertices gives. Where it flattens the plane of a normal to a line, that is 0.
+        The GIL is released for large meshes. Raises ValueError that names the argument, what was wanted
+        and what came.
         """
