@@ -7,6 +7,7 @@
 
 #include "arrays.h"
 #include "broadcast.h"
+#include "deform_arguments.h"
 #include "gil.h"
 #include "module.h"
 #include "parameters.h"
@@ -27,12 +28,16 @@ std::string names_of_methods() {
     return names;
 }
 
+}  // namespace
+
 MethodInfo checked_method(const py::object& method, const char* argument) {
     const std::string wanted = "one of " + names_of_methods();
     const std::string name = checked_name(method, argument, wanted);
     if (const std::optional<MethodInfo> found = find_method(name)) return *found;
     fail(argument, wanted, "'" + name + "'");
 }
+
+namespace {
 
 /// The arrays that BindData points at.
 struct BindArrays {
@@ -103,16 +108,7 @@ Deformer make_deformer(const py::object& rest_points, const py::object& influenc
                     row);
 }
 
-/// The argument `mix`, and the array that MixData points at.
-struct MixArguments {
-    std::optional<MethodInfo> method;
-    py::array_t<float> weights;
-
-    [[nodiscard]] std::optional<MixData> data() const {
-        if (!method) return std::nullopt;
-        return MixData{*method, as_span(weights)};
-    }
-};
+}  // namespace
 
 MixArguments checked_mix(const py::object& mix) {
     if (mix.is_none()) return {};
@@ -126,6 +122,8 @@ MixArguments checked_mix(const py::object& mix) {
     const MethodInfo second = checked_method(pair[0], "mix");
     return {second, checked<float>(pair[1], "mix", 1, "weights float32 [vertices]", kMaxVertices)};
 }
+
+namespace {
 
 Deformer make_deformer_of(const Binding& binding, const py::object& method, const py::object& mix) {
     const MethodInfo first = checked_method(method, "method");
@@ -270,12 +268,6 @@ MethodParameter checked_parameter_name(const py::handle& name) {
     fail("parameters", wanted, "'" + text + "'");
 }
 
-/// What DeformOptions::parameters and mix_parameters point at.
-struct Parameters {
-    std::vector<double> of_method;
-    std::vector<double> of_mix;
-};
-
 /// From a dict of values by the full names of parameters. Those of other methods are checked, and change nothing.
 Parameters checked_parameters(const Deformer& deformer, const py::object& parameters) {
     if (parameters.is_none()) return {};
@@ -296,31 +288,43 @@ Parameters checked_parameters(const Deformer& deformer, const py::object& parame
     return values;
 }
 
-py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
-                          const py::object& threads, const py::object& bones_from_model,
-                          const py::object& rest_inverses, const py::object& parameters) {
-    const std::vector<Affine<float>> bones = rest_inverses.is_none()
-                                                 ? checked_affines(bone_transforms, "bone_transforms")
-                                                 : posed_from_rest(bone_transforms, rest_inverses);
-    if (bones.size() < deformer.bone_count()) {
+}  // namespace
+
+DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
+                               const py::object& threads, const py::object& bones_from_model,
+                               const py::object& rest_inverses, const py::object& parameters) {
+    DeformArguments arguments;
+    arguments.bones = rest_inverses.is_none() ? checked_affines(bone_transforms, "bone_transforms")
+                                              : posed_from_rest(bone_transforms, rest_inverses);
+    if (arguments.bones.size() < deformer.bone_count()) {
         fail("bone_transforms", "at least " + std::to_string(deformer.bone_count()) + " bones",
-             std::to_string(bones.size()));
+             std::to_string(arguments.bones.size()));
     }
-    DeformOptions options;
+    DeformOptions& options = arguments.options;
     options.threads = checked_threads(threads);
-    const Parameters values = checked_parameters(deformer, parameters);
-    options.parameters = values.of_method;
-    options.mix_parameters = values.of_mix;
+    arguments.values = checked_parameters(deformer, parameters);
+    options.parameters = arguments.values.of_method;
+    options.mix_parameters = arguments.values.of_mix;
     if (!bones_from_model.is_none()) {
         options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
         if (glm::determinant(Mat3<double>(options.bones_from_model.linear)) == 0.0) {
             fail("bones_from_model", "an invertible transform", "one of determinant 0");
         }
     }
+    return arguments;
+}
+
+namespace {
+
+py::array_t<float> deform(const Deformer& deformer, const py::object& bone_transforms, const py::object& out,
+                          const py::object& threads, const py::object& bones_from_model,
+                          const py::object& rest_inverses, const py::object& parameters) {
+    const DeformArguments arguments =
+        checked_deform(deformer, bone_transforms, threads, bones_from_model, rest_inverses, parameters);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
                                         deformer.vertex_count());
-    const auto run = [&] { deformer.deform(bones, options, target); };
+    const auto run = [&] { deformer.deform(arguments.bones, arguments.options, target); };
     // Where many threads want the lock, getting it back takes longer than to deform a small mesh.
     deformer.vertex_count() > kVerticesUnderLock ? without_gil(run) : run();
     return points;

@@ -166,8 +166,7 @@ void bind_normals(py::module_& m) {
              "    nothing is sharp or custom.\n"
              "sharp_edges: None, or bool [edges].\n"
              "sharp_faces: None, or bool [faces], which are flat.\n"
-             "custom_normals: None, or int16 [corners, 2], as Blender's attribute of the name custom_normal "
-             "has "
+             "custom_normals: None, or int16 [corners, 2], as Blender's attribute custom_normal has "
              "them.\n\n"
              "All input is copied. Raises ValueError that names the argument, what was wanted and what came.")
         .def_property_readonly(

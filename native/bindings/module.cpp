@@ -12,6 +12,7 @@ PYBIND11_MODULE(_native, m) {
     sinew::bindings::bind_bulge_limit(m);
     sinew::bindings::bind_delta_mush(m);
     sinew::bindings::bind_normals(m);
+    sinew::bindings::bind_skinned_normals(m);
     sinew::bindings::bind_precompute(m);
     sinew::bindings::bind_threads(m);
 }

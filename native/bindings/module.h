@@ -14,6 +14,7 @@ void bind_deformer(pybind11::module_& m);
 void bind_bulge_limit(pybind11::module_& m);
 void bind_delta_mush(pybind11::module_& m);
 void bind_normals(pybind11::module_& m);
+void bind_skinned_normals(pybind11::module_& m);
 void bind_precompute(pybind11::module_& m);
 
 }  // namespace sinew::bindings

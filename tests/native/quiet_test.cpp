@@ -12,6 +12,7 @@
 #include "scene.h"
 #include "sinew/deform/delta_mush.h"
 #include "sinew/deform/normals.h"
+#include "sinew/deform/skinned_normals.h"
 
 #ifdef __GLIBC__
 #include <dlfcn.h>
@@ -179,6 +180,21 @@ TEST(Normals, allocate_nothing_once_they_are_made) {
         EXPECT_EQ(allocations, allocations_before);
         EXPECT_GT(result.back().z, 0.1f);
     }
+}
+
+TEST(SkinnedNormals, allocate_nothing_once_they_are_made) {
+    const Scene scene = random_scene(2, 20000, 1.0);
+    const std::vector<Vec3<float>> normals(scene.rest_points.size(), Vec3<float>(0, 0, 1));
+    const SkinnedNormals skinned(Binding(scene.data()), Dq::info, {normals, normals});
+    auto points = normals, moved = normals, tangents = normals;
+    const int allocations_before = allocations;
+    for (const std::size_t threads : {1, 4, 0}) {
+        DeformOptions options;
+        options.threads = threads;
+        skinned.deform(scene.posed_from_rest, options, points, moved, tangents);
+    }
+    EXPECT_EQ(allocations, allocations_before);
+    EXPECT_NE(moved.front(), normals.front());
 }
 
 TEST(Bindings, are_packed_once) {

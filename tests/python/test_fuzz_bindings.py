@@ -493,6 +493,49 @@ def test_normals(data):
         same(result, copy.compute(posed, domain, None, 1))
 
 
+@many(0.2)
+@given(st.data())
+def test_skinned_normals(data):
+    vertices, bones = data.draw(st.sampled_from([0, 1, 5, 20])), data.draw(st.integers(1, 4))
+    wild = wild_one(data.draw, 10)
+    mesh = (
+        np.zeros((vertices, 3)),
+        range(vertices + 1),
+        [v % bones for v in range(vertices)],
+        np.ones(vertices),
+    )
+    binding = sinew.Binding(*mesh)
+    frames = data.draw(st.sampled_from([vertices, 3 * vertices]))
+    of_frames = None if frames == vertices else [i % vertices for i in range(frames)]
+    normals = data.draw(or_garbage(arrays((frames, 3), wild[0]), wild[0]))[0]
+    tangents = data.draw(st.one_of(st.none(), or_garbage(arrays((frames, 3), wild[1]), wild[1])))
+    skinned = attempt(
+        sinew.SkinnedNormals,
+        [
+            binding,
+            normals,
+            None if tangents is None else tangents[0],
+            data.draw(names(st.just(of_frames), wild[2])),
+            data.draw(names(METHODS, wild[3])),
+            data.draw(names(st.none(), wild[4])),
+        ],
+        {"binding", "normals", "tangents", "vertices", "method", "mix"},
+    )
+    if skinned is None:
+        return
+    repr(skinned)
+    pose = data.draw(or_garbage(arrays((bones, 4, 4), wild[5]), wild[5]))[0]
+    threads = data.draw(names(st.one_of(st.none(), st.integers(0, 70)), wild[6]))
+    space = data.draw(names(st.none(), wild[7]))
+    inverses = data.draw(names(st.none(), wild[8]))
+    parameters = data.draw(names(st.none(), wild[9]))
+    known = {"bone_transforms", "threads", "bones_from_model", "rest_inverses", "parameters"}
+    result = attempt(skinned.deform, [pose, threads, space, inverses, parameters], known)
+    if result is not None:
+        assert result[0].shape == (vertices, 3)
+        assert result[1].shape == (skinned.frame_count, 3)
+
+
 @many(0.1)
 @given(st.data())
 def test_bulge_limits(data):

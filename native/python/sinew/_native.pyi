@@ -507,3 +507,47 @@ class Normals:
         normals of faces cancel, that of their vertex is 0. None is NaN. The GIL is released for large
         meshes. Raises ValueError that names the argument, what was wanted and what came.
         """
+
+@final
+class SkinnedNormals:
+    """Normals and tangents that move with the skin, as engines have them: each by the blend of its own
+    vertex, normals by the inverse transpose. What the change of weights does to the surface is not in them.
+    """
+
+    def __init__(
+        self,
+        binding: Binding,
+        normals: ArrayLike,
+        tangents: ArrayLike | None = None,
+        vertices: ArrayLike | None = None,
+        method: str = "lbs",
+        mix: tuple[str, ArrayLike] | None = None,
+    ) -> None:
+        """binding: a Binding; not copied.
+        normals: float32 [frames, 3], at rest, of any length.
+        tangents: None, or float32 [frames, 3].
+        vertices: int32 [frames], the vertex of each, as for the corners of faces; None: one frame for each
+            vertex.
+        method, mix: as of Deformer.
+
+        Raises ValueError that names the argument, what was wanted and what came.
+        """
+    @property
+    def frame_count(self) -> int:
+        """How many normals it has."""
+    def deform(
+        self,
+        bone_transforms: ArrayLike,
+        threads: int | np.integer[Any] | None = None,
+        bones_from_model: ArrayLike | None = None,
+        rest_inverses: ArrayLike | None = None,
+        parameters: Mapping[str, float | bool | str] | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32] | None]:
+        """(points, normals, tangents): float32 [vertices, 3], the deformed points; float32 [frames, 3], unit
+        vectors; the same of tangents, or None.
+
+        Arguments are those of Deformer.deform. Where the blend mirrors, a normal is on the side that the
+        order of a face's vertices gives. Where it flattens the plane of a normal to a line, that is 0.
+        The GIL is released for large meshes. Raises ValueError that names the argument, what was wanted
+        and what came.
+        """

@@ -11,6 +11,7 @@
 #include "sinew/deform/delta_mush.h"
 #include "sinew/deform/normals.h"
 #include "sinew/deform/simd.h"
+#include "sinew/deform/skinned_normals.h"
 #include "sinew/deform/thread_pool.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/skeleton/forward_kinematics.h"
@@ -75,6 +76,21 @@ void compute_normals() {
     for (const auto& normal : result) expect(normal == sinew::Vec3<float>(0, 0, 1), "a flat face's normal");
 }
 
+void move_normals() {
+    const std::vector<sinew::Vec3<float>> rest{{1, 0, 0}}, normals{{0, 0, 1}};
+    const std::vector<std::int32_t> offsets{0, 1}, bones{0};
+    const std::vector<float> weights{1.0f};
+    std::vector<sinew::Affine<float>> pose(1);
+    pose[0].linear = sinew::Mat3<float>(0, 1, 0, 0, 0, 1, 1, 0, 0);
+    const sinew::Binding binding({rest, offsets, bones, weights});
+    const sinew::SkinnedNormals skinned(binding, sinew::Lbs::info, {normals});
+    std::vector<sinew::Vec3<float>> points(1), moved(1);
+    skinned.deform(pose, {}, points, moved);
+    expect(skinned.frame_count() == 1 && !skinned.has_tangents() && skinned.deformer().vertex_count() == 1,
+           "SkinnedNormals say what they were made of");
+    expect(glm::length(moved[0] - sinew::Vec3<float>(1, 0, 0)) < 1e-5f, "a normal turns with its bone");
+}
+
 void limit_bulges() {
     const std::vector<sinew::Vec3<float>> rest{{0, 1, 0}};
     const std::vector<std::int32_t> offsets{0, 2}, bones{0, 1};
@@ -108,6 +124,7 @@ int main() {
     deform();
     smooth();
     compute_normals();
+    move_normals();
     limit_bulges();
     find_centres();
     interpolate();

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <string>
+
+#include "arrays.h"
+#include "deform_arguments.h"
+#include "gil.h"
+#include "module.h"
+#include "sinew/deform/skinned_normals.h"
+
+namespace sinew::bindings {
+namespace {
+
+constexpr std::size_t kFramesUnderLock = 4096;  // some 30 microseconds
+
+/// [n, 3]; none where `value` is None.
+py::array_t<float> checked_vectors(const py::object& value, const char* argument) {
+    if (value.is_none()) return checked_out(py::none(), 0);
+    return checked_points(value, argument);
+}
+
+SkinnedNormals make(const Binding& binding, const py::object& normals, const py::object& tangents,
+                    const py::object& vertices, const py::object& method, const py::object& mix) {
+    const auto rest_normals = checked_points(normals, "normals");
+    const auto rest_tangents = checked_vectors(tangents, "tangents");
+    py::array_t<std::int32_t> of_frames;
+    if (!vertices.is_none()) of_frames = checked<std::int32_t>(vertices, "vertices", 1, "int32 [normals]");
+    const MethodInfo first = checked_method(method, "method");
+    const MixArguments second = checked_mix(mix);
+    return SkinnedNormals(binding, first,
+                          {as_points(rest_normals), as_points(rest_tangents), as_span(of_frames)},
+                          second.data());
+}
+
+std::span<Vec3<float>> writable(py::array_t<float>& points) {
+    return {reinterpret_cast<Vec3<float>*>(points.mutable_data()), static_cast<std::size_t>(points.shape(0))};
+}
+
+py::tuple deform(const SkinnedNormals& skinned, const py::object& bone_transforms, const py::object& threads,
+                 const py::object& bones_from_model, const py::object& rest_inverses,
+                 const py::object& parameters) {
+    const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
+                                                     bones_from_model, rest_inverses, parameters);
+    const std::size_t frames = skinned.frame_count();
+    auto points = checked_out(py::none(), skinned.deformer().vertex_count());
+    auto normals = checked_out(py::none(), frames);
+    auto tangents = checked_out(py::none(), skinned.has_tangents() ? frames : 0);
+    const auto to_points = writable(points), to_normals = writable(normals), to_tangents = writable(tangents);
+    const auto run = [&] {
+        skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents);
+    };
+    frames > kFramesUnderLock ? without_gil(run) : run();
+    if (!skinned.has_tangents()) return py::make_tuple(points, normals, py::none());
+    return py::make_tuple(points, normals, tangents);
+}
+
+std::string text_of(const SkinnedNormals& skinned) {
+    return "<sinew.SkinnedNormals: " + std::to_string(skinned.frame_count()) + " of " +
+           std::to_string(skinned.deformer().vertex_count()) + " vertices, method " +
+           std::string(skinned.deformer().method().name) + ">";
+}
+
+}  // namespace
+
+void bind_skinned_normals(py::module_& m) {
+    py::class_<SkinnedNormals>(
+        m, "SkinnedNormals",
+        "Normals and tangents that move with the skin, as engines have them: each by the blend of its own "
+        "vertex,\n"
+        "normals by the inverse transpose. What the change of weights does to the surface is not in them.")
+        .def(py::init(&make), py::arg("binding"), py::arg("normals"), py::arg("tangents") = py::none(),
+             py::arg("vertices") = py::none(), py::arg("method") = "lbs", py::arg("mix") = py::none(),
+             "binding: a Binding; not copied.\n"
+             "normals: float32 [frames, 3], at rest, of any length.\n"
+             "tangents: None, or float32 [frames, 3].\n"
+             "vertices: int32 [frames], the vertex of each, as for the corners of faces; None: one frame for "
+             "each\n"
+             "    vertex.\n"
+             "method, mix: as of Deformer.\n\n"
+             "Raises ValueError that names the argument, what was wanted and what came.")
+        .def_property_readonly("frame_count", &SkinnedNormals::frame_count, "How many normals it has.")
+        .def("__repr__", &text_of)
+        .def("deform", &deform, py::arg("bone_transforms"), py::arg("threads") = py::none(),
+             py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
+             py::arg("parameters") = py::none(),
+             "(points, normals, tangents): float32 [vertices, 3], the deformed points; float32 [frames, 3], "
+             "unit\n"
+             "vectors; the same of tangents, or None.\n\n"
+             "Arguments are those of Deformer.deform. Where the blend mirrors, a normal is on the side that "
+             "the "
+             "order of\n"
+             "a face's vertices gives. Where it flattens the plane of a normal to a line, that is 0. The GIL "
+             "is\n"
+             "released for large meshes. Raises ValueError that names the argument, what was wanted and what "
+             "came.");
+}
+
+}  // namespace sinew::bindings

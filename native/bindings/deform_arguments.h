@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "arrays.h"
+#include "sinew/deform/deformer.h"
+
+namespace sinew::bindings {
+
+/// The method of a name. ValueError that names `argument`, TypeError for what is no str.
+MethodInfo checked_method(const py::object& method, const char* argument);
+
+/// The argument `mix`, and the array that MixData points at.
+struct MixArguments {
+    std::optional<MethodInfo> method;
+    py::array_t<float> weights;
+
+    [[nodiscard]] std::optional<MixData> data() const {
+        if (!method) return std::nullopt;
+        return MixData{*method, as_span(weights)};
+    }
+};
+
+/// None, or (method, weights).
+MixArguments checked_mix(const py::object& mix);
+
+/// What DeformOptions::parameters and mix_parameters point at.
+struct Parameters {
+    std::vector<double> of_method;
+    std::vector<double> of_mix;
+};
+
+/// How a frame is deformed, and what the options point at.
+struct DeformArguments {
+    std::vector<Affine<float>> bones;  // posed_from_rest
+    Parameters values;
+    DeformOptions options;
+
+    DeformArguments() = default;
+    DeformArguments(DeformArguments&&) = default;  // the options point at memory that stays
+    DeformArguments(const DeformArguments&) = delete;
+};
+
+/// The arguments of Deformer.deform but for `out`.
+DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_transforms,
+                               const py::object& threads, const py::object& bones_from_model,
+                               const py::object& rest_inverses, const py::object& parameters);
+
+}  // namespace sinew::bindings
