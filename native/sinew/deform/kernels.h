@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "sinew/deform/bone_moments.h"
 #include "sinew/deform/packed_mesh.h"
 #include "sinew/deform/palette.h"
 
@@ -16,6 +17,7 @@ struct Frame {
     const PackedMesh* mesh;
     const Lanes<float>* rows;         // of the mesh, or with other rest points
     const Lanes<float>* vertex_rows;  // [blocks][MethodInfo::vertex_floats]; null: the method has none
+    const BoneMoments* moments;       // null: the method has none
     const std::int32_t* bones;        // as PackedMesh::bones, or BoneSets::entries
     const Palette* palette;
     const Float4* bones_from_model;  // displacements of points to the space of the bones and back;
