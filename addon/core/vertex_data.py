@@ -207,8 +207,8 @@ class VertexData:
             return entry is not None and bool(entry.key) and entry.key in precomputations.stopped
 
     def of(self, method: str, bones_from_model: np.ndarray) -> np.ndarray | None:
-        """float32 [vertices or rows, Method.vertex_floats], object space; None for a method that keeps nothing. Made
-        here where there is none.
+        """float32 [vertices or rows, Method.vertex_floats], object space; None for a method that keeps
+        nothing. Made here where there is none.
 
         bones_from_model  float64 [4, 4], where weights depend on where vertices are: the first call decides
         """
@@ -290,7 +290,7 @@ class VertexData:
 
 
 def _values_of(method: str, values: Mapping[str, Value]) -> dict[str, float]:
-    """By the ids of parameters. As Blender's properties round them, so that a default equals what it was set to."""
+    """By the ids of parameters. As Blender's properties round them: a default equals what it was set to."""
     defaults = {each.id: each.default for each in METHODS[method].parameters}
     names = PROVIDERS[method].parameters
     return {name: float(np.float32(values.get(f"{method}.{name}", defaults[name]))) for name in names}

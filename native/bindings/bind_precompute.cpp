@@ -148,26 +148,26 @@ void bind_precompute(py::module_& m) {
         "progress: None, or a callable that is called on this thread with the share that is done, 0 to 1.\n"
         "    Where it returns False the work ends, and the result is None. What it raises comes through.\n\n"
         "Precomputations of other methods take `threads` and `progress` alike. The GIL is released.");
-    m.def(
-        "direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
-        py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
-        py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
-        py::arg("progress") = py::none(),
-        "What the method \"ddm\" keeps: the moments of each bone's smoothed weights about each vertex (Le, "
-        "Lewis 2019),\n"
-        "float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x, y, "
-        "z; from the\n"
-        "origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments); "
-        "vertices rise,\n"
-        "and bones of a vertex. It belongs to these rest points and this radius.\n\n"
-        "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"
-        "triangles: int32 [triangles, 3], vertices.\n"
-        "radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard "
-        "deviation\n"
-        "    along each axis.\n"
-        "exact: also weights below 1e-6; else these are left out.\n"
-        "threads, progress: as of centres_of_rotation. The GIL is released.\n\n"
-        "Raises RuntimeError where Sinew was built without this method.");
+    m.def("direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
+          py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
+          py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
+          py::arg("progress") = py::none(),
+          "What the method \"ddm\" keeps: the moments of each bone's smoothed weights about each vertex (Le, "
+          "Lewis 2019),\n"
+          "float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x, "
+          "y, "
+          "z; from the\n"
+          "origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments); "
+          "vertices rise,\n"
+          "and bones of a vertex. It belongs to these rest points and this radius.\n\n"
+          "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"
+          "triangles: int32 [triangles, 3], vertices.\n"
+          "radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard "
+          "deviation\n"
+          "    along each axis.\n"
+          "exact: also weights below 1e-6; else these are left out.\n"
+          "threads, progress: as of centres_of_rotation. The GIL is released.\n\n"
+          "Raises RuntimeError where Sinew was built without this method.");
 }
 
 }  // namespace sinew::bindings

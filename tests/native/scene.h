@@ -104,8 +104,18 @@ private:
         const float* const centre = &vertex_numbers[kVertexNumbers * vertex];
         for (const auto& [bone, share] : shares) {
             const auto weight = static_cast<float>(share);
-            const float row[] = {static_cast<float>(vertex), static_cast<float>(bone), weight, weight * centre[0],
-                                 weight * centre[1], weight * centre[2], 0, 0, 0, 0, 0, 0};
+            const float row[] = {static_cast<float>(vertex),
+                                 static_cast<float>(bone),
+                                 weight,
+                                 weight * centre[0],
+                                 weight * centre[1],
+                                 weight * centre[2],
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 0};
             rows.insert(rows.end(), std::begin(row), std::end(row));
         }
         return rows;

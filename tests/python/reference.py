@@ -3,8 +3,8 @@
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
 Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor),
-Kavan, Zara 2005 (sbs), Le, Lewis 2019 (ddm) and mmd_tools' formula (sdef); slow, one vertex at a time, and does not use the
-formulas of the library where others exist. Quaternions are (w, x, y, z).
+Kavan, Zara 2005 (sbs), Le, Lewis 2019 (ddm) and mmd_tools' formula (sdef); slow, one vertex at a time, and
+does not use the formulas of the library where others exist. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -272,8 +272,9 @@ LEAST_SINGULAR = 0.05
 
 
 def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="0", radius=None):
-    """neighbourhood: its moments [bones, 10], and motions, rotations and heads of these bones. The polar factor by
-    singular values; the tie is also where they are near one, or where it is far from the blended rotation."""
+    """neighbourhood: its moments [bones, 10], and motions, rotations and heads of these bones. The polar
+    factor is by singular values; the tie is also where these are near one, or where it is far from the
+    blended rotation."""
     if neighbourhood is None:
         return lbs(point, motions, rotations, weights)
     moments, its_motions, its_rotations, its_heads = neighbourhood
@@ -292,7 +293,10 @@ def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="
     if variant == "0" and sizes[0] > 1e-12 * max(1.0, np.abs(point).max()) ** 2:
         fitted = nearest_rotation(correlation)
         far = np.degrees(np.arccos(np.clip((np.trace(rotated.T @ fitted) - 1.0) / 2.0, -1.0, 1.0)))
-        is_sure = far < 60.0 and sizes[1] + np.sign(np.linalg.det(correlation)) * sizes[2] > LEAST_SINGULAR * sizes[0]
+        is_sure = (
+            far < 60.0
+            and sizes[1] + np.sign(np.linalg.det(correlation)) * sizes[2] > LEAST_SINGULAR * sizes[0]
+        )
         rotated, margin = fitted, margin if is_sure else 0.0
     own = rigid_parts(motions, rotations, heads)
     scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - own

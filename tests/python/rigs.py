@@ -66,7 +66,7 @@ class Rig:
 
     @property
     def moments(self):
-        """What ddm keeps: the own weights of each vertex, as if its neighbourhood were at its centre alone."""
+        """What ddm keeps: each vertex's own weights, as if its neighbourhood were at its centre alone."""
         vertices = np.repeat(np.arange(len(self.centres)), np.diff(self.offsets))
         totals = np.bincount(vertices, self.weights.astype(np.float64), len(self.centres))
         counts = totals[vertices] > 0.0

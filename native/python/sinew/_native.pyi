@@ -151,10 +151,10 @@ def direct_delta_mush(
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> NDArray[np.float32] | None:
-    """What the method "ddm" keeps: the moments of each bone's smoothed weights about each vertex (Le, Lewis 2019),
-    float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x, y, z; from the
-    origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments); vertices rise,
-    and bones of a vertex. It belongs to these rest points and this radius.
+    """What the method "ddm" keeps: the moments of each bone's smoothed weights about each vertex (Le, Lewis
+    2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment
+    (x, y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first
+    moments); vertices rise, and bones of a vertex. It belongs to these rest points and this radius.
 
     rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.
     triangles: int32 [triangles, 3], vertices.

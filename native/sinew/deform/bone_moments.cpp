@@ -41,7 +41,8 @@ public:
         // Of sum 1 but for rounding, unless some were left out.
         if (sum > 0.0 && sum < 0.999) {
             for (BoneRow& row : found) {
-                for (float& number : row.numbers) number = static_cast<float>(static_cast<double>(number) / sum);
+                for (float& number : row.numbers)
+                    number = static_cast<float>(static_cast<double>(number) / sum);
             }
         }
     }
@@ -158,7 +159,9 @@ private:
         for (std::size_t i = 0; i < lanes_[lane].size(); ++i) {
             const BoneRow& row = lanes_[lane][i];
             const std::size_t k =
-                block.mixed ? i : static_cast<std::size_t>(std::ranges::lower_bound(bones, row.bone) - bones.begin());
+                block.mixed
+                    ? i
+                    : static_cast<std::size_t>(std::ranges::lower_bound(bones, row.bone) - bones.begin());
             for (std::size_t n = 0; n < kMomentRows; ++n) {
                 rows[kNeighbourhoodRows + kMomentRows * k + n].lane[lane] = row.numbers[n];
                 if (n > 0) sums[n - 1] += static_cast<double>(row.numbers[n]);
@@ -199,9 +202,8 @@ std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& mom
             }
         }
     }
-    std::ranges::sort(found, [](const Full& a, const Full& b) {
-        return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1];
-    });
+    std::ranges::sort(found,
+                      [](const Full& a, const Full& b) { return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1]; });
     std::vector<float> rows;
     rows.reserve(kMomentFloats * found.size());
     for (const Full& row : found) rows.insert(rows.end(), row.begin(), row.end());

@@ -170,7 +170,8 @@ Binding::Packed::Packed(const BindData& data) {
 BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
     BoundMesh bound = bound_mesh(mesh, rows, vertex_count, bone_count);
     for (std::size_t i = 0; i < kMethodCount; ++i) {
-        if (!moments[i].blocks.empty()) bound.vertex_data.push_back({kMethods[i], unpack_moments(mesh, moments[i])});
+        if (!moments[i].blocks.empty())
+            bound.vertex_data.push_back({kMethods[i], unpack_moments(mesh, moments[i])});
         if (vertex_rows[i].empty()) continue;
         bound.vertex_data.push_back(
             {kMethods[i], unpack_values(mesh, vertex_rows[i], vertex_count, kMethods[i].vertex_floats)});

@@ -164,8 +164,7 @@ struct Found {
 };
 
 Columns columns_of(const Vec3<double>& p, double weight) {
-    Columns columns{1.0,       p.x,       p.y,       p.z,       p.x * p.x,
-                    p.y * p.y, p.z * p.z, p.y * p.z, p.x * p.z, p.x * p.y};
+    Columns columns{1.0, p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.x * p.z, p.x * p.y};
     for (double& number : columns) number *= weight;
     return columns;
 }
@@ -178,9 +177,15 @@ std::array<float, kColumns> moved_to(const Vec3<double>& o, const Columns& m) {
     const auto second = [&](std::size_t column, int a, int b) {
         return static_cast<float>(m[column] - first[a] * o[b] - o[a] * first[b] - weight * o[a] * o[b]);
     };
-    return {static_cast<float>(weight),  static_cast<float>(first.x), static_cast<float>(first.y),
-            static_cast<float>(first.z), second(4, 0, 0),             second(5, 1, 1),
-            second(6, 2, 2),             second(7, 1, 2),             second(8, 0, 2),
+    return {static_cast<float>(weight),
+            static_cast<float>(first.x),
+            static_cast<float>(first.y),
+            static_cast<float>(first.z),
+            second(4, 0, 0),
+            second(5, 1, 1),
+            second(6, 2, 2),
+            second(7, 1, 2),
+            second(8, 0, 2),
             second(9, 0, 1)};
 }
 
@@ -266,16 +271,17 @@ void add_rows(std::uint32_t vertex, const Vec3<double>& point,
         };
         const Vec3<float> from_origin(first + weight * point);
         rows.insert(rows.end(),
-                    {static_cast<float>(vertex), static_cast<float>(bone), static_cast<float>(weight), from_origin.x,
-                     from_origin.y, from_origin.z, second(4, 0, 0), second(5, 1, 1), second(6, 2, 2), second(7, 1, 2),
-                     second(8, 0, 2), second(9, 0, 1)});
+                    {static_cast<float>(vertex), static_cast<float>(bone), static_cast<float>(weight),
+                     from_origin.x, from_origin.y, from_origin.z, second(4, 0, 0), second(5, 1, 1),
+                     second(6, 2, 2), second(7, 1, 2), second(8, 0, 2), second(9, 0, 1)});
     }
 }
 
 }  // namespace
 
-std::optional<std::vector<float>> direct_delta_mush(const BindData& data, std::span<const std::int32_t> triangles,
-                                                    double radius, const PrecomputeOptions& options) {
+std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
+                                                    std::span<const std::int32_t> triangles, double radius,
+                                                    const PrecomputeOptions& options) {
     check(data);
     const std::size_t vertex_count = data.rest_points.size();
     check_triangles(triangles, vertex_count);

@@ -51,15 +51,17 @@ struct Ddm {
     static constexpr Parameter kParameters[] = {
         {.id = "variant",
          .label = "Variant",
-         .description = "0: the rotation that fits the neighbourhood best; 2: the blended quaternion, faster; 4: "
-                        "fastest, of smoothed weights alone",
+         .description =
+             "0: the rotation that fits the neighbourhood best; 2: the blended quaternion, faster; 4: "
+             "fastest, of smoothed weights alone",
          .unit = "",
          .kind = ParameterKind::choice,
          .choices = kVariants},
         {.id = "radius",
          .label = "Radius",
-         .description = "How far the smoothing reaches, in units of the object, however dense the mesh is; another "
-                        "value has the mesh bound anew",
+         .description =
+             "How far the smoothing reaches, in units of the object, however dense the mesh is; another "
+             "value has the mesh bound anew",
          .unit = "length",
          .kind = ParameterKind::number,
          .initial = 0.05,
@@ -70,7 +72,8 @@ struct Ddm {
         "ddm",
         "Direct Delta Mush",
         MethodGroup::crude_weights,
-        "Makes smooth joints of crude weights, even of one bone a vertex; joints lose some volume, and large meshes are "
+        "Makes smooth joints of crude weights, even of one bone a vertex; joints lose some volume, and large "
+        "meshes are "
         "bound some seconds longer",
         "Le, Lewis 2019",
         Needs::rest_bones | Needs::vertex_data | Needs::topology | Needs::precomputation,
@@ -129,7 +132,8 @@ struct Ddm {
             by_bones +=
                 moved_by(bone, variant == 2 ? moments.weight * centroid : moments.first, moments.weight);
         }
-        if (variant == 0) rotation = toward_polar_factor(rotation, correlation(bones, rows, centroid, by_bones));
+        if (variant == 0)
+            rotation = toward_polar_factor(rotation, correlation(bones, rows, centroid, by_bones));
         const T length = glm::length(rotation);
         return rest + rotation_displacement(rotation * (T(1) / length), rest - centroid) + by_bones +
                displacement;
@@ -146,8 +150,8 @@ private:
     ///
     /// displacement  of the centroid
     template <class T>
-    static Mat3<T> correlation(std::span<const Bone<T>> bones, std::span<const T> rows, const Vec3<T>& centroid,
-                               const Vec3<T>& displacement) noexcept {
+    static Mat3<T> correlation(std::span<const Bone<T>> bones, std::span<const T> rows,
+                               const Vec3<T>& centroid, const Vec3<T>& displacement) noexcept {
         Mat3<T> sum(T(0));
         for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
             const Bone<T>& bone = bones[static_cast<std::size_t>(rows[i + 1])];

@@ -71,7 +71,8 @@ private:
             const float* const r = row + i;
             float moved[4];
             for (std::size_t c = 0; c < 4; ++c) {
-                moved[c] = r[c] + (r[0] * from_model_[c] + (r[1] * from_model_[4 + c] + r[2] * from_model_[8 + c]));
+                moved[c] =
+                    r[c] + (r[0] * from_model_[c] + (r[1] * from_model_[4 + c] + r[2] * from_model_[8 + c]));
             }
             std::memcpy(row + i, moved, sizeof(moved));
         }
@@ -142,7 +143,8 @@ HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
 }
 
 template <bool kFirst, bool kPlain, bool kResolved, class D>
-HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* block, const Points<D>& centroid) {
+HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* block,
+                                   const Points<D>& centroid) {
     alignas(64) float space[kDdmNumbers];
     const Vec<D> zero = hn::Zero(d);
     Motion<D> sum{{zero, zero, zero, zero}, {zero, zero, zero}};
@@ -216,13 +218,14 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* bloc
                                 const Points<D>& displacement, const float* from_model) {
     alignas(64) float space[kDdmNumbers];
     const Symmetric<D> total = load_symmetric(d, block, 3);
-    Rows3<D> sum{{total.xx, total.xy, total.xz}, {total.xy, total.yy, total.yz}, {total.xz, total.yz, total.zz}};
-    const auto add_rows = [&](const float* x, const float* y, const float* z,
-                              const Symmetric<D>& m) HWY_ATTR {
-        sum.x = add_product(d, x, m, sum.x);
-        sum.y = add_product(d, y, m, sum.y);
-        sum.z = add_product(d, z, m, sum.z);
-    };
+    Rows3<D> sum{
+        {total.xx, total.xy, total.xz}, {total.xy, total.yy, total.yz}, {total.xz, total.yz, total.zz}};
+    const auto add_rows = [&](const float* x, const float* y, const float* z, const Symmetric<D>& m)
+                              HWY_ATTR {
+                                  sum.x = add_product(d, x, m, sum.x);
+                                  sum.y = add_product(d, y, m, sum.y);
+                                  sum.z = add_product(d, z, m, sum.z);
+                              };
     if (from_model != nullptr) add_rows(from_model, from_model + 4, from_model + 8, total);
     if (!kPlain) {
         const float* const first = bones.row(0, space);
@@ -235,9 +238,9 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* bloc
         const std::size_t at = first_moment_row(k);
         add_rows(row + 4, row + 8, row + 12, load_symmetric(d, block, at + 4));
         // Only what bones differ by counts, as the first moments about the centroid have sum 0.
-        Points<D> moved = kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y),
-                                             hn::Neg(displacement.z)}
-                                 : Points<D>{zero, zero, zero};
+        Points<D> moved =
+            kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
+                   : Points<D>{zero, zero, zero};
         add_moved<D>(d, row, centroid, one, moved);
         const Vec<D> weight = load_row(d, block, at);
         const Points<D> by{hn::NegMulAdd(weight, centroid.x, load_row(d, block, at + 1)),
@@ -273,7 +276,8 @@ HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
 /// R(q)^T m, as toward_polar_factor() has it.
 template <class D>
 HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
-    const Vec<D> norm = hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
+    const Vec<D> norm =
+        hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
     const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), norm);
     const Vec<D> x = hn::Mul(scale, q[1]);
     const Vec<D> y = hn::Mul(scale, q[2]);
@@ -318,9 +322,8 @@ HWY_INLINE void step_to_polar_factor(D d, const Rows3<D>& matrix, Vec<D>* q) {
     const Vec<D> least =
         hn::Mul(hn::Mul(hn::Set(d, static_cast<float>(kSingularStep)), trace), hn::Mul(trace, trace));
     const Vec<D> zero = hn::Zero(d);
-    const auto has_maximum =
-        hn::And(hn::And(hn::Gt(xx, zero), hn::Gt(minor, zero)),
-                hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
+    const auto has_maximum = hn::And(hn::And(hn::Gt(xx, zero), hn::Gt(minor, zero)),
+                                     hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
     const Vec<D> scale = hn::IfThenElseZero(
         has_maximum, hn::Div(hn::Set(d, 0.5f), hn::IfThenElse(has_maximum, determinant, hn::Set(d, 1.0f))));
     const auto along = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
@@ -354,12 +357,13 @@ HWY_INLINE void to_polar_factor(D d, Rows3<D> matrix, const float* from_model, V
 
 /// What bones scale, by the weights of lane `lane` of block `b`, added to `sum`.
 template <class D>
-HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::size_t lane, const Points<D>& rest,
-                                const Points<D>& sum) {
+HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::size_t lane,
+                                const Points<D>& rest, const Points<D>& sum) {
     Points<D> total = sum;
     const Block& block = frame.mesh->blocks[b];
     // Lanes of mixed blocks come one by one.
-    const std::int32_t* const bones = frame.bones + block.first_bone + (block.mixed ? block.influences * lane : 0);
+    const std::int32_t* const bones =
+        frame.bones + block.first_bone + (block.mixed ? block.influences * lane : 0);
     const float* weights = weights_of(frame.rows + block.first_row) + lane;
     for (std::size_t k = 0; k < block.influences; ++k) {
         const float* const of_bone = block.mixed ? weights + kLanes * k
@@ -381,10 +385,9 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     Motion<D> motion =
         blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, block, centroid);
     if constexpr (kVariant == Variant::polar) {
-        to_polar_factor(d,
-                        correlation<kPlain>(d, bones, block, centroid, motion.displacement,
-                                            spaces.bones_from_model),
-                        spaces.bones_from_model, motion.rotation);
+        to_polar_factor(
+            d, correlation<kPlain>(d, bones, block, centroid, motion.displacement, spaces.bones_from_model),
+            spaces.bones_from_model, motion.rotation);
     }
     const Points<D> rest = load_rest(d, pointers.rows + pointers.blocks[b].first_row, spaces, lane);
     if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
