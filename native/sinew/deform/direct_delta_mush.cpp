@@ -107,7 +107,8 @@ public:
         if (factor_.info() != Eigen::Success) {
             fail("rest_points", "a mesh whose areas are numbers", "one that is too large or too small");
         }
-        diagonal_.assign(factor_.vectorD().data(), factor_.vectorD().data() + matrix.rows());
+        const auto diagonal = factor_.vectorD();
+        diagonal_.assign(diagonal.data(), diagonal.data() + diagonal.size());
         for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
             place_.push_back(static_cast<std::size_t>(factor_.permutationP().indices()(i)));
         }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <string_view>
 
@@ -10,36 +11,16 @@
 #include "sinew/skinning/moments.h"
 #include "sinew/skinning/rotation_about.h"
 #include "sinew/skinning/scaled_rigid.h"
+#include "sinew/transform/nearest_rotation.h"
 
 namespace sinew {
 
-/// Steps of Newton's method from the blended quaternion to the polar factor.
-inline constexpr int kPolarSteps = 3;
+/// A neighbourhood whose second moments have a trace of less than this times its centroid's square is a point: it has no
+/// rotation of its own.
+inline constexpr double kLeastExtent = 1e-10;
 
-/// Where the determinant of their matrix, over the cube of its trace, is less than this there is no such step.
-inline constexpr double kSingularStep = 1e-6;
-
-/// The rotation nearest to `matrix`, by steps of Newton's method from the rotation of `q`, of any length but 0; of any
-/// length. Where a step has no maximum to go to, as where the matrix is near one of rank 1 or nearer to a reflection,
-/// it is left out. From less than 60 degrees away the last step is below 1e-6.
-template <class T>
-[[nodiscard]] Quat<T> toward_polar_factor(Quat<T> q, const Mat3<T>& matrix) noexcept {
-    for (int step = 0; step < kPolarSteps; ++step) {
-        const Mat3<T> rotated = glm::transpose(to_mat3(q * (T(1) / glm::length(q)))) * matrix;
-        const auto at = [&](int row, int column) { return rotated[column][row]; };
-        const Vec3<T> slope(at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1));
-        const T trace = at(0, 0) + at(1, 1) + at(2, 2);
-        Mat3<T> bend = Mat3<T>(trace) - (rotated + glm::transpose(rotated)) * T(0.5);
-        const T determinant = glm::determinant(bend);
-        const T minor = bend[0][0] * bend[1][1] - bend[0][1] * bend[1][0];
-        const bool has_maximum = bend[0][0] > T(0) && minor > T(0) &&
-                                 determinant > T(kSingularStep) * trace * trace * trace && trace > T(0);
-        if (!has_maximum) break;
-        const Vec3<T> by = glm::inverse(bend) * slope * T(0.5);
-        q = q * Quat<T>(T(1), by.x, by.y, by.z);
-    }
-    return q;
-}
+/// Where the gap of NearestRotation is less than this times the largest entry, rotations are as near as each other.
+inline constexpr double kLeastGap = 1e-6;
 
 /// Direct delta mush (Le, Lewis 2019): the shape that smoothing the rest mesh and the posed one would give, by sums
 /// over bones alone. deform/direct_delta_mush.h finds what they take of the rest mesh.
@@ -101,7 +82,9 @@ struct Ddm {
     /// parameters  empty, or the index in kVariants, and the radius, which is not read
     ///
     /// Quaternions are added in the order of rows, each in the hemisphere of the sum before it: half a turn apart, a
-    /// vertex rotates the one way or the other.
+    /// vertex rotates the one way or the other. A neighbourhood that is a point, or of which no rotation is nearest,
+    /// has the blended quaternion under variant 0, too. Where it is folded over so far that another rotation becomes the
+    /// nearest, the vertex flips.
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
                                                std::span<const Influence<T>> influences, const Vec3<T>& rest,
@@ -119,8 +102,11 @@ struct Ddm {
 
         const std::size_t variant = parameters.empty() ? 0 : static_cast<std::size_t>(parameters[0]);
         Vec3<T> centroid(T(0));
+        T extent(0);
         for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
-            centroid += moments_of(rows.subspan(i, kMomentFloats)).first;
+            const Moments<T> moments = moments_of(rows.subspan(i, kMomentFloats));
+            centroid += moments.first;
+            extent += moments.second[0][0] + moments.second[1][1] + moments.second[2][2];
         }
         Quat<T> rotation(T(0), T(0), T(0), T(0));
         Vec3<T> by_bones(T(0));
@@ -132,8 +118,11 @@ struct Ddm {
             by_bones +=
                 moved_by(bone, variant == 2 ? moments.weight * centroid : moments.first, moments.weight);
         }
-        if (variant == 0)
-            rotation = toward_polar_factor(rotation, correlation(bones, rows, centroid, by_bones));
+        if (variant == 0 && extent > T(kLeastExtent) * glm::dot(centroid, centroid)) {
+            const Mat3<T> matrix = correlation(bones, rows, centroid, by_bones);
+            const NearestRotation<T> nearest = nearest_rotation(matrix);
+            if (nearest.gap > T(kLeastGap) * largest_entry(matrix)) rotation = nearest.rotation;
+        }
         const T length = glm::length(rotation);
         return rest + rotation_displacement(rotation * (T(1) / length), rest - centroid) + by_bones +
                displacement;
@@ -144,6 +133,15 @@ private:
     template <class T>
     static Vec3<T> moved_by(const Bone<T>& bone, const Vec3<T>& point, T weight) noexcept {
         return rotation_displacement(bone.rigid.rotation, point) + weight * bone.rigid.translation;
+    }
+
+    template <class T>
+    static T largest_entry(const Mat3<T>& matrix) noexcept {
+        T largest(0);
+        for (int column = 0; column < 3; ++column) {
+            for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(matrix[column][row]));
+        }
+        return largest;
     }
 
     /// Of the posed neighbourhood with the one at rest, each about its centroid.

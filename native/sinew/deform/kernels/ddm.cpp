@@ -440,6 +440,8 @@ void deform_lane_by_lane(const Frame& frame, std::size_t b) {
         const MomentBones bones(frame, &frame.moments->bones[first], block.bones);
         if (bones.is_plain) {
             deform_lanes<kVariant, true, false>(d, frame, pointers, spaces, bones, b, lane);
+        } else if (bones.is_resolved) {
+            deform_lanes<kVariant, false, true>(d, frame, pointers, spaces, bones, b, lane);
         } else {
             deform_lanes<kVariant, false, false>(d, frame, pointers, spaces, bones, b, lane);
         }
