@@ -269,12 +269,12 @@ def dib(point, motions, rotations, weights):
 
 # Of singular values over the largest: nearer to a tie, the polar factor depends on rounding.
 LEAST_SINGULAR = 0.05
+LEAST_EXTENT = 1e-10
 
 
 def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="0", radius=None):
     """neighbourhood: its moments [bones, 10], and motions, rotations and heads of these bones. The polar
-    factor is by singular values; the tie is also where these are near one, or where it is far from the
-    blended rotation."""
+    factor is by singular values, whose tie counts where there is one."""
     if neighbourhood is None:
         return lbs(point, motions, rotations, weights)
     moments, its_motions, its_rotations, its_heads = neighbourhood
@@ -289,15 +289,10 @@ def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="
     if variant == "4":
         target = (np.tensordot(moments[:, 0], rigid, axes=1) @ np.append(centroid, 1.0))[:3]
     sizes = np.linalg.svd(correlation)[1]
-    # Without extent, as a point has none, only the blended rotation is left.
-    if variant == "0" and sizes[0] > 1e-12 * max(1.0, np.abs(point).max()) ** 2:
-        fitted = nearest_rotation(correlation)
-        far = np.degrees(np.arccos(np.clip((np.trace(rotated.T @ fitted) - 1.0) / 2.0, -1.0, 1.0)))
-        is_sure = (
-            far < 60.0
-            and sizes[1] + np.sign(np.linalg.det(correlation)) * sizes[2] > LEAST_SINGULAR * sizes[0]
-        )
-        rotated, margin = fitted, margin if is_sure else 0.0
+    # A point has no rotation of its own.
+    if variant == "0" and moments[:, 4:7].sum() > LEAST_EXTENT * centroid @ centroid:
+        smallest = sizes[1] + np.sign(np.linalg.det(correlation)) * sizes[2]
+        rotated, margin = nearest_rotation(correlation), 1.0 if smallest > LEAST_SINGULAR * sizes[0] else 0.0
     own = rigid_parts(motions, rotations, heads)
     scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - own
     return rotated @ (point - centroid) + target + weights @ scaled, margin

@@ -23,7 +23,17 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-enum class Variant { polar, quaternion, weights };
+// Newton's method has found the nearest rotation where its last step is at most this square of half an angle.
+inline constexpr float kLastStep = 1e-7f;
+
+// From the blended quaternion on; what takes longer is far from it, and found one by one.
+inline constexpr int kFewestSteps = 2;
+inline constexpr int kMostSteps = 6;
+
+// Where the determinant of a step's matrix, over the cube of its trace, is less, it has no maximum to go to.
+inline constexpr float kSingularStep = 1e-6f;
+
+enum class Variant { nearest, quaternion, weights };
 
 inline constexpr std::size_t kDdmNumbers = CentreRows::kNumbers;
 
@@ -273,7 +283,7 @@ HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
     return {hn::Mul(scale, r.x), hn::Mul(scale, r.y), hn::Mul(scale, r.z)};
 }
 
-/// R(q)^T m, as toward_polar_factor() has it.
+/// R(q)^T m.
 template <class D>
 HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
     const Vec<D> norm =
@@ -300,9 +310,12 @@ HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
             combined(m.z, hn::Add(xz, wy), hn::Sub(yz, wx), hn::Neg(hn::Add(xx, yy)))};
 }
 
-/// One step of toward_polar_factor().
+/// One step of Newton's method from `q`, of any length, to the rotation nearest to `matrix`: q times (1, half the step).
+/// There is none where its matrix has no maximum to go to. Of all rotations only the nearest is a maximum.
+///
+/// Whether it is found.
 template <class D>
-HWY_INLINE void step_to_polar_factor(D d, const Rows3<D>& matrix, Vec<D>* q) {
+HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
     const Rows3<D> s = rotated_back(d, q, matrix);
     const Points<D> slope{hn::Sub(s.z.y, s.y.z), hn::Sub(s.x.z, s.z.x), hn::Sub(s.y.x, s.x.y)};
     const Vec<D> half = hn::Set(d, -0.5f);
@@ -319,8 +332,7 @@ HWY_INLINE void step_to_polar_factor(D d, const Rows3<D>& matrix, Vec<D>* q) {
     const Vec<D> minor = hn::MulSub(xx, yy, hn::Mul(xy, xy));
     const Vec<D> determinant = hn::MulAdd(xx, first.x, hn::MulAdd(xy, first.y, hn::Mul(xz, first.z)));
     const Vec<D> trace = hn::Add(s.x.x, xx);
-    const Vec<D> least =
-        hn::Mul(hn::Mul(hn::Set(d, static_cast<float>(kSingularStep)), trace), hn::Mul(trace, trace));
+    const Vec<D> least = hn::Mul(hn::Mul(hn::Set(d, kSingularStep), trace), hn::Mul(trace, trace));
     const Vec<D> zero = hn::Zero(d);
     const auto has_maximum = hn::And(hn::And(hn::Gt(xx, zero), hn::Gt(minor, zero)),
                                      hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
@@ -340,10 +352,51 @@ HWY_INLINE void step_to_polar_factor(D d, const Rows3<D>& matrix, Vec<D>* q) {
     q[1] = i;
     q[2] = j;
     q[3] = k;
+    const Vec<D> square = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
+    return hn::And(has_maximum, hn::Lt(square, hn::Set(d, kLastStep)));
 }
 
+/// The nearest rotations of lanes where `is_found` is false, one by one; the blended quaternion where there is none.
+///
+/// matrix  its largest entry is 1
 template <class D>
-HWY_INLINE void to_polar_factor(D d, Rows3<D> matrix, const float* from_model, Vec<D>* q) {
+HWY_NOINLINE void find_others(D d, const Rows3<D>& matrix, hn::Mask<D> is_found, const Vec<D>* blended,
+                              Vec<D>* q) {
+    constexpr std::size_t kMax = hn::MaxLanes(D());
+    alignas(64) float numbers[9][kMax];
+    alignas(64) float rotations[4][kMax];
+    alignas(64) float found[kMax];
+    const Points<D>* const rows[] = {&matrix.x, &matrix.y, &matrix.z};
+    for (std::size_t i = 0; i < 3; ++i) {
+        hn::Store(rows[i]->x, d, numbers[3 * i]);
+        hn::Store(rows[i]->y, d, numbers[3 * i + 1]);
+        hn::Store(rows[i]->z, d, numbers[3 * i + 2]);
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+        hn::Store(hn::IfThenElse(is_found, q[i], blended[i]), d, rotations[i]);
+    }
+    hn::Store(hn::IfThenElseZero(is_found, hn::Set(d, 1.0f)), d, found);
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+        if (found[lane] != 0.0f) continue;
+        Mat3<double> own;
+        for (int i = 0; i < 9; ++i) {
+            own[i % 3][i / 3] = static_cast<double>(numbers[static_cast<std::size_t>(i)][lane]);
+        }
+        const NearestRotation<double> nearest = nearest_rotation(own);
+        if (!(nearest.gap > kLeastGap)) continue;
+        rotations[0][lane] = static_cast<float>(nearest.rotation.w);
+        rotations[1][lane] = static_cast<float>(nearest.rotation.x);
+        rotations[2][lane] = static_cast<float>(nearest.rotation.y);
+        rotations[3][lane] = static_cast<float>(nearest.rotation.z);
+    }
+    for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Load(d, rotations[i]);
+}
+
+/// From the blended quaternion `q` to the rotation that is nearest to `matrix`.
+///
+/// is_point  where it stays
+template <class D>
+HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const float* from_model, Vec<D>* q) {
     if (from_model != nullptr) {
         matrix = {in_space(d, matrix.x, from_model), in_space(d, matrix.y, from_model),
                   in_space(d, matrix.z, from_model)};
@@ -352,7 +405,24 @@ HWY_INLINE void to_polar_factor(D d, Rows3<D> matrix, const float* from_model, V
     const Vec<D> size = hn::Max(largest(matrix.x), hn::Max(largest(matrix.y), largest(matrix.z)));
     const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Max(size, hn::Set(d, 1e-37f)));
     matrix = {times<D>(scale, matrix.x), times<D>(scale, matrix.y), times<D>(scale, matrix.z)};
-    for (int step = 0; step < kPolarSteps; ++step) step_to_polar_factor(d, matrix, q);
+    const Vec<D> blended[4] = {q[0], q[1], q[2], q[3]};
+    hn::Mask<D> is_found = is_point;
+    for (int step = 1; step <= kMostSteps; ++step) {
+        is_found = hn::Or(is_point, step_to_nearest(d, matrix, q));
+        if (step >= kFewestSteps && hn::AllTrue(d, is_found)) break;
+    }
+    for (std::size_t i = 0; i < 4; ++i) q[i] = hn::IfThenElse(is_point, blended[i], q[i]);
+    if (HWY_UNLIKELY(!hn::AllTrue(d, is_found))) find_others(d, matrix, is_found, blended, q);
+}
+
+/// Whether the neighbourhood is a point: see Ddm.
+template <class D>
+HWY_INLINE hn::Mask<D> is_point_at(D d, const float* block, const Points<D>& centroid) {
+    const Vec<D> extent =
+        hn::Add(load_row(d, block, 3), hn::Add(load_row(d, block, 4), load_row(d, block, 5)));
+    const Vec<D> square = hn::MulAdd(centroid.x, centroid.x,
+                                     hn::MulAdd(centroid.y, centroid.y, hn::Mul(centroid.z, centroid.z)));
+    return hn::Not(hn::Gt(extent, hn::Mul(hn::Set(d, static_cast<float>(kLeastExtent)), square)));
 }
 
 /// What bones scale, by the weights of lane `lane` of block `b`, added to `sum`.
@@ -384,10 +454,10 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     Points<D> centroid{load_row(d, block, 0), load_row(d, block, 1), load_row(d, block, 2)};
     Motion<D> motion =
         blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, block, centroid);
-    if constexpr (kVariant == Variant::polar) {
-        to_polar_factor(
-            d, correlation<kPlain>(d, bones, block, centroid, motion.displacement, spaces.bones_from_model),
-            spaces.bones_from_model, motion.rotation);
+    if constexpr (kVariant == Variant::nearest) {
+        const Rows3<D> matrix =
+            correlation<kPlain>(d, bones, block, centroid, motion.displacement, spaces.bones_from_model);
+        to_nearest(d, matrix, is_point_at(d, block, centroid), spaces.bones_from_model, motion.rotation);
     }
     const Points<D> rest = load_rest(d, pointers.rows + pointers.blocks[b].first_row, spaces, lane);
     if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
@@ -476,7 +546,7 @@ void deform_ddm(const Frame& frame, std::size_t begin, std::size_t end) {
     switch (static_cast<int>(frame.parameters[0])) {
         case 1: return deform_by<Variant::quaternion>(frame, begin, end);
         case 2: return deform_by<Variant::weights>(frame, begin, end);
-        default: return deform_by<Variant::polar>(frame, begin, end);
+        default: return deform_by<Variant::nearest>(frame, begin, end);
     }
 }
 
