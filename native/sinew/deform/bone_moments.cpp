@@ -11,7 +11,7 @@ namespace {
 // vertices have, each has a list of its own.
 constexpr std::size_t kMostShared = 2;
 
-using Row = std::array<float, kMomentRows>;
+using Row = std::array<float, kMomentNumbers>;
 
 /// Of one vertex.
 struct BoneRow {
@@ -33,7 +33,7 @@ public:
                 std::ranges::lower_bound(mesh_.used_bones, static_cast<std::int32_t>(at(row)[1]));
             if (used == mesh_.used_bones.end() || *used != static_cast<std::int32_t>(at(row)[1])) continue;
             found.push_back({static_cast<std::int32_t>(used - mesh_.used_bones.begin()), {}});
-            std::copy_n(at(row) + 2, kMomentRows, found.back().numbers.begin());
+            std::copy_n(at(row) + 2, kMomentNumbers, found.back().numbers.begin());
         }
         double sum = 0.0;
         for (const BoneRow& row : found) sum += static_cast<double>(row.numbers[0]);
@@ -122,7 +122,7 @@ private:
             bones = own_bones(most);
         }
         block.first_bone = place_of(bones, block);
-        moments_.rows.resize(moments_.rows.size() + kNeighbourhoodRows + kMomentRows * block.bones);
+        moments_.rows.resize(moments_.rows.size() + MomentLayout{block.bones}.rows());
         Lanes<float>* const rows = &moments_.rows[block.first_row];
         for (std::size_t lane = 0; lane < kLanes; ++lane) fill(block, bones, lane, rows);
         moments_.blocks.push_back(block);
@@ -155,19 +155,22 @@ private:
 
     void fill(const MomentBlock& block, std::span<const std::int32_t> bones, std::size_t lane,
               Lanes<float>* rows) const {
-        std::array<double, kNeighbourhoodRows> sums{};
+        const MomentLayout layout{block.bones};
+        std::array<double, kMomentNumbers> sums{};
         for (std::size_t i = 0; i < lanes_[lane].size(); ++i) {
             const BoneRow& row = lanes_[lane][i];
             const std::size_t k =
                 block.mixed
                     ? i
                     : static_cast<std::size_t>(std::ranges::lower_bound(bones, row.bone) - bones.begin());
-            for (std::size_t n = 0; n < kMomentRows; ++n) {
-                rows[kNeighbourhoodRows + kMomentRows * k + n].lane[lane] = row.numbers[n];
-                if (n > 0) sums[n - 1] += static_cast<double>(row.numbers[n]);
+            for (std::size_t n = 0; n < kMomentNumbers; ++n) {
+                rows[layout.number(k, n)].lane[lane] = row.numbers[n];
+                sums[n] += static_cast<double>(row.numbers[n]);
             }
         }
-        for (std::size_t n = 0; n < kNeighbourhoodRows; ++n) rows[n].lane[lane] = static_cast<float>(sums[n]);
+        for (std::size_t n = 1; n < kMomentNumbers; ++n) {
+            rows[n < 4 ? n - 1 : layout.total() + n - 4].lane[lane] = static_cast<float>(sums[n]);
+        }
     }
 
     const PackedMesh& mesh_;
@@ -193,9 +196,9 @@ std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& mom
                 Full row{static_cast<float>(mesh.vertices[b].lane[lane]),
                          static_cast<float>(mesh.used_bones[static_cast<std::size_t>(moments.bones[bone])])};
                 bool is_empty = true;
-                for (std::size_t n = 0; n < kMomentRows; ++n) {
+                for (std::size_t n = 0; n < kMomentNumbers; ++n) {
                     row[2 + n] =
-                        moments.rows[block.first_row + kNeighbourhoodRows + kMomentRows * k + n].lane[lane];
+                        moments.rows[block.first_row + MomentLayout{block.bones}.number(k, n)].lane[lane];
                     is_empty = is_empty && row[2 + n] == 0.0f;
                 }
                 if (!is_empty) found.push_back(row);

@@ -11,16 +11,29 @@
 
 namespace sinew {
 
-/// Rows of a block before those of its bones: the centroid of each neighbourhood (x, y, z), and the sum of its bones'
-/// second moments (xx, yy, zz, yz, xz, xy).
-inline constexpr std::size_t kNeighbourhoodRows = 9;
+/// The rows of a block's vertices: the centroid of each neighbourhood (x, y, z), then of each of `bones` the weight, then
+/// their first moments, then the sum of all bones' second moments, then these of each. So a variant that needs less reads
+/// the beginning alone.
+struct MomentLayout {
+    std::size_t bones;
 
-/// Rows of each bone: weight, first moment, second moment.
-inline constexpr std::size_t kMomentRows = kMomentFloats - 2;
+    [[nodiscard]] constexpr std::size_t weight(std::size_t bone) const { return 3 + bone; }
+    [[nodiscard]] constexpr std::size_t first(std::size_t bone) const { return 3 + bones + 3 * bone; }
+    [[nodiscard]] constexpr std::size_t total() const { return 3 + 4 * bones; }
+    [[nodiscard]] constexpr std::size_t second(std::size_t bone) const { return 9 + 4 * bones + 6 * bone; }
+    [[nodiscard]] constexpr std::size_t rows() const { return 9 + 10 * bones; }
+    /// The row of number `n` of Moments.
+    [[nodiscard]] constexpr std::size_t number(std::size_t bone, std::size_t n) const {
+        return n == 0 ? weight(bone) : n < 4 ? first(bone) + n - 1 : second(bone) + n - 4;
+    }
+};
+
+/// Numbers of each bone: weight, first moment, second moment.
+inline constexpr std::size_t kMomentNumbers = kMomentFloats - 2;
 
 /// The moments of a block of a packed mesh.
 struct MomentBlock {
-    std::uint32_t first_row;   // of BoneMoments::rows: kNeighbourhoodRows, then kMomentRows of each bone
+    std::uint32_t first_row;   // of BoneMoments::rows, as MomentLayout says
     std::uint32_t first_bone;  // of BoneMoments::bones: [bones], or if mixed [kLanes][bones]
     std::uint32_t bones;       // rising; a vertex that lacks one has 0 of it
     bool mixed;                // every lane has bones of its own

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sinew/deform/bone_moments.h"
 #include "sinew/deform/bone_sets.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/kernels.h"

@@ -6,11 +6,12 @@
 #include <cstdint>
 #include <span>
 
-#include "sinew/deform/bone_moments.h"
 #include "sinew/deform/packed_mesh.h"
 #include "sinew/deform/palette.h"
 
 namespace sinew {
+
+struct BoneMoments;
 
 /// What every block of one frame reads.
 struct Frame {

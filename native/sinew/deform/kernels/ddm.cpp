@@ -115,13 +115,17 @@ public:
     bool is_resolved = false;
 };
 
-/// What each bone's row has in a block: weights at kNeighbourhoodRows, kMomentRows apart.
+/// A row of a block, from the lanes at work on.
 template <class D>
 HWY_INLINE Vec<D> load_row(D d, const float* block, std::size_t row) {
     return hn::Load(d, block + kLanes * row);
 }
 
-HWY_INLINE std::size_t first_moment_row(std::size_t bone) { return kNeighbourhoodRows + kMomentRows * bone; }
+/// Three rows that follow each other.
+template <class D>
+HWY_INLINE Points<D> load_point(D d, const float* block, std::size_t row) {
+    return {load_row(d, block, row), load_row(d, block, row + 1), load_row(d, block, row + 2)};
+}
 
 /// The rows x, y, z of what `row` of a bone makes of a point and its weight, added to `sum`.
 template <class D>
@@ -156,6 +160,7 @@ template <bool kFirst, bool kPlain, bool kResolved, class D>
 HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* block,
                                    const Points<D>& centroid) {
     alignas(64) float space[kDdmNumbers];
+    const MomentLayout layout{bones.count};
     const Vec<D> zero = hn::Zero(d);
     Motion<D> sum{{zero, zero, zero, zero}, {zero, zero, zero}};
     if (!kPlain) {
@@ -164,16 +169,15 @@ HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* b
         if (kResolved) {
             for (std::size_t i = 0; i < 4; ++i) sum.rotation[i] = hn::Set(d, first[i]);
         } else {
-            add_signed<D>(d, first, load_row(d, block, first_moment_row(0)), sum.rotation);
+            add_signed<D>(d, first, load_row(d, block, layout.weight(0)), sum.rotation);
         }
     }
     for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
         const float* const row = bones.row(k, space);
-        const std::size_t at = first_moment_row(k);
-        const Vec<D> weight = load_row(d, block, at);
+        const Vec<D> weight = load_row(d, block, layout.weight(k));
         Points<D> first;
         if constexpr (kFirst) {
-            first = {load_row(d, block, at + 1), load_row(d, block, at + 2), load_row(d, block, at + 3)};
+            first = load_point(d, block, layout.first(k));
         } else {
             first = {hn::Mul(weight, centroid.x), hn::Mul(weight, centroid.y), hn::Mul(weight, centroid.z)};
         }
@@ -227,7 +231,8 @@ template <bool kPlain, class D>
 HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* block, const Points<D>& centroid,
                                 const Points<D>& displacement, const float* from_model) {
     alignas(64) float space[kDdmNumbers];
-    const Symmetric<D> total = load_symmetric(d, block, 3);
+    const MomentLayout layout{bones.count};
+    const Symmetric<D> total = load_symmetric(d, block, layout.total());
     Rows3<D> sum{
         {total.xx, total.xy, total.xz}, {total.xy, total.yy, total.yz}, {total.xz, total.yz, total.zz}};
     const auto add_rows = [&](const float* x, const float* y, const float* z, const Symmetric<D>& m)
@@ -245,17 +250,14 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* bloc
     const Vec<D> zero = hn::Zero(d);
     for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
         const float* const row = bones.row(k, space);
-        const std::size_t at = first_moment_row(k);
-        add_rows(row + 4, row + 8, row + 12, load_symmetric(d, block, at + 4));
+        add_rows(row + 4, row + 8, row + 12, load_symmetric(d, block, layout.second(k)));
         // Only what bones differ by counts, as the first moments about the centroid have sum 0.
         Points<D> moved =
             kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
                    : Points<D>{zero, zero, zero};
         add_moved<D>(d, row, centroid, one, moved);
-        const Vec<D> weight = load_row(d, block, at);
-        const Points<D> by{hn::NegMulAdd(weight, centroid.x, load_row(d, block, at + 1)),
-                           hn::NegMulAdd(weight, centroid.y, load_row(d, block, at + 2)),
-                           hn::NegMulAdd(weight, centroid.z, load_row(d, block, at + 3))};
+        const Vec<D> weight = load_row(d, block, layout.weight(k));
+        const Points<D> by = add_scaled<D>(load_point(d, block, layout.first(k)), hn::Neg(weight), centroid);
         sum.x = add_scaled<D>(sum.x, moved.x, by);
         sum.y = add_scaled<D>(sum.y, moved.y, by);
         sum.z = add_scaled<D>(sum.z, moved.z, by);
@@ -416,10 +418,12 @@ HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const flo
 }
 
 /// Whether the neighbourhood is a point: see Ddm.
+///
+/// total  the row of the sum of second moments
 template <class D>
-HWY_INLINE hn::Mask<D> is_point_at(D d, const float* block, const Points<D>& centroid) {
-    const Vec<D> extent =
-        hn::Add(load_row(d, block, 3), hn::Add(load_row(d, block, 4), load_row(d, block, 5)));
+HWY_INLINE hn::Mask<D> is_point_at(D d, const float* block, std::size_t total, const Points<D>& centroid) {
+    const Points<D> diagonal = load_point(d, block, total);
+    const Vec<D> extent = hn::Add(diagonal.x, hn::Add(diagonal.y, diagonal.z));
     const Vec<D> square = hn::MulAdd(centroid.x, centroid.x,
                                      hn::MulAdd(centroid.y, centroid.y, hn::Mul(centroid.z, centroid.z)));
     return hn::Not(hn::Gt(extent, hn::Mul(hn::Set(d, static_cast<float>(kLeastExtent)), square)));
@@ -451,13 +455,14 @@ template <Variant kVariant, bool kPlain, bool kResolved, class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
     const float* const block = frame.moments->rows[frame.moments->blocks[b].first_row].lane.data() + lane;
-    Points<D> centroid{load_row(d, block, 0), load_row(d, block, 1), load_row(d, block, 2)};
+    Points<D> centroid = load_point(d, block, 0);
     Motion<D> motion =
         blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, block, centroid);
     if constexpr (kVariant == Variant::nearest) {
         const Rows3<D> matrix =
             correlation<kPlain>(d, bones, block, centroid, motion.displacement, spaces.bones_from_model);
-        to_nearest(d, matrix, is_point_at(d, block, centroid), spaces.bones_from_model, motion.rotation);
+        to_nearest(d, matrix, is_point_at(d, block, MomentLayout{bones.count}.total(), centroid),
+                   spaces.bones_from_model, motion.rotation);
     }
     const Points<D> rest = load_rest(d, pointers.rows + pointers.blocks[b].first_row, spaces, lane);
     if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
