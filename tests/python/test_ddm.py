@@ -167,6 +167,24 @@ def test_each_variant_agrees_with_its_definition(variant, scaled, most_influence
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
+def test_bone_numbers_mean_nothing_but_rounding(variant):
+    rig, rows = near_rig(4)
+    number = np.random.default_rng(32).permutation(15)
+    order = np.argsort(number)
+    other = rows.copy()
+    other[:, 1] = number[rows[:, 1].astype(int)]
+    other = other[np.lexsort((other[:, 1], other[:, 0]))]
+    parameters = {"ddm.variant": variant}
+    points = sinew.Deformer(*rig.mesh, "ddm", vertex_data={"ddm": rows}).deform(
+        rig.transforms, parameters=parameters
+    )
+    mesh = rig.rest_points, rig.offsets, number[rig.bones].astype(np.int32), rig.weights
+    renumbered = sinew.Deformer(*mesh, "ddm", vertex_data={"ddm": other})
+    found = renumbered.deform(rig.transforms[order], parameters=parameters)
+    np.testing.assert_allclose(found, points, atol=2e-5)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_another_space_of_bones_is_that_by_hand(variant):
     rig, rows = near_rig(5)
     space = random_motion(np.random.default_rng(6), 2.0)
