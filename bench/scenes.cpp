@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <numeric>
 #include <random>
 
@@ -28,6 +30,38 @@ void Scene::add_vertex(const glm::vec3& rest, std::size_t count, const std::size
     plain.rest_points.push_back(rest);
     plain.bones.push_back(padded);
     plain.weights.push_back(padded_share);
+}
+
+void Scene::add_moments() {
+    std::map<std::int32_t, float> shares;
+    for (std::size_t vertex = 0; vertex < plain.rest_points.size(); ++vertex) {
+        shares.clear();
+        for (std::int32_t i = offsets[vertex]; i < offsets[vertex + 1]; ++i) {
+            shares[bones[static_cast<std::size_t>(i)]] += weights[static_cast<std::size_t>(i)];
+        }
+        const glm::vec3 rest = 0.98f * plain.rest_points[vertex];
+        const auto middle = static_cast<float>(offsets[vertex + 1] - offsets[vertex] - 1) / 2.0f;
+        float k = 0.0f;
+        float along = 0.0f;
+        for (const auto& [bone, share] : shares) along += share * 0.02f * (k++ - middle);
+        k = 0.0f;
+        for (const auto& [bone, share] : shares) {
+            const float z = rest.z + 0.02f * (k++ - middle) - along;
+            const float row[] = {static_cast<float>(vertex),
+                                 static_cast<float>(bone),
+                                 share,
+                                 share * rest.x,
+                                 share * rest.y,
+                                 share * z,
+                                 share * 0.02f,
+                                 share * 0.02f,
+                                 share * 0.05f,
+                                 0,
+                                 0,
+                                 share * -0.01f};
+            method_values.insert(method_values.end(), std::begin(row), std::end(row));
+        }
+    }
 }
 
 namespace {

@@ -50,16 +50,23 @@ struct Scene {
         BindData bound = data();
         if (method.vertex_floats == 0) return bound;
         method_values.clear();
-        for (const glm::vec3& rest : plain.rest_points) {
-            // Points on the axis: the centre of Cor; C, R0, R1 and their use of Sdef.
-            const float z = rest.z;
-            const float numbers[] = {0, 0, z, 0, 0, z - 0.3f, 0, 0, z + 0.3f, 1};
-            method_values.insert(method_values.end(), numbers, numbers + method.vertex_floats);
+        if (method.keeps_moments) {
+            add_moments();
+        } else {
+            for (const glm::vec3& rest : plain.rest_points) {
+                // Points on the axis: the centre of Cor; C, R0, R1 and their use of Sdef.
+                const float z = rest.z;
+                const float numbers[] = {0, 0, z, 0, 0, z - 0.3f, 0, 0, z + 0.3f, 1};
+                method_values.insert(method_values.end(), numbers, numbers + method.vertex_floats);
+            }
         }
         vertex_data.assign(1, {method, method_values});
         bound.vertex_data = vertex_data;
         return bound;
     }
+
+    /// What Ddm keeps, of as many bones as influences: neighbourhoods on the surface, spread more along the axis.
+    void add_moments();
 
     /// of, share  [count]; the plain loops see the first four
     void add_vertex(const glm::vec3& rest, std::size_t count, const std::size_t* of, const float* share);

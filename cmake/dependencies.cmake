@@ -44,7 +44,7 @@ if(SINEW_BUILD_BENCH OR SINEW_BUILD_EXPERIMENTS)
   endif()
 endif()
 
-if(SINEW_BUILD_EXPERIMENTS OR SINEW_BUILD_BENCH)
+if(SINEW_WITH_DDM OR SINEW_BUILD_EXPERIMENTS OR SINEW_BUILD_BENCH)
   find_package(Eigen3 QUIET NO_MODULE)
   if(NOT TARGET Eigen3::Eigen)
     FetchContent_Declare(eigen GIT_REPOSITORY https://gitlab.com/libeigen/eigen.git GIT_TAG 3.4.0

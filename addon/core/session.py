@@ -203,6 +203,8 @@ class Binding:
         """By the name of the method."""
         if self.vertex_data is None:
             return {}
+        for name in (frame.method, frame.mix):
+            self.vertex_data.take_parameters(name, frame.parameters)
         made = {name: self.vertex_data.of(name, frame.bones_from_model) for name in (frame.method, frame.mix)}
         return {name: data for name, data in made.items() if data is not None}
 

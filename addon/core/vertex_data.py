@@ -15,6 +15,7 @@ import numpy as np
 import sinew
 
 from .influences import Influences
+from .parameters import Value
 from .precompute import Make, Precomputation, Progress, precomputations
 from .rig import Weighting
 from .spaces import transformed
@@ -26,14 +27,16 @@ METHODS = {method.name: method for method in sinew.methods()}
 class Provider:
     """What makes the data of a method.
 
-    what     it is called, for people
-    version  part of the hash: another one where the same mesh gives other data
-    make     of rest points, influences, triangles and progress
+    what        it is called, for people
+    version     part of the hash: another one where the same mesh gives other data
+    make        of rest points, influences, triangles and progress, and of `parameters` by name
+    parameters  ids of those of the method, all numbers, that the data is made with
     """
 
     what: str
     version: int
-    make: Callable[[np.ndarray, Influences, np.ndarray, Progress], np.ndarray | None]
+    make: Callable[..., np.ndarray | None]
+    parameters: tuple[str, ...] = ()
 
 
 def _centres(
@@ -45,7 +48,21 @@ def _centres(
     )
 
 
-PROVIDERS = {"cor": Provider("centres of rotation", 1, _centres)}
+def _moments(
+    points: np.ndarray, influences: Influences, triangles: np.ndarray, progress: Progress, *, radius: float
+) -> np.ndarray | None:
+    own = influences
+    return sinew.direct_delta_mush(
+        points, own.offsets, own.bones, own.weights, triangles, radius, progress=progress
+    )
+
+
+_ALL = {
+    "cor": Provider("centres of rotation", 1, _centres),
+    "ddm": Provider("smoothed weights", 1, _moments, ("radius",)),
+}
+# A build may be without one of them.
+PROVIDERS = {name: provider for name, provider in _ALL.items() if name in METHODS}
 
 
 @dataclass
@@ -95,6 +112,7 @@ class VertexData:
         self._stored = stored or {}
         self._lock = threading.Lock()
         self._entries: dict[str, _Entry] = {}
+        self._parameters = {name: _values_of(name, {}) for name in PROVIDERS}
         if before is not None:
             self._take_over(before)
         if self._given:
@@ -102,11 +120,12 @@ class VertexData:
 
     def _take_over(self, before: VertexData) -> None:
         with before._lock:
+            self._parameters = dict(before._parameters)
             for method, entry in before._entries.items():
                 if entry.run is not None:
                     # Made of a mesh that is no longer there.
                     entry.run.cancel()
-                if entry.made is not None and len(entry.made) == len(self.points):
+                if entry.made is not None and len(before.points) == len(self.points):
                     self._entries[method] = _Entry(made=entry.made, is_outdated=True)
                     self.version = before.version
 
@@ -125,6 +144,26 @@ class VertexData:
         """Those of the mesh, where they were not read before."""
         if self.triangles is None:
             self.triangles = triangles
+
+    def take_parameters(self, method: str, values: Mapping[str, Value]) -> None:
+        """Data that was made with others than these is outdated.
+
+        values  by full names; where one is not there, its default
+        """
+        if method not in PROVIDERS or not PROVIDERS[method].parameters:
+            return
+        taken = _values_of(method, values)
+        with self._lock:
+            if self._parameters[method] == taken:
+                return
+            self._parameters[method] = taken
+            self.read_at = time.monotonic()
+            entry = self._entries.pop(method, None)
+            if entry is None:
+                return
+            if entry.run is not None:
+                entry.run.cancel()
+            self._entries[method] = _Entry(made=entry.made, is_outdated=entry.made is not None)
 
     def is_ready(self, method: str) -> bool:
         """Whether of() has something without making it, be it outdated; true for a method that keeps nothing.
@@ -170,8 +209,8 @@ class VertexData:
             return entry is not None and bool(entry.key) and entry.key in precomputations.stopped
 
     def of(self, method: str, bones_from_model: np.ndarray) -> np.ndarray | None:
-        """float32 [vertices, Method.vertex_floats], object space; None for a method that keeps nothing. Made
-        here where there is none.
+        """float32 [vertices or rows, Method.vertex_floats], object space; None for a method that keeps
+        nothing. Made here where there is none.
 
         bones_from_model  float64 [4, 4], where weights depend on where vertices are: the first call decides
         """
@@ -230,8 +269,9 @@ class VertexData:
             points = transformed(points, bones_from_model)
         influences = self.weighting.influences_over_joints(points)
         provider = PROVIDERS[method]
-        entry.key = _key(method, provider.version, self.points, influences, self.triangles)
-        entry.make = partial(provider.make, self.points, influences, self.triangles)
+        values = self._parameters[method]
+        entry.key = _key(method, provider.version, values, self.points, influences, self.triangles)
+        entry.make = partial(provider.make, self.points, influences, self.triangles, **values)
         found = self._stored.get(entry.key)
         if found is None:
             found = precomputations.find(entry.key)
@@ -240,17 +280,35 @@ class VertexData:
         return entry.make
 
     def _fits(self, method: str, found: np.ndarray) -> bool:
-        wanted = (len(self.points), METHODS[method].vertex_floats)
-        return found.shape == wanted and found.dtype == np.float32 and bool(np.isfinite(found).all())
+        info = METHODS[method]
+        rows = len(found) if info.keeps_moments else len(self.points)
+        if found.shape != (rows, info.vertex_floats) or found.dtype != np.float32:
+            return False
+        return bool(np.isfinite(found).all())
 
     def _put(self, entry: _Entry, made: np.ndarray) -> None:
         entry.made, entry.is_outdated = made, False
         self.version = next(_versions)
 
 
-def _key(method: str, version: int, points: np.ndarray, influences: Influences, triangles: np.ndarray) -> str:
+def _values_of(method: str, values: Mapping[str, Value]) -> dict[str, float]:
+    """By the ids of parameters. As Blender's properties round them: a default equals what it was set to."""
+    defaults = {each.id: each.default for each in METHODS[method].parameters}
+    names = PROVIDERS[method].parameters
+    return {name: float(np.float32(values.get(f"{method}.{name}", defaults[name]))) for name in names}
+
+
+def _key(
+    method: str,
+    version: int,
+    values: Mapping[str, float],
+    points: np.ndarray,
+    influences: Influences,
+    triangles: np.ndarray,
+) -> str:
     """The hash of all that the data of a method is made from."""
-    digest = hashlib.blake2b(f"{method} {version}".encode(), digest_size=16)
+    of_method = " ".join([method, str(version), *map(repr, values.values())])
+    digest = hashlib.blake2b(of_method.encode(), digest_size=16)
     for array in (points, influences.offsets, influences.bones, influences.weights, triangles):
         digest.update(f" {array.dtype.str} {array.shape} ".encode())
         digest.update(array.tobytes())

@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..attach import properties, stored_vertex_data
+from ..attach import properties, stage_settings, stored_vertex_data
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread
 from ..core.errors import SinewError
@@ -171,6 +171,8 @@ def _needed(obj: bpy.types.Object, skinned: SkinnedObject) -> list[tuple[bpy.typ
         data = stage.binding.vertex_data
         if data is None or replaced.armature is None or not stage.binding.bones.names:
             continue
+        for name in methods:
+            data.take_parameters(name, stage_settings.method_values(properties.of(obj), (name,)))
         names = [*methods, *(data.missed if data.missed and is_method_animated(obj) else ())]
         found += [(replaced.armature, data, name) for name in dict.fromkeys(names) if name in PROVIDERS]
     return found

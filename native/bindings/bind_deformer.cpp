@@ -63,8 +63,9 @@ void add_vertex_data(const py::object& vertex_data, BindArrays& arrays) {
     for (const auto& [name, values] : py::reinterpret_borrow<py::dict>(vertex_data)) {
         const MethodInfo method = checked_method(py::reinterpret_borrow<py::object>(name), "vertex_data");
         const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
-        const std::string wanted =
-            "of " + std::string(method.name) + " float32 [vertices, " + std::to_string(floats) + "]";
+        const std::string wanted = "of " + std::string(method.name) +
+                                   (method.keeps_moments ? " float32 [rows, " : " float32 [vertices, ") +
+                                   std::to_string(floats) + "]";
         const auto array = checked<float>(values, "vertex_data", 2, wanted, kMaxVertices);
         if (array.shape(1) != floats) fail("vertex_data", wanted, describe(values));
         arrays.vertex_arrays.push_back(array);
@@ -147,9 +148,9 @@ py::tuple state_of(const BoundMesh& mesh) {
         py::dict by_method;
         for (const auto& [method, values] : mesh.vertex_data) {
             const auto floats = static_cast<py::ssize_t>(method.vertex_floats);
+            const auto rows = static_cast<py::ssize_t>(values.size()) / floats;
             by_method[py::str(std::string(method.name))] =
-                array_of(std::span(values))
-                    .reshape({static_cast<py::ssize_t>(mesh.rest_points.size()), floats});
+                array_of(std::span(values)).reshape({rows, floats});
         }
         vertex_data = by_method;
     }

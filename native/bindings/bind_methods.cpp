@@ -116,7 +116,10 @@ void bind_methods(py::module_& m) {
             "these are made from; \"precomputation\", a function that makes them.")
         .def_property_readonly(
             "vertex_floats", [](const MethodInfo& row) { return row.vertex_floats; },
-            "How many numbers its vertex data has for each vertex; 0: it has none.");
+            "How many numbers its vertex data has for each vertex, or in each row; 0: it has none.")
+        .def_property_readonly(
+            "keeps_moments", [](const MethodInfo& row) { return row.keeps_moments; },
+            "Whether its vertex data has rows, any number for each vertex: see direct_delta_mush.");
 
     py::class_<StageInfo> stage(m, "Stage", "The facts of a stage: what may follow a method.");
     def_facts(stage, "Stage");

@@ -4,11 +4,15 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 
 #include "arrays.h"
 #include "gil.h"
 #include "module.h"
 #include "sinew/deform/centres_of_rotation.h"
+#if SINEW_WITH_DDM
+#include "sinew/deform/direct_delta_mush.h"
+#endif
 
 namespace sinew::bindings {
 namespace {
@@ -57,31 +61,74 @@ std::size_t thread_count(const py::object& threads) {
     return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
+/// A mesh that a precomputation takes.
+struct Mesh {
+    py::array_t<float> points;
+    py::array_t<std::int32_t> offsets;
+    py::array_t<std::int32_t> bones;
+    py::array_t<float> weights;
+    py::array_t<std::int32_t> corners;
+
+    Mesh(const py::object& rest_points, const py::object& influence_offsets,
+         const py::object& influence_bones, const py::object& influence_weights, const py::object& triangles)
+        : points(checked_points(rest_points, "rest_points")),
+          offsets(checked<std::int32_t>(influence_offsets, "influence_offsets", 1, "int32 [vertices + 1]",
+                                        kMaxVertices + 1)),
+          bones(checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]",
+                                      kMaxInfluences)),
+          weights(checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]",
+                                 kMaxInfluences)),
+          corners(checked<std::int32_t>(triangles, "triangles", 2, "int32 [triangles, 3]")) {
+        if (corners.shape(1) != 3) fail("triangles", "int32 [triangles, 3]", describe(triangles));
+    }
+
+    [[nodiscard]] BindData data() const {
+        return {as_points(points), as_span(offsets), as_span(bones), as_span(weights)};
+    }
+};
+
+PrecomputeOptions options_of(bool exact, const py::object& threads) {
+    PrecomputeOptions options;
+    options.threads = thread_count(threads);
+    options.exact = exact;
+    return options;
+}
+
 py::object centres(const py::object& rest_points, const py::object& influence_offsets,
                    const py::object& influence_bones, const py::object& influence_weights,
                    const py::object& triangles, bool exact, const py::object& threads,
                    const py::object& progress) {
-    const auto points = checked_points(rest_points, "rest_points");
-    const auto offsets = checked<std::int32_t>(influence_offsets, "influence_offsets", 1,
-                                               "int32 [vertices + 1]", kMaxVertices + 1);
-    const auto bones =
-        checked<std::int32_t>(influence_bones, "influence_bones", 1, "int32 [influences]", kMaxInfluences);
-    const auto weights =
-        checked<float>(influence_weights, "influence_weights", 1, "float32 [influences]", kMaxInfluences);
-    const auto corners = checked<std::int32_t>(triangles, "triangles", 2, "int32 [triangles, 3]");
-    if (corners.shape(1) != 3) fail("triangles", "int32 [triangles, 3]", describe(triangles));
-    const BindData data{as_points(points), as_span(offsets), as_span(bones), as_span(weights)};
-    PrecomputeOptions options;
-    options.threads = thread_count(threads);
-    options.exact = exact;
-    const auto found = precompute(progress, options, [&](const PrecomputeOptions& with) {
-        return centres_of_rotation(data, as_span(corners), with);
+    const Mesh mesh(rest_points, influence_offsets, influence_bones, influence_weights, triangles);
+    const auto found = precompute(progress, options_of(exact, threads), [&](const PrecomputeOptions& with) {
+        return centres_of_rotation(mesh.data(), as_span(mesh.corners), with);
     });
     if (!found) return py::none();
-    py::array_t<float> result({points.shape(0), py::ssize_t{3}});
+    py::array_t<float> result({mesh.points.shape(0), py::ssize_t{3}});
     if (!found->empty())
         std::memcpy(result.mutable_data(), found->data(), found->size() * sizeof(found->front()));
     return result;
+}
+
+py::object moments(const py::object& rest_points, const py::object& influence_offsets,
+                   const py::object& influence_bones, const py::object& influence_weights,
+                   const py::object& triangles, double radius, bool exact, const py::object& threads,
+                   const py::object& progress) {
+    const Mesh mesh(rest_points, influence_offsets, influence_bones, influence_weights, triangles);
+#if SINEW_WITH_DDM
+    const auto found = precompute(progress, options_of(exact, threads), [&](const PrecomputeOptions& with) {
+        return direct_delta_mush(mesh.data(), as_span(mesh.corners), radius, with);
+    });
+    if (!found) return py::none();
+    constexpr auto floats = static_cast<py::ssize_t>(kMomentFloats);
+    py::array_t<float> result({static_cast<py::ssize_t>(found->size()) / floats, floats});
+    if (!found->empty()) std::memcpy(result.mutable_data(), found->data(), found->size() * sizeof(float));
+    return result;
+#else
+    static_cast<void>(radius);
+    static_cast<void>(options_of(exact, threads));
+    static_cast<void>(progress);
+    throw std::runtime_error("direct_delta_mush: this build of Sinew is without the method ddm");
+#endif
 }
 
 }  // namespace
@@ -101,6 +148,26 @@ void bind_precompute(py::module_& m) {
         "progress: None, or a callable that is called on this thread with the share that is done, 0 to 1.\n"
         "    Where it returns False the work ends, and the result is None. What it raises comes through.\n\n"
         "Precomputations of other methods take `threads` and `progress` alike. The GIL is released.");
+    m.def("direct_delta_mush", &moments, py::arg("rest_points"), py::arg("influence_offsets"),
+          py::arg("influence_bones"), py::arg("influence_weights"), py::arg("triangles"), py::arg("radius"),
+          py::kw_only(), py::arg("exact") = false, py::arg("threads") = py::none(),
+          py::arg("progress") = py::none(),
+          "What the method \"ddm\" keeps: the moments of each bone's smoothed weights about each vertex (Le, "
+          "Lewis 2019),\n"
+          "float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment (x, "
+          "y, "
+          "z; from the\n"
+          "origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first moments); "
+          "vertices rise,\n"
+          "and bones of a vertex. It belongs to these rest points and this radius.\n\n"
+          "rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.\n"
+          "triangles: int32 [triangles, 3], vertices.\n"
+          "radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard "
+          "deviation\n"
+          "    along each axis.\n"
+          "exact: also weights below 1e-6; else these are left out.\n"
+          "threads, progress: as of centres_of_rotation. The GIL is released.\n\n"
+          "Raises RuntimeError where Sinew was built without this method.");
 }
 
 }  // namespace sinew::bindings

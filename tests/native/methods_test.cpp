@@ -37,6 +37,11 @@ TEST(Methods, stored_numbers_stay) {
     EXPECT_EQ(find_method("sbs")->number, 6);
     EXPECT_EQ(find_method("dib")->number, 7);
     EXPECT_EQ(find_method("sdef")->number, 8);
+#if SINEW_WITH_DDM
+    EXPECT_EQ(find_method("ddm")->number, 9);
+#else
+    EXPECT_FALSE(find_method("ddm"));
+#endif
 }
 
 TEST(Methods, every_field_says_something) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <iterator>
+#include <map>
 #include <ostream>
 
 #include "sinew/deform/deformer.h"
@@ -35,6 +37,7 @@ struct Scene {
             if (method.vertex_floats == 0) continue;
             std::vector<float>& values = vertex_values_.emplace_back();
             for (std::size_t vertex = 0; vertex < rest_points.size(); ++vertex) {
+                if (has_no_weight(vertex) && method.keeps_moments) continue;
                 const auto numbers = numbers_of<float>(vertex, method);
                 values.insert(values.end(), numbers.begin(), numbers.end());
             }
@@ -47,6 +50,7 @@ struct Scene {
 
     template <class T>
     std::vector<T> numbers_of(std::size_t vertex, const MethodInfo& method) const {
+        if (method.keeps_moments) return moments_at<T>(vertex);
         const auto first = vertex_numbers.begin() + static_cast<std::ptrdiff_t>(kVertexNumbers * vertex);
         return {first, first + static_cast<std::ptrdiff_t>(method.vertex_floats)};
     }
@@ -77,6 +81,46 @@ struct Scene {
     }
 
 private:
+    bool has_no_weight(std::size_t vertex) const { return total_weight(vertex) == 0.0; }
+
+    double total_weight(std::size_t vertex) const {
+        double sum = 0.0;
+        for (std::int32_t i = offsets[vertex]; i < offsets[vertex + 1]; ++i) {
+            sum += static_cast<double>(weights[static_cast<std::size_t>(i)]);
+        }
+        return sum;
+    }
+
+    /// Its own weights, as if all of its neighbourhood were at the first of its points: what rotates it best is then the
+    /// blended quaternion.
+    template <class T>
+    std::vector<T> moments_at(std::size_t vertex) const {
+        std::map<std::int32_t, double> shares;
+        for (std::int32_t i = offsets[vertex]; i < offsets[vertex + 1]; ++i) {
+            const auto influence = static_cast<std::size_t>(i);
+            shares[bones[influence]] += static_cast<double>(weights[influence]) / total_weight(vertex);
+        }
+        std::vector<T> rows;
+        const float* const centre = &vertex_numbers[kVertexNumbers * vertex];
+        for (const auto& [bone, share] : shares) {
+            const auto weight = static_cast<float>(share);
+            const float row[] = {static_cast<float>(vertex),
+                                 static_cast<float>(bone),
+                                 weight,
+                                 weight * centre[0],
+                                 weight * centre[1],
+                                 weight * centre[2],
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 0};
+            rows.insert(rows.end(), std::begin(row), std::end(row));
+        }
+        return rows;
+    }
+
     mutable std::vector<VertexData> vertex_data_;
     mutable std::vector<std::vector<float>> vertex_values_;
 };

@@ -3,8 +3,8 @@
 
 Written from Magnenat-Thalmann et al. 1988 (lbs), Hejl 2004 with Smith 2013 section 3.6 (qv), Kavan,
 Collins, Zara, O'Sullivan 2008, algorithms 1 (dq) and 3 (dib), Alexa 2002 (log), Le, Hodgins 2016 (cor),
-Kavan, Zara 2005 (sbs) and mmd_tools' formula (sdef); slow, one vertex at a time, and does not use the
-formulas of the library where others exist. Quaternions are (w, x, y, z).
+Kavan, Zara 2005 (sbs), Le, Lewis 2019 (ddm) and mmd_tools' formula (sdef); slow, one vertex at a time, and
+does not use the formulas of the library where others exist. Quaternions are (w, x, y, z).
 """
 
 import functools
@@ -267,9 +267,60 @@ def dib(point, motions, rotations, weights):
     return rotated @ point + translated, margin if steps < 40 else 0.0
 
 
-METHODS = {"lbs": lbs, "qv": qv, "dq": dq, "cor": cor, "sdef": sdef, "sbs": sbs, "log": log, "dib": dib}
+# Of singular values over the largest: nearer to a tie, the polar factor depends on rounding.
+LEAST_SINGULAR = 0.05
+LEAST_EXTENT = 1e-10
+
+
+def ddm(point, motions, rotations, weights, heads, neighbourhood=None, variant="0", radius=None):
+    """neighbourhood: its moments [bones, 10], and motions, rotations and heads of these bones. The polar
+    factor is by singular values, whose tie counts where there is one."""
+    if neighbourhood is None:
+        return lbs(point, motions, rotations, weights)
+    moments, its_motions, its_rotations, its_heads = neighbourhood
+    translations = rigid_parts(its_motions, its_rotations, its_heads)
+    centroid = moments[:, 1:4].sum(axis=0)
+    psi = np.array([second_moments(row, centroid) for row in moments])
+    rigid = np.tile(np.eye(4), (len(moments), 1, 1))
+    rigid[:, :3, :3], rigid[:, :3, 3] = its_rotations, translations
+    rotated, margin = blended_rotation(its_rotations, moments[:, 0])
+    moved = np.einsum("kij,kjl->il", rigid, psi)
+    target, correlation = moved[:3, 3], moved[:3, :3] - np.outer(moved[:3, 3], centroid)
+    if variant == "4":
+        target = (np.tensordot(moments[:, 0], rigid, axes=1) @ np.append(centroid, 1.0))[:3]
+    sizes = np.linalg.svd(correlation)[1]
+    # A point has no rotation of its own.
+    if variant == "0" and moments[:, 4:7].sum() > LEAST_EXTENT * centroid @ centroid:
+        smallest = sizes[1] + np.sign(np.linalg.det(correlation)) * sizes[2]
+        rotated, margin = nearest_rotation(correlation), 1.0 if smallest > LEAST_SINGULAR * sizes[0] else 0.0
+    own = rigid_parts(motions, rotations, heads)
+    scaled = (motions @ np.append(point, 1.0))[:, :3] - rotations @ point - own
+    return rotated @ (point - centroid) + target + weights @ scaled, margin
+
+
+def second_moments(row, centroid):
+    """The 4x4 matrix that Le and Lewis call Psi."""
+    weight, first, (xx, yy, zz, yz, xz, xy) = row[0], row[1:4], row[4:]
+    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    shifted = np.outer(first, centroid) + np.outer(centroid, first) - weight * np.outer(centroid, centroid)
+    psi = np.empty((4, 4))
+    psi[:3, :3], psi[:3, 3], psi[3, :3], psi[3, 3] = about + shifted, first, first, weight
+    return psi
+
+
+METHODS = {
+    "lbs": lbs,
+    "qv": qv,
+    "dq": dq,
+    "cor": cor,
+    "ddm": ddm,
+    "sdef": sdef,
+    "sbs": sbs,
+    "log": log,
+    "dib": dib,
+}
 # Those that also read where bones are at rest, and those that keep something of each vertex.
-WITH_HEADS = {"cor", "sbs", "sdef"}
+WITH_HEADS = {"cor", "ddm", "sbs", "sdef"}
 WITH_VERTEX_DATA = {"cor", "sdef"}
 
 
@@ -308,6 +359,12 @@ def deform(
             more = [rest_bones[of, :3, 3]] if method in WITH_HEADS else []
             if method in WITH_VERTEX_DATA and vertex_data is not None and method in vertex_data:
                 more.append(vertex_data[method][vertex].astype(np.float64))
+            if method == "ddm" and vertex_data is not None and method in vertex_data:
+                rows = np.asarray(vertex_data[method], np.float64)
+                rows = rows[slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1)))]
+                its = rows[:, 1].astype(int)
+                if len(rows):
+                    more.append((rows[:, 2:], transforms[its], rotations[its], rest_bones[its, :3, 3]))
             points[vertex], margins[vertex] = METHODS[method](
                 points[vertex], transforms[of], rotations[of], share / share.sum(), *more, **values
             )

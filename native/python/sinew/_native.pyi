@@ -76,7 +76,10 @@ class Method:
         these are made from; "precomputation", a function that makes them."""
     @property
     def vertex_floats(self) -> int:
-        """How many numbers its vertex data has for each vertex; 0: it has none."""
+        """How many numbers its vertex data has for each vertex, or in each row; 0: it has none."""
+    @property
+    def keeps_moments(self) -> bool:
+        """Whether its vertex data has rows, any number for each vertex: see direct_delta_mush."""
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its settings, one Parameter each."""
@@ -134,6 +137,33 @@ def centres_of_rotation(
         Where it returns False the work ends, and the result is None. What it raises comes through.
 
     Precomputations of other methods take `threads` and `progress` alike. The GIL is released.
+    """
+
+def direct_delta_mush(
+    rest_points: ArrayLike,
+    influence_offsets: ArrayLike,
+    influence_bones: ArrayLike,
+    influence_weights: ArrayLike,
+    triangles: ArrayLike,
+    radius: float,
+    *,
+    exact: bool = False,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> NDArray[np.float32] | None:
+    """What the method "ddm" keeps: the moments of each bone's smoothed weights about each vertex (Le, Lewis
+    2019), float32 [rows, 12], for `vertex_data` of Binding. A row is vertex, bone, weight, first moment
+    (x, y, z; from the origin) and second moment (xx, yy, zz, yz, xz, xy; about the sum of the vertex's first
+    moments); vertices rise, and bones of a vertex. It belongs to these rest points and this radius.
+
+    rest_points, influence_offsets, influence_bones, influence_weights: as of Binding.
+    triangles: int32 [triangles, 3], vertices.
+    radius: how far the smoothing reaches, 0 or more, in units of the rest points: the standard deviation
+        along each axis.
+    exact: also weights below 1e-6; else these are left out.
+    threads, progress: as of centres_of_rotation. The GIL is released.
+
+    Raises RuntimeError where Sinew was built without this method.
     """
 
 @final

@@ -6,12 +6,11 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
-#include <string>
-#include <thread>
 #include <type_traits>
 #include <unordered_map>
 
 #include "sinew/deform/check_bind_data.h"
+#include "sinew/deform/progress_reporter.h"
 #include "sinew/deform/thread_pool.h"
 
 namespace sinew {
@@ -318,36 +317,6 @@ private:
     std::vector<Strip> strips_;
 };
 
-/// Calls `options.progress` on the thread that made this, and knows whether it cancelled.
-class Reporter {
-public:
-    explicit Reporter(const PrecomputeOptions& options) : progress_(options.progress) {}
-
-    /// False where the work is to end. On other threads, only that.
-    bool go_on(double done) {
-        if (progress_ && std::this_thread::get_id() == caller_ &&
-            !cancelled_.load(std::memory_order_relaxed) && !progress_(done)) {
-            cancelled_.store(true, std::memory_order_relaxed);
-        }
-        return !cancelled_.load(std::memory_order_relaxed);
-    }
-
-private:
-    const std::function<bool(double)>& progress_;
-    std::thread::id caller_ = std::this_thread::get_id();
-    std::atomic<bool> cancelled_{false};
-};
-
-void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count) {
-    if (triangles.size() % 3 != 0) fail("triangles", "three corners each", std::to_string(triangles.size()));
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-        if (triangles[i] < 0 || static_cast<std::size_t>(triangles[i]) >= vertex_count) {
-            fail("triangles", "numbers of vertices, below " + std::to_string(vertex_count),
-                 std::to_string(triangles[i]) + " at triangle " + std::to_string(i / 3));
-        }
-    }
-}
-
 Vec3<double> mean_of(std::span<const Vec3<float>> points) {
     Vec3<double> sum(0.0);
     for (const Vec3<float>& point : points) sum += Vec3<double>(point);
@@ -356,7 +325,7 @@ Vec3<double> mean_of(std::span<const Vec3<float>> points) {
 
 template <class T>
 bool find_centres(const BindData& data, const NormalisedInfluences& influences, const Collector& collector,
-                  std::size_t threads, Reporter& reporter, std::span<Vec3<float>> centres) {
+                  std::size_t threads, ProgressReporter& reporter, std::span<Vec3<float>> centres) {
     const Vec3<double> origin = mean_of(data.rest_points);
     const PairSums<T> sums(collector.cells(), collector.pairs().count(), origin);
     std::atomic<std::size_t> done{0};
@@ -398,7 +367,7 @@ std::optional<std::vector<Vec3<float>>> centres_of_rotation(const BindData& data
     check(data);
     check_triangles(triangles, data.rest_points.size());
     const NormalisedInfluences influences = normalised_influences(data);
-    Reporter reporter(options);
+    ProgressReporter reporter(options);
     Collector collector(options.exact);
     for (std::size_t i = 0; i < triangles.size(); i += 3) {
         if (i / 3 % kTrianglesBetweenReports == 0 &&

@@ -1,28 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "sinew/deform/deformer.h"
+#include "sinew/deform/precompute_options.h"
 #include "sinew/export.h"
 
 namespace sinew {
-
-/// How a precomputation runs. All of them take this.
-struct PrecomputeOptions {
-    /// 0: as many as help.
-    std::size_t threads = 0;
-    /// Called now and then, on the calling thread alone, with the share that is done, 0 to 1. False cancels; what it
-    /// throws comes through.
-    std::function<bool(double)> progress;
-    /// By the definition itself, slowly: for tests.
-    bool exact = false;
-};
 
 /// The optimised centre of rotation of each vertex [vertices], model space: what Cor keeps of it (Le, Hodgins 2016).
 ///

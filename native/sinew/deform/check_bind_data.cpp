@@ -148,4 +148,14 @@ NormalisedInfluences normalised_influences(const BindData& data) {
     return result;
 }
 
+void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count) {
+    if (triangles.size() % 3 != 0) fail("triangles", "three corners each", std::to_string(triangles.size()));
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        if (triangles[i] < 0 || static_cast<std::size_t>(triangles[i]) >= vertex_count) {
+            fail("triangles", "numbers of vertices, below " + std::to_string(vertex_count),
+                 std::to_string(triangles[i]) + " at triangle " + std::to_string(i / 3));
+        }
+    }
+}
+
 }  // namespace sinew

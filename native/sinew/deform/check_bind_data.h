@@ -29,6 +29,9 @@ struct NormalisedInfluences {
     std::vector<Influence<float>> influences;
 };
 
+/// Throws where `triangles` [3 x any number] has a corner that is no vertex.
+void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);
+
 /// What `mesh` was packed of, as far as points, weights and the highest bone are concerned.
 ///
 /// rows        of `mesh`, or with other rest points

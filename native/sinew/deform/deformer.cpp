@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sinew/deform/bone_moments.h"
 #include "sinew/deform/bone_sets.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/kernels.h"
@@ -43,12 +44,44 @@ std::size_t checked_method(const std::string& argument, const MethodInfo& method
     fail(argument, "one of " + names, "a method of number " + std::to_string(method.number));
 }
 
+void check_moments(const std::string& name, std::span<const float> rows, std::size_t vertex_count) {
+    if (rows.size() % kMomentFloats != 0) {
+        fail("vertex_data", "rows of " + std::to_string(kMomentFloats) + " numbers of " + name,
+             std::to_string(rows.size()) + " numbers");
+    }
+    const auto fail_at = [&](std::size_t row, const std::string& wanted, const std::string& got) {
+        fail("vertex_data", wanted, got + " of " + name + " in row " + std::to_string(row));
+    };
+    const auto is_number = [](float value, std::size_t count) {
+        return value >= 0.0f && value < static_cast<float>(count) && value == std::floor(value);
+    };
+    for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
+        const auto row = rows.subspan(i, kMomentFloats);
+        const std::size_t number = i / kMomentFloats;
+        for (const float value : row) {
+            if (!std::isfinite(value)) fail_at(number, "finite values", "NaN or infinity");
+        }
+        if (!is_number(row[0], vertex_count)) fail_at(number, "numbers of vertices", "another");
+        if (!is_number(row[1], kMaxBones)) fail_at(number, "numbers of bones", "another");
+        if (row[2] < 0.0f) fail_at(number, "weights of 0 and more", "a negative one");
+        if (i == 0) continue;
+        const float* const before = row.data() - kMomentFloats;
+        if (row[0] < before[0] || (row[0] == before[0] && row[1] <= before[1])) {
+            fail_at(number, "rising vertices and bones", "others");
+        }
+    }
+}
+
 /// The index of the method.
 std::size_t checked_vertex_data(const VertexData& data, std::size_t vertex_count) {
     const std::size_t index = checked_method("vertex_data", data.method);
     const std::string name(kMethods[index].name);
     const std::size_t floats = kMethods[index].vertex_floats;
     if (floats == 0) fail("vertex_data", "that of methods that need it", "that of " + name);
+    if (kMethods[index].keeps_moments) {
+        check_moments(name, data.values, vertex_count);
+        return index;
+    }
     if (data.values.size() != vertex_count * floats) {
         fail("vertex_data", std::to_string(vertex_count * floats) + " numbers of " + name,
              std::to_string(data.values.size()));
@@ -99,6 +132,7 @@ struct Binding::Packed {
     std::vector<Affine<float>> rest_bones;      // of mesh.used_bones; or empty: all identity
     std::vector<std::int32_t> stretched_bones;  // of mesh.used_bones, those whose axes are not of unit length
     std::array<std::vector<Lanes<float>>, kMethodCount> vertex_rows;  // of each method; empty: none
+    std::array<BoneMoments, kMethodCount> moments;                    // of methods that keep these
     std::size_t vertex_count;
     std::size_t influence_count;
     std::size_t bone_count = 0;
@@ -117,7 +151,11 @@ Binding::Packed::Packed(const BindData& data) {
     mesh = pack(data.rest_points, normalised.offsets, normalised.influences);
     for (const VertexData& of_method : data.vertex_data) {
         const std::size_t method = checked_vertex_data(of_method, vertex_count);
-        vertex_rows[method] = pack_values(mesh, of_method.values, of_method.method.vertex_floats);
+        if (kMethods[method].keeps_moments) {
+            moments[method] = pack_moments(mesh, of_method.values);
+        } else {
+            vertex_rows[method] = pack_values(mesh, of_method.values, of_method.method.vertex_floats);
+        }
     }
 
     if (data.rest_bones.empty()) return;
@@ -133,6 +171,8 @@ Binding::Packed::Packed(const BindData& data) {
 BoundMesh Binding::Packed::unpack(std::span<const Lanes<float>> rows) const {
     BoundMesh bound = bound_mesh(mesh, rows, vertex_count, bone_count);
     for (std::size_t i = 0; i < kMethodCount; ++i) {
+        if (!moments[i].blocks.empty())
+            bound.vertex_data.push_back({kMethods[i], unpack_moments(mesh, moments[i])});
         if (vertex_rows[i].empty()) continue;
         bound.vertex_data.push_back(
             {kMethods[i], unpack_values(mesh, vertex_rows[i], vertex_count, kMethods[i].vertex_floats)});
@@ -273,9 +313,11 @@ void Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         }
         const bool changes_space = kernel.is_rigid && !same_space;
         const std::vector<Lanes<float>>& vertex_rows = packed.vertex_rows[state_->methods[k]];
+        const BoneMoments& moments = packed.moments[state_->methods[k]];
         work.frames[k] = {&packed.mesh,
                           state_->rows().data(),
                           vertex_rows.empty() ? nullptr : vertex_rows.data(),
+                          moments.blocks.empty() ? nullptr : &moments,
                           kernel.set_bone_size > 0 ? state_->sets.entries.data() : packed.mesh.bones.data(),
                           &palette,
                           changes_space ? bones_from_model.data() : nullptr,

@@ -25,7 +25,9 @@ inline constexpr std::size_t kMaxBones = std::size_t{1}
 /// belongs to the rest points that it was made from, and stays as it is where set_rest_points() gives others.
 struct VertexData {
     MethodInfo method;
-    std::span<const float> values;  // [vertices][method.vertex_floats] finite; model space
+    // [vertices][method.vertex_floats], or [rows][vertex_floats] of a method that keeps moments, by rising vertices and
+    // bones, each once. Finite; model space.
+    std::span<const float> values;
 };
 
 /// What a Binding is made of. Nothing is kept by reference.

@@ -11,11 +11,14 @@
 
 namespace sinew {
 
+struct BoneMoments;
+
 /// What every block of one frame reads.
 struct Frame {
     const PackedMesh* mesh;
     const Lanes<float>* rows;         // of the mesh, or with other rest points
     const Lanes<float>* vertex_rows;  // [blocks][MethodInfo::vertex_floats]; null: the method has none
+    const BoneMoments* moments;       // null: the method has none
     const std::int32_t* bones;        // as PackedMesh::bones, or BoneSets::entries
     const Palette* palette;
     const Float4* bones_from_model;  // displacements of points to the space of the bones and back;

@@ -105,7 +105,8 @@ struct MethodInfo {
     std::string_view source;       // the papers
     Needs needs;
     std::span<const Parameter> parameters{};  // numbers and choices, which each frame has its own of
-    std::size_t vertex_floats = 0;            // numbers that it keeps of each vertex
+    std::size_t vertex_floats = 0;  // numbers that it keeps of each vertex; or, of each row, if keeps_moments
+    bool keeps_moments = false;     // it keeps rows, any number a vertex: see skinning/moments.h
 };
 
 /// The number is the method's identity.

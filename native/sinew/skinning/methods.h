@@ -9,6 +9,9 @@
 #include <tuple>
 
 #include "sinew/skinning/cor.h"
+#if SINEW_WITH_DDM
+#include "sinew/skinning/ddm.h"
+#endif
 #include "sinew/skinning/dib.h"
 #include "sinew/skinning/dq.h"
 #include "sinew/skinning/lbs.h"
@@ -21,7 +24,11 @@ namespace sinew {
 
 /// THE list of methods, group by group, in the order in which people see them. Dispatch, bindings, tests, measurements,
 /// command line and panel are made from it.
+#if SINEW_WITH_DDM
+using Methods = std::tuple<Lbs, Dq, Cor, Ddm, Sdef, Qv, Sbs, Log, IterativeDq>;
+#else
 using Methods = std::tuple<Lbs, Dq, Cor, Sdef, Qv, Sbs, Log, IterativeDq>;
+#endif
 
 inline constexpr std::size_t kMethodCount = std::tuple_size_v<Methods>;
 

@@ -23,21 +23,6 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-/// Vertices that do not have two bones: linear blending.
-struct LinearRows : CentreRows {
-    static constexpr std::size_t kVertexFloats = 0;
-    static constexpr std::size_t kSignedFloat4s = 0;
-
-    template <class D>
-    static HWY_INLINE Points<D> finish(D, const Sum<D, kNumbers>& sum, const Points<D>& p) {
-        const auto moved = [&](std::size_t row) HWY_ATTR {
-            const Vec<D>* const m = sum.value + row;
-            return hn::MulAdd(m[0], p.x, hn::MulAdd(m[1], p.y, hn::MulAdd(m[2], p.z, m[3])));
-        };
-        return add<D>(p, {moved(4), moved(8), moved(12)});
-    }
-};
-
 /// Two bones of a vertex.
 struct Pair {
     std::int32_t bones[2];

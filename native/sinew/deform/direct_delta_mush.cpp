@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sinew/deform/direct_delta_mush.h"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "sinew/deform/check_bind_data.h"
+#include "sinew/deform/progress_reporter.h"
+#include "sinew/deform/thread_pool.h"
+
+namespace sinew {
+namespace {
+
+// How often the neighbourhood's weights are smoothed: four times, they are near a bell's.
+constexpr int kSteps = 4;
+
+// The share of the work before the first bone.
+constexpr double kShareOfFactor = 0.1;
+
+// Weights below this are 0: far below any that is kept, and far above numbers that are slow to compute with.
+constexpr double kNothing = 1e-13;
+
+// Of exact results.
+constexpr double kLeastExact = 1e-10;
+
+using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
+
+// 1, x, y, z, xx, yy, zz, yz, xz, xy: what is smoothed of a bone.
+constexpr std::size_t kColumns = 10;
+using Columns = std::array<double, kColumns>;
+
+/// Half the cotangent of the angle at `corner`; 0 of a triangle without area.
+double half_cotangent(const Vec3<double>& corner, const Vec3<double>& a, const Vec3<double>& b) {
+    const Vec3<double> to_a = a - corner;
+    const Vec3<double> to_b = b - corner;
+    const double twice_area = glm::length(glm::cross(to_a, to_b));
+    const double longest = std::max(glm::dot(to_a, to_a), glm::dot(to_b, to_b));
+    return twice_area > 1e-9 * longest ? 0.5 * glm::dot(to_a, to_b) / twice_area : 0.0;
+}
+
+/// The matrix of one step, and the mass of each vertex; both over the mean mass.
+struct Smoothing {
+    SparseMatrix step;
+    std::vector<double> mass;
+};
+
+Smoothing smoothing_of(std::span<const Vec3<float>> points, std::span<const std::int32_t> triangles,
+                       double radius) {
+    const std::size_t count = points.size();
+    Smoothing smoothing{SparseMatrix(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(count)),
+                        std::vector<double>(count)};
+    // Below the diagonal: an entry of each edge's two triangles, to be added up.
+    using Entry = Eigen::Triplet<double, std::int32_t>;
+    std::vector<Entry> entries;
+    entries.reserve(triangles.size());
+    double area = 0.0;
+    for (std::size_t i = 0; i < triangles.size(); i += 3) {
+        const auto corners = triangles.subspan(i, 3);
+        const auto point = [&](std::size_t k) {
+            return Vec3<double>(points[static_cast<std::size_t>(corners[k % 3])]);
+        };
+        const double third = glm::length(glm::cross(point(1) - point(0), point(2) - point(0))) / 6.0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            smoothing.mass[static_cast<std::size_t>(corners[k])] += third;
+            area += third;
+            const std::int32_t a = corners[(k + 1) % 3];
+            const std::int32_t b = corners[(k + 2) % 3];
+            if (a != b) {
+                entries.emplace_back(std::max(a, b), std::min(a, b),
+                                     half_cotangent(point(k), point(k + 1), point(k + 2)));
+            }
+        }
+    }
+    const double mean = area > 0.0 ? area / static_cast<double>(count) : 1.0;
+    for (double& mass : smoothing.mass) mass = mass > 0.0 ? mass / mean : 1.0;
+    SparseMatrix edges(smoothing.step.rows(), smoothing.step.cols());
+    edges.setFromTriplets(entries.begin(), entries.end());
+    entries.clear();
+    std::vector<double> diagonal = smoothing.mass;
+    const double time = radius * radius / (2.0 * kSteps) / mean;
+    for (std::int32_t column = 0; column < edges.outerSize(); ++column) {
+        for (SparseMatrix::InnerIterator edge(edges, column); edge; ++edge) {
+            const double weight = time * std::max(0.0, edge.value());
+            if (weight == 0.0) continue;
+            entries.emplace_back(edge.row(), column, -weight);
+            diagonal[static_cast<std::size_t>(edge.row())] += weight;
+            diagonal[static_cast<std::size_t>(column)] += weight;
+        }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        entries.emplace_back(static_cast<std::int32_t>(i), static_cast<std::int32_t>(i), diagonal[i]);
+    }
+    smoothing.step.setFromTriplets(entries.begin(), entries.end());
+    return smoothing;
+}
+
+/// Solves the step for several columns at once, and only where they are not 0: Eigen's own solver goes through the
+/// whole factor for each column.
+class Solver {
+public:
+    explicit Solver(const SparseMatrix& matrix) : factor_(matrix) {
+        if (factor_.info() != Eigen::Success) {
+            fail("rest_points", "a mesh whose areas are numbers", "one that is too large or too small");
+        }
+        const auto diagonal = factor_.vectorD();
+        diagonal_.assign(diagonal.data(), diagonal.data() + diagonal.size());
+        for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+            place_.push_back(static_cast<std::size_t>(factor_.permutationP().indices()(i)));
+        }
+    }
+
+    /// Where the solver has row `i`.
+    [[nodiscard]] std::size_t place(std::size_t i) const { return place_[i]; }
+
+    /// From right side to solution. The first column is >= 0, and where it is 0 all are.
+    ///
+    /// is_there  [rows] where it is not 0
+    void solve(std::span<Columns> x, std::span<std::uint8_t> is_there) const {
+        const SparseMatrix& lower = factor_.matrixL().nestedExpression();
+        const std::int32_t* const starts = lower.outerIndexPtr();
+        const std::int32_t* const rows = lower.innerIndexPtr();
+        const double* const values = lower.valuePtr();
+        for (std::size_t k = 0; k < x.size(); ++k) {
+            if (is_there[k] == 0) continue;
+            if (x[k][0] < kNothing * diagonal_[k]) {
+                x[k] = {};
+                is_there[k] = 0;
+                continue;
+            }
+            const Columns from = x[k];
+            for (std::int32_t i = starts[k]; i < starts[k + 1]; ++i) {
+                const auto row = static_cast<std::size_t>(rows[i]);
+                is_there[row] = 1;
+                for (std::size_t c = 0; c < kColumns; ++c) x[row][c] -= values[i] * from[c];
+            }
+        }
+        for (std::size_t k = x.size(); k-- > 0;) {
+            Columns sum = x[k];
+            for (double& number : sum) number /= diagonal_[k];
+            for (std::int32_t i = starts[k]; i < starts[k + 1]; ++i) {
+                const auto row = static_cast<std::size_t>(rows[i]);
+                if (is_there[row] == 0) continue;
+                for (std::size_t c = 0; c < kColumns; ++c) sum[c] -= values[i] * x[row][c];
+            }
+            is_there[k] = sum[0] >= kNothing;
+            x[k] = is_there[k] != 0 ? sum : Columns{};
+        }
+    }
+
+private:
+    Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>> factor_;
+    std::vector<double> diagonal_;
+    std::vector<std::size_t> place_;
+};
+
+/// What a bone has about a vertex, from the vertex as the origin.
+struct Found {
+    std::uint32_t vertex;
+    std::array<float, kColumns> moments;
+};
+
+Columns columns_of(const Vec3<double>& p, double weight) {
+    Columns columns{1.0, p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.x * p.z, p.x * p.y};
+    for (double& number : columns) number *= weight;
+    return columns;
+}
+
+/// From `origin` instead.
+std::array<float, kColumns> moved_to(const Vec3<double>& o, const Columns& m) {
+    const double weight = m[0];
+    const Vec3<double> first = Vec3<double>(m[1], m[2], m[3]) - weight * o;
+    // Of (p - o) (p - o)^T, by the moments from there: p p^T less first o^T, o first^T and weight o o^T.
+    const auto second = [&](std::size_t column, int a, int b) {
+        return static_cast<float>(m[column] - first[a] * o[b] - o[a] * first[b] - weight * o[a] * o[b]);
+    };
+    return {static_cast<float>(weight),
+            static_cast<float>(first.x),
+            static_cast<float>(first.y),
+            static_cast<float>(first.z),
+            second(4, 0, 0),
+            second(5, 1, 1),
+            second(6, 2, 2),
+            second(7, 1, 2),
+            second(8, 0, 2),
+            second(9, 0, 1)};
+}
+
+/// The influences of each bone.
+struct Weight {
+    std::uint32_t vertex;
+    float weight;
+};
+using WeightsByBone = std::map<std::int32_t, std::vector<Weight>>;
+
+WeightsByBone weights_by_bone(const NormalisedInfluences& influences) {
+    WeightsByBone found;
+    for (std::size_t vertex = 0; vertex + 1 < influences.offsets.size(); ++vertex) {
+        for (std::uint32_t i = influences.offsets[vertex]; i < influences.offsets[vertex + 1]; ++i) {
+            const Influence<float>& influence = influences.influences[i];
+            found[influence.bone].push_back({static_cast<std::uint32_t>(vertex), influence.weight});
+        }
+    }
+    return found;
+}
+
+/// The moments of one bone about all vertices that it has any.
+class BoneSmoother {
+public:
+    BoneSmoother(const Solver& solver, std::span<const double> mass, std::span<const Vec3<double>> points)
+        : solver_(solver), mass_(mass), points_(points), x_(points.size()), is_there_(points.size()) {}
+
+    /// Nothing where `goes_on()` is false.
+    template <class GoesOn>
+    std::vector<Found> find(std::span<const Weight> weights, double least, const GoesOn& goes_on) {
+        std::ranges::fill(x_, Columns{});
+        std::ranges::fill(is_there_, std::uint8_t{0});
+        for (const auto& [vertex, weight] : weights) {
+            const std::size_t place = solver_.place(vertex);
+            const Columns columns = columns_of(points_[vertex], static_cast<double>(weight));
+            for (std::size_t c = 0; c < kColumns; ++c) x_[place][c] += columns[c];
+            is_there_[place] = 1;
+        }
+        for (int step = 0; step < kSteps; ++step) {
+            if (!goes_on()) return {};
+            for (std::size_t vertex = 0; vertex < points_.size(); ++vertex) {
+                const std::size_t place = solver_.place(vertex);
+                if (is_there_[place] == 0) continue;
+                for (double& number : x_[place]) number *= mass_[vertex];
+            }
+            solver_.solve(x_, is_there_);
+        }
+        std::vector<Found> found;
+        for (std::size_t vertex = 0; vertex < points_.size(); ++vertex) {
+            const Columns& moments = x_[solver_.place(vertex)];
+            if (moments[0] < least) continue;
+            found.push_back({static_cast<std::uint32_t>(vertex), moved_to(points_[vertex], moments)});
+        }
+        return found;
+    }
+
+private:
+    const Solver& solver_;
+    std::span<const double> mass_;
+    std::span<const Vec3<double>> points_;
+    std::vector<Columns> x_;
+    std::vector<std::uint8_t> is_there_;
+};
+
+/// Writes the rows of one vertex, from what its bones have about it.
+void add_rows(std::uint32_t vertex, const Vec3<double>& point,
+              std::span<const std::pair<std::int32_t, const Found*>> of_bones, std::vector<float>& rows) {
+    double total = 0.0;
+    Vec3<double> centre(0.0);  // from the vertex
+    const auto at = [](const Found& found, std::size_t i) { return static_cast<double>(found.moments[i]); };
+    for (const auto& [bone, found] : of_bones) {
+        total += at(*found, 0);
+        centre += Vec3<double>(at(*found, 1), at(*found, 2), at(*found, 3));
+    }
+    centre /= total;
+    for (const auto& [bone, found] : of_bones) {
+        const double weight = at(*found, 0) / total;
+        const Vec3<double> first = Vec3<double>(at(*found, 1), at(*found, 2), at(*found, 3)) / total;
+        const auto second = [&](std::size_t column, int a, int b) {
+            const double moment = at(*found, column) / total;
+            return static_cast<float>(moment - first[a] * centre[b] - centre[a] * first[b] +
+                                      weight * centre[a] * centre[b]);
+        };
+        const Vec3<float> from_origin(first + weight * point);
+        rows.insert(rows.end(),
+                    {static_cast<float>(vertex), static_cast<float>(bone), static_cast<float>(weight),
+                     from_origin.x, from_origin.y, from_origin.z, second(4, 0, 0), second(5, 1, 1),
+                     second(6, 2, 2), second(7, 1, 2), second(8, 0, 2), second(9, 0, 1)});
+    }
+}
+
+}  // namespace
+
+std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
+                                                    std::span<const std::int32_t> triangles, double radius,
+                                                    const PrecomputeOptions& options) {
+    check(data);
+    const std::size_t vertex_count = data.rest_points.size();
+    check_triangles(triangles, vertex_count);
+    if (!(radius >= 0.0) || !std::isfinite(radius)) {
+        fail("radius", "a number of 0 or more", std::to_string(radius));
+    }
+    if (vertex_count > kMaxMomentVertices) {
+        fail("rest_points", "at most " + std::to_string(kMaxMomentVertices) + " points",
+             std::to_string(vertex_count));
+    }
+    ProgressReporter reporter(options);
+    if (!reporter.go_on(0.0)) return std::nullopt;
+    const NormalisedInfluences influences = normalised_influences(data);
+    const WeightsByBone by_bone = weights_by_bone(influences);
+    const Smoothing smoothing = smoothing_of(data.rest_points, triangles, radius);
+    const Solver solver(smoothing.step);
+    if (!reporter.go_on(kShareOfFactor)) return std::nullopt;
+
+    // About the mesh's middle, so that no digits are lost to where it is.
+    std::vector<Vec3<double>> points(data.rest_points.begin(), data.rest_points.end());
+    Vec3<double> origin(0.0);
+    for (const Vec3<double>& point : points) origin += point / static_cast<double>(vertex_count);
+    for (Vec3<double>& point : points) point -= origin;
+    std::vector<const WeightsByBone::value_type*> bones;
+    for (const auto& bone : by_bone) bones.push_back(&bone);
+    std::vector<std::vector<Found>> found(bones.size());
+    std::atomic<std::size_t> done{0};
+    const double least = options.exact ? kLeastExact : kLeastMoment;
+    const auto go_on = [&] {
+        const auto share = static_cast<double>(done.load(std::memory_order_relaxed)) /
+                           static_cast<double>(kSteps * bones.size());
+        return reporter.go_on(kShareOfFactor + (1.0 - kShareOfFactor) * share);
+    };
+    parallel_for(
+        bones.size(), options.threads > 0 ? options.threads : hardware_threads(),
+        [&](std::size_t begin, std::size_t end) {
+            BoneSmoother smoother(solver, smoothing.mass, points);
+            for (std::size_t bone = begin; bone < end; ++bone) {
+                found[bone] = smoother.find(bones[bone]->second, least, [&] {
+                    const bool goes_on = go_on();
+                    done.fetch_add(1, std::memory_order_relaxed);
+                    return goes_on;
+                });
+            }
+        },
+        1);
+    if (!go_on()) return std::nullopt;
+
+    std::vector<float> rows;
+    std::vector<std::size_t> next(bones.size());
+    std::vector<std::pair<std::int32_t, const Found*>> of_vertex;
+    for (std::uint32_t vertex = 0; vertex < vertex_count; ++vertex) {
+        of_vertex.clear();
+        for (std::size_t bone = 0; bone < bones.size(); ++bone) {
+            if (next[bone] == found[bone].size() || found[bone][next[bone]].vertex != vertex) continue;
+            of_vertex.emplace_back(bones[bone]->first, &found[bone][next[bone]++]);
+        }
+        if (influences.offsets[vertex] == influences.offsets[vertex + 1]) continue;
+        if (!of_vertex.empty()) add_rows(vertex, Vec3<double>(data.rest_points[vertex]), of_vertex, rows);
+    }
+    return reporter.go_on(1.0) ? std::optional(std::move(rows)) : std::nullopt;
+}
+
+}  // namespace sinew

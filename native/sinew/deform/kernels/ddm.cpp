@@ -1,0 +1,581 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Direct delta mush on lanes. A row is as CentreRows has it. Vertices have moments of bones: Frame::moments.
+// This file is compiled once for each instruction set by including itself (foreach_target.h).
+#include "sinew/skinning/ddm.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "sinew/deform/bone_moments.h"
+#include "sinew/deform/centre_rows.h"
+#include "sinew/deform/rigid_bones.h"
+#include "sinew/deform/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sinew/deform/kernels/ddm.cpp"
+#include "hwy/foreach_target.h"
+//
+#include "hwy/highway.h"
+#include "sinew/deform/centre-inl.h"
+#include "sinew/deform/rigid-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sinew {
+namespace HWY_NAMESPACE {
+
+// Newton's method has found the nearest rotation where its last step is at most this square of half an angle.
+inline constexpr float kLastStep = 1e-7f;
+
+// From the blended quaternion on; what takes longer is far from it, and found one by one.
+inline constexpr int kFewestSteps = 2;
+inline constexpr int kMostSteps = 6;
+
+// Where the determinant of a step's matrix, over the cube of its trace, is less, it has no maximum to go to.
+inline constexpr float kSingularStep = 1e-6f;
+
+enum class Variant { nearest, quaternion, weights };
+
+inline constexpr std::size_t kDdmNumbers = CentreRows::kNumbers;
+
+// Bones of more rows are prepared one by one for each vector.
+inline constexpr std::size_t kMaxPrepared = kMaxResolved;
+
+/// The bones of blocks, as their rows are added.
+///
+/// The last 12 numbers of a row take points of model space. Unless they are added plainly, those of all but the first
+/// are what they differ from the first; where signs are resolved, quaternions, too.
+class MomentBones {
+public:
+    HWY_INLINE MomentBones(const Frame& frame, const std::int32_t* bones, std::size_t bone_count)
+        : palette_(*frame.palette),
+          bones_(bones),
+          from_model_(frame.bones_from_model == nullptr ? nullptr : frame.bones_from_model->value.data()),
+          count(bone_count) {
+        if (count == 0) return;
+        float least = palette_.sizes[bones[0]];
+        for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette_.sizes[bones[k]]);
+        is_plain = sinew::is_plain(palette_.sizes[bones[0]], least);
+        const std::size_t prepared = std::min(count, kMaxPrepared);
+        for (std::size_t k = 0; k < prepared; ++k) load(k, rows_ + kDdmNumbers * k);
+        resolve_signs();
+        for (std::size_t k = 1; k < prepared && !is_plain; ++k) {
+            subtract_first(rows_ + kDdmNumbers * k, is_resolved ? 0 : 4);
+        }
+    }
+
+    /// [kDdmNumbers]
+    ///
+    /// space  for a row that is not kept
+    HWY_INLINE const float* row(std::size_t k, float* space) const {
+        if (HWY_LIKELY(k < kMaxPrepared)) return rows_ + kDdmNumbers * k;
+        load(k, space);
+        if (!is_plain) subtract_first(space, 4);
+        return space;
+    }
+
+private:
+    HWY_INLINE void load(std::size_t k, float* row) const {
+        std::memcpy(row, row_of<kDdmNumbers>(palette_, bones_[k]), sizeof(float) * kDdmNumbers);
+        if (from_model_ == nullptr) return;
+        for (std::size_t i = 4; i < kDdmNumbers; i += 4) {
+            const float* const r = row + i;
+            float moved[4];
+            for (std::size_t c = 0; c < 4; ++c) {
+                moved[c] =
+                    r[c] + (r[0] * from_model_[c] + (r[1] * from_model_[4 + c] + r[2] * from_model_[8 + c]));
+            }
+            std::memcpy(row + i, moved, sizeof(moved));
+        }
+    }
+
+    HWY_INLINE void subtract_first(float* row, std::size_t begin) const {
+        for (std::size_t i = begin; i < kDdmNumbers; ++i) row[i] -= rows_[i];
+    }
+
+    HWY_INLINE void resolve_signs() {
+        if (count > kMaxPrepared) return;
+        float* const rows = rows_;
+        for (std::size_t k = 1; k < count; ++k) {
+            float* const q = rows + kDdmNumbers * k;
+            if (dot(q, rows) < 0.0f) {
+                for (std::size_t i = 0; i < 4; ++i) q[i] = -q[i];
+            }
+        }
+        is_resolved = signs_agree(rows, kDdmNumbers, count);
+    }
+
+    const Palette& palette_;
+    const std::int32_t* bones_;
+    const float* from_model_;
+    alignas(64) float rows_[kDdmNumbers * kMaxPrepared];
+
+public:
+    std::size_t count;
+    bool is_plain = false;
+    bool is_resolved = false;
+};
+
+/// A row of a block, from the lanes at work on.
+template <class D>
+HWY_INLINE Vec<D> load_row(D d, const float* block, std::size_t row) {
+    return hn::Load(d, block + kLanes * row);
+}
+
+/// Three rows that follow each other.
+template <class D>
+HWY_INLINE Points<D> load_point(D d, const float* block, std::size_t row) {
+    return {load_row(d, block, row), load_row(d, block, row + 1), load_row(d, block, row + 2)};
+}
+
+/// The rows x, y, z of what `row` of a bone makes of a point and its weight, added to `sum`.
+template <class D>
+HWY_INLINE void add_moved(D d, const float* row, const Points<D>& p, Vec<D> weight, Points<D>& sum) {
+    const auto along = [d, &p, weight](const float* r, Vec<D> to) HWY_ATTR {
+        to = hn::MulAdd(hn::Set(d, r[3]), weight, to);
+        to = hn::MulAdd(hn::Set(d, r[0]), p.x, to);
+        to = hn::MulAdd(hn::Set(d, r[1]), p.y, to);
+        return hn::MulAdd(hn::Set(d, r[2]), p.z, to);
+    };
+    sum = {along(row + 4, sum.x), along(row + 8, sum.y), along(row + 12, sum.z)};
+}
+
+/// The blended quaternion and the displacement of the centroid.
+template <class D>
+struct Motion {
+    Vec<D> rotation[4];
+    Points<D> displacement;
+};
+
+/// Adds a quaternion in the hemisphere of the sum before it. Rounded as dot() is.
+template <class D>
+HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
+    const Vec<D> along =
+        hn::Add(hn::Add(hn::Mul(hn::Set(d, q[0]), sum[0]), hn::Mul(hn::Set(d, q[2]), sum[2])),
+                hn::Add(hn::Mul(hn::Set(d, q[1]), sum[1]), hn::Mul(hn::Set(d, q[3]), sum[3])));
+    const Vec<D> by = hn::IfThenElse(hn::Lt(along, hn::Zero(d)), hn::Neg(weight), weight);
+    for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
+}
+
+template <bool kFirst, bool kPlain, bool kResolved, class D>
+HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* block,
+                                   const Points<D>& centroid) {
+    alignas(64) float space[kDdmNumbers];
+    const MomentLayout layout{bones.count};
+    const Vec<D> zero = hn::Zero(d);
+    Motion<D> sum{{zero, zero, zero, zero}, {zero, zero, zero}};
+    if (!kPlain) {
+        const float* const first = bones.row(0, space);
+        add_moved<D>(d, first, centroid, hn::Set(d, 1.0f), sum.displacement);
+        if (kResolved) {
+            for (std::size_t i = 0; i < 4; ++i) sum.rotation[i] = hn::Set(d, first[i]);
+        } else {
+            add_signed<D>(d, first, load_row(d, block, layout.weight(0)), sum.rotation);
+        }
+    }
+    for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
+        const float* const row = bones.row(k, space);
+        const Vec<D> weight = load_row(d, block, layout.weight(k));
+        Points<D> first;
+        if constexpr (kFirst) {
+            first = load_point(d, block, layout.first(k));
+        } else {
+            first = {hn::Mul(weight, centroid.x), hn::Mul(weight, centroid.y), hn::Mul(weight, centroid.z)};
+        }
+        add_moved<D>(d, row, first, weight, sum.displacement);
+        if (kResolved) {
+            for (std::size_t i = 0; i < 4; ++i) {
+                sum.rotation[i] = hn::MulAdd(weight, hn::Set(d, row[i]), sum.rotation[i]);
+            }
+        } else {
+            add_signed<D>(d, row, weight, sum.rotation);
+        }
+    }
+    return sum;
+}
+
+/// Rows of a 3x3 matrix.
+template <class D>
+struct Rows3 {
+    Points<D> x;
+    Points<D> y;
+    Points<D> z;
+};
+
+/// A symmetric matrix.
+template <class D>
+struct Symmetric {
+    Vec<D> xx, yy, zz, yz, xz, xy;
+};
+
+template <class D>
+HWY_INLINE Symmetric<D> load_symmetric(D d, const float* block, std::size_t at) {
+    return {load_row(d, block, at),     load_row(d, block, at + 1), load_row(d, block, at + 2),
+            load_row(d, block, at + 3), load_row(d, block, at + 4), load_row(d, block, at + 5)};
+}
+
+/// r m, the row r of three numbers, added to `sum`.
+template <class D>
+HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, const Points<D>& sum) {
+    const Vec<D> x = hn::Set(d, r[0]);
+    const Vec<D> y = hn::Set(d, r[1]);
+    const Vec<D> z = hn::Set(d, r[2]);
+    return {hn::MulAdd(x, m.xx, hn::MulAdd(y, m.xy, hn::MulAdd(z, m.xz, sum.x))),
+            hn::MulAdd(x, m.xy, hn::MulAdd(y, m.yy, hn::MulAdd(z, m.yz, sum.y))),
+            hn::MulAdd(x, m.xz, hn::MulAdd(y, m.yz, hn::MulAdd(z, m.zz, sum.z)))};
+}
+
+/// Of the posed neighbourhood, in the space of the bones, with the one at rest in model space.
+///
+/// displacement  of the centroid
+template <bool kPlain, class D>
+HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* block, const Points<D>& centroid,
+                                const Points<D>& displacement, const float* from_model) {
+    alignas(64) float space[kDdmNumbers];
+    const MomentLayout layout{bones.count};
+    const Symmetric<D> total = load_symmetric(d, block, layout.total());
+    Rows3<D> sum{
+        {total.xx, total.xy, total.xz}, {total.xy, total.yy, total.yz}, {total.xz, total.yz, total.zz}};
+    const auto add_rows = [&](const float* x, const float* y, const float* z, const Symmetric<D>& m)
+                              HWY_ATTR {
+                                  sum.x = add_product(d, x, m, sum.x);
+                                  sum.y = add_product(d, y, m, sum.y);
+                                  sum.z = add_product(d, z, m, sum.z);
+                              };
+    if (from_model != nullptr) add_rows(from_model, from_model + 4, from_model + 8, total);
+    if (!kPlain) {
+        const float* const first = bones.row(0, space);
+        add_rows(first + 4, first + 8, first + 12, total);
+    }
+    const Vec<D> one = hn::Set(d, 1.0f);
+    const Vec<D> zero = hn::Zero(d);
+    for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
+        const float* const row = bones.row(k, space);
+        add_rows(row + 4, row + 8, row + 12, load_symmetric(d, block, layout.second(k)));
+        // Only what bones differ by counts, as the first moments about the centroid have sum 0.
+        Points<D> moved =
+            kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
+                   : Points<D>{zero, zero, zero};
+        add_moved<D>(d, row, centroid, one, moved);
+        const Vec<D> weight = load_row(d, block, layout.weight(k));
+        const Points<D> by = add_scaled<D>(load_point(d, block, layout.first(k)), hn::Neg(weight), centroid);
+        sum.x = add_scaled<D>(sum.x, moved.x, by);
+        sum.y = add_scaled<D>(sum.y, moved.y, by);
+        sum.z = add_scaled<D>(sum.z, moved.z, by);
+    }
+    return sum;
+}
+
+/// The row r, and what the displacement `from_model` makes of it from the right, transposed.
+template <class D>
+HWY_INLINE Points<D> in_space(D d, const Points<D>& r, const float* from_model) {
+    const auto along = [d, &r](const float* m, Vec<D> own) HWY_ATTR {
+        return hn::MulAdd(hn::Set(d, m[0]), r.x,
+                          hn::MulAdd(hn::Set(d, m[1]), r.y, hn::MulAdd(hn::Set(d, m[2]), r.z, own)));
+    };
+    return {along(from_model, r.x), along(from_model + 4, r.y), along(from_model + 8, r.z)};
+}
+
+template <class D>
+HWY_INLINE Vec<D> largest(const Points<D>& r) {
+    return hn::Max(hn::Abs(r.x), hn::Max(hn::Abs(r.y), hn::Abs(r.z)));
+}
+
+template <class D>
+HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
+    return {hn::Mul(scale, r.x), hn::Mul(scale, r.y), hn::Mul(scale, r.z)};
+}
+
+/// R(q)^T m.
+template <class D>
+HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
+    const Vec<D> norm =
+        hn::MulAdd(q[0], q[0], hn::MulAdd(q[1], q[1], hn::MulAdd(q[2], q[2], hn::Mul(q[3], q[3]))));
+    const Vec<D> scale = hn::Div(hn::Set(d, 2.0f), norm);
+    const Vec<D> x = hn::Mul(scale, q[1]);
+    const Vec<D> y = hn::Mul(scale, q[2]);
+    const Vec<D> z = hn::Mul(scale, q[3]);
+    const Vec<D> wx = hn::Mul(x, q[0]);
+    const Vec<D> wy = hn::Mul(y, q[0]);
+    const Vec<D> wz = hn::Mul(z, q[0]);
+    const Vec<D> xx = hn::Mul(x, q[1]);
+    const Vec<D> xy = hn::Mul(x, q[2]);
+    const Vec<D> xz = hn::Mul(x, q[3]);
+    const Vec<D> yy = hn::Mul(y, q[2]);
+    const Vec<D> yz = hn::Mul(y, q[3]);
+    const Vec<D> zz = hn::Mul(z, q[3]);
+    // Row i of the result is the rows of m by column i of the rotation; the identity is added apart.
+    const auto combined = [&](const Points<D>& own, Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+        return add_scaled<D>(add_scaled<D>(add_scaled<D>(own, a, m.x), b, m.y), c, m.z);
+    };
+    return {combined(m.x, hn::Neg(hn::Add(yy, zz)), hn::Add(xy, wz), hn::Sub(xz, wy)),
+            combined(m.y, hn::Sub(xy, wz), hn::Neg(hn::Add(xx, zz)), hn::Add(yz, wx)),
+            combined(m.z, hn::Add(xz, wy), hn::Sub(yz, wx), hn::Neg(hn::Add(xx, yy)))};
+}
+
+/// One step of Newton's method from `q`, of any length, to the rotation nearest to `matrix`: q times (1, half the step).
+/// There is none where its matrix has no maximum to go to. Of all rotations only the nearest is a maximum.
+///
+/// Whether it is found.
+template <class D>
+HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
+    const Rows3<D> s = rotated_back(d, q, matrix);
+    const Points<D> slope{hn::Sub(s.z.y, s.y.z), hn::Sub(s.x.z, s.z.x), hn::Sub(s.y.x, s.x.y)};
+    const Vec<D> half = hn::Set(d, -0.5f);
+    const Vec<D> xx = hn::Add(s.y.y, s.z.z);
+    const Vec<D> yy = hn::Add(s.x.x, s.z.z);
+    const Vec<D> zz = hn::Add(s.x.x, s.y.y);
+    const Vec<D> yz = hn::Mul(half, hn::Add(s.y.z, s.z.y));
+    const Vec<D> xz = hn::Mul(half, hn::Add(s.x.z, s.z.x));
+    const Vec<D> xy = hn::Mul(half, hn::Add(s.x.y, s.y.x));
+    const Points<D> first{hn::MulSub(yy, zz, hn::Mul(yz, yz)), hn::MulSub(yz, xz, hn::Mul(xy, zz)),
+                          hn::MulSub(xy, yz, hn::Mul(yy, xz))};
+    const Vec<D> second_y = hn::MulSub(xx, zz, hn::Mul(xz, xz));
+    const Vec<D> second_z = hn::MulSub(xy, xz, hn::Mul(xx, yz));
+    const Vec<D> minor = hn::MulSub(xx, yy, hn::Mul(xy, xy));
+    const Vec<D> determinant = hn::MulAdd(xx, first.x, hn::MulAdd(xy, first.y, hn::Mul(xz, first.z)));
+    const Vec<D> trace = hn::Add(s.x.x, xx);
+    const Vec<D> least = hn::Mul(hn::Mul(hn::Set(d, kSingularStep), trace), hn::Mul(trace, trace));
+    const Vec<D> zero = hn::Zero(d);
+    const auto has_maximum = hn::And(hn::And(hn::Gt(xx, zero), hn::Gt(minor, zero)),
+                                     hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
+    const Vec<D> scale = hn::IfThenElseZero(
+        has_maximum, hn::Div(hn::Set(d, 0.5f), hn::IfThenElse(has_maximum, determinant, hn::Set(d, 1.0f))));
+    const auto along = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+        return hn::Mul(scale, hn::MulAdd(a, slope.x, hn::MulAdd(b, slope.y, hn::Mul(c, slope.z))));
+    };
+    const Vec<D> x = along(first.x, first.y, first.z);
+    const Vec<D> y = along(first.y, second_y, second_z);
+    const Vec<D> z = along(first.z, second_z, minor);
+    const Vec<D> w = hn::NegMulAdd(q[1], x, hn::NegMulAdd(q[2], y, hn::NegMulAdd(q[3], z, q[0])));
+    const Vec<D> i = hn::MulAdd(q[0], x, hn::MulAdd(q[2], z, hn::NegMulAdd(q[3], y, q[1])));
+    const Vec<D> j = hn::MulAdd(q[0], y, hn::MulAdd(q[3], x, hn::NegMulAdd(q[1], z, q[2])));
+    const Vec<D> k = hn::MulAdd(q[0], z, hn::MulAdd(q[1], y, hn::NegMulAdd(q[2], x, q[3])));
+    q[0] = w;
+    q[1] = i;
+    q[2] = j;
+    q[3] = k;
+    const Vec<D> square = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
+    return hn::And(has_maximum, hn::Lt(square, hn::Set(d, kLastStep)));
+}
+
+/// The nearest rotations of lanes where `is_found` is false, one by one; the blended quaternion where there is none.
+///
+/// matrix  its largest entry is 1
+template <class D>
+HWY_NOINLINE void find_others(D d, const Rows3<D>& matrix, hn::Mask<D> is_found, const Vec<D>* blended,
+                              Vec<D>* q) {
+    constexpr std::size_t kMax = hn::MaxLanes(D());
+    alignas(64) float numbers[9][kMax];
+    alignas(64) float rotations[4][kMax];
+    alignas(64) float found[kMax];
+    const Points<D>* const rows[] = {&matrix.x, &matrix.y, &matrix.z};
+    for (std::size_t i = 0; i < 3; ++i) {
+        hn::Store(rows[i]->x, d, numbers[3 * i]);
+        hn::Store(rows[i]->y, d, numbers[3 * i + 1]);
+        hn::Store(rows[i]->z, d, numbers[3 * i + 2]);
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+        hn::Store(hn::IfThenElse(is_found, q[i], blended[i]), d, rotations[i]);
+    }
+    hn::Store(hn::IfThenElseZero(is_found, hn::Set(d, 1.0f)), d, found);
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+        if (found[lane] != 0.0f) continue;
+        Mat3<double> own;
+        for (int i = 0; i < 9; ++i) {
+            own[i % 3][i / 3] = static_cast<double>(numbers[static_cast<std::size_t>(i)][lane]);
+        }
+        const NearestRotation<double> nearest = nearest_rotation(own);
+        if (!(nearest.gap > kLeastGap)) continue;
+        rotations[0][lane] = static_cast<float>(nearest.rotation.w);
+        rotations[1][lane] = static_cast<float>(nearest.rotation.x);
+        rotations[2][lane] = static_cast<float>(nearest.rotation.y);
+        rotations[3][lane] = static_cast<float>(nearest.rotation.z);
+    }
+    for (std::size_t i = 0; i < 4; ++i) q[i] = hn::Load(d, rotations[i]);
+}
+
+/// From the blended quaternion `q` to the rotation that is nearest to `matrix`.
+///
+/// is_point  where it stays
+template <class D>
+HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const float* from_model, Vec<D>* q) {
+    if (from_model != nullptr) {
+        matrix = {in_space(d, matrix.x, from_model), in_space(d, matrix.y, from_model),
+                  in_space(d, matrix.z, from_model)};
+    }
+    // Cubes of its numbers are to be floats.
+    const Vec<D> size = hn::Max(largest(matrix.x), hn::Max(largest(matrix.y), largest(matrix.z)));
+    const Vec<D> scale = hn::Div(hn::Set(d, 1.0f), hn::Max(size, hn::Set(d, 1e-37f)));
+    matrix = {times<D>(scale, matrix.x), times<D>(scale, matrix.y), times<D>(scale, matrix.z)};
+    const Vec<D> blended[4] = {q[0], q[1], q[2], q[3]};
+    hn::Mask<D> is_found = is_point;
+    for (int step = 1; step <= kMostSteps; ++step) {
+        is_found = hn::Or(is_point, step_to_nearest(d, matrix, q));
+        if (step >= kFewestSteps && hn::AllTrue(d, is_found)) break;
+    }
+    for (std::size_t i = 0; i < 4; ++i) q[i] = hn::IfThenElse(is_point, blended[i], q[i]);
+    if (HWY_UNLIKELY(!hn::AllTrue(d, is_found))) find_others(d, matrix, is_found, blended, q);
+}
+
+/// Whether the neighbourhood is a point: see Ddm.
+///
+/// total  the row of the sum of second moments
+template <class D>
+HWY_INLINE hn::Mask<D> is_point_at(D d, const float* block, std::size_t total, const Points<D>& centroid) {
+    const Points<D> diagonal = load_point(d, block, total);
+    const Vec<D> extent = hn::Add(diagonal.x, hn::Add(diagonal.y, diagonal.z));
+    const Vec<D> square = hn::MulAdd(centroid.x, centroid.x,
+                                     hn::MulAdd(centroid.y, centroid.y, hn::Mul(centroid.z, centroid.z)));
+    return hn::Not(hn::Gt(extent, hn::Mul(hn::Set(d, static_cast<float>(kLeastExtent)), square)));
+}
+
+/// What bones scale, by the weights of lane `lane` of block `b`, added to `sum`.
+template <class D>
+HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::size_t lane,
+                                const Points<D>& rest, const Points<D>& sum) {
+    Points<D> total = sum;
+    const Block& block = frame.mesh->blocks[b];
+    // Lanes of mixed blocks come one by one.
+    const std::int32_t* const bones =
+        frame.bones + block.first_bone + (block.mixed ? block.influences * lane : 0);
+    const float* weights = weights_of(frame.rows + block.first_row) + lane;
+    for (std::size_t k = 0; k < block.influences; ++k) {
+        const float* const of_bone = block.mixed ? weights + kLanes * k
+                                     : k == 0    ? first_weights_of(frame, b) + lane
+                                                 : weights + kLanes * (k - 1);
+        Points<D> by;
+        if (!scaled(d, *frame.palette, bones[k], rest, by)) continue;
+        const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), by);
+        total = add_scaled<D>(total, hn::Load(d, of_bone), rotated);
+    }
+    return total;
+}
+
+template <Variant kVariant, bool kPlain, bool kResolved, class D>
+HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
+                             const MomentBones& bones, std::size_t b, std::size_t lane) {
+    const float* const block = frame.moments->rows[frame.moments->blocks[b].first_row].lane.data() + lane;
+    Points<D> centroid = load_point(d, block, 0);
+    Motion<D> motion =
+        blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, block, centroid);
+    if constexpr (kVariant == Variant::nearest) {
+        const Rows3<D> matrix =
+            correlation<kPlain>(d, bones, block, centroid, motion.displacement, spaces.bones_from_model);
+        to_nearest(d, matrix, is_point_at(d, block, MomentLayout{bones.count}.total(), centroid),
+                   spaces.bones_from_model, motion.rotation);
+    }
+    const Points<D> rest = load_rest(d, pointers.rows + pointers.blocks[b].first_row, spaces, lane);
+    if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
+    if (frame.palette->any_scale) {
+        motion.displacement = add_scales(d, frame, b, lane, rest, motion.displacement);
+    }
+    const Points<D> from_centroid{hn::Sub(rest.x, centroid.x), hn::Sub(rest.y, centroid.y),
+                                  hn::Sub(rest.z, centroid.z)};
+    Points<D> points = add<D>(rest, add_rotation<D>(d, motion.displacement, motion.rotation, from_centroid));
+    if (spaces.model_from_bones != nullptr) points = displaced(d, spaces.model_from_bones, points);
+    store_points(d, pointers, b, lane, points);
+}
+
+/// Blocks [begin, end), which have the same bones.
+template <Variant kVariant, bool kPlain, bool kResolved>
+void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t begin, std::size_t end) {
+    const Full d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    for (std::size_t b = begin; b < end; ++b) {
+        const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+            deform_lanes<kVariant, kPlain, kResolved>(d, frame, pointers, spaces, bones, b, lane);
+        }
+    }
+}
+
+template <Variant kVariant>
+void deform_set_of(const Frame& frame, std::size_t begin, std::size_t end) {
+    const MomentBlock& block = frame.moments->blocks[begin];
+    const MomentBones bones(frame, &frame.moments->bones[block.first_bone], block.bones);
+    if (HWY_UNLIKELY(bones.is_plain)) {
+        deform_blocks<kVariant, true, false>(frame, bones, begin, end);
+    } else if (bones.is_resolved) {
+        deform_blocks<kVariant, false, true>(frame, bones, begin, end);
+    } else {
+        deform_blocks<kVariant, false, false>(frame, bones, begin, end);
+    }
+}
+
+/// Each lane by bones of its own: of the moments, or of what bones scale.
+template <Variant kVariant>
+void deform_lane_by_lane(const Frame& frame, std::size_t b) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Spaces spaces = spaces_of(frame);
+    const MomentBlock& block = frame.moments->blocks[b];
+    for (std::size_t lane = 0; lane < pointers.blocks[b].vertices; ++lane) {
+        const std::size_t first = block.first_bone + (block.mixed ? block.bones * lane : 0);
+        const MomentBones bones(frame, &frame.moments->bones[first], block.bones);
+        if (bones.is_plain) {
+            deform_lanes<kVariant, true, false>(d, frame, pointers, spaces, bones, b, lane);
+        } else if (bones.is_resolved) {
+            deform_lanes<kVariant, false, true>(d, frame, pointers, spaces, bones, b, lane);
+        } else {
+            deform_lanes<kVariant, false, false>(d, frame, pointers, spaces, bones, b, lane);
+        }
+    }
+}
+
+template <Variant kVariant>
+void deform_by(const Frame& frame, std::size_t begin, std::size_t end) {
+    const std::vector<MomentBlock>& blocks = frame.moments->blocks;
+    const auto is_alone = [&](std::size_t b) {
+        return blocks[b].mixed || (frame.palette->any_scale && frame.mesh->blocks[b].mixed);
+    };
+    for (std::size_t b = begin; b < end;) {
+        std::size_t after = b + 1;
+        if (frame.mesh->blocks[b].influences == 0) {
+            keep_blocks(frame, b, after);
+        } else if (is_alone(b)) {
+            deform_lane_by_lane<kVariant>(frame, b);
+        } else {
+            while (after < end && !is_alone(after) && frame.mesh->blocks[after].influences > 0 &&
+                   blocks[after].first_bone == blocks[b].first_bone) {
+                ++after;
+            }
+            deform_set_of<kVariant>(frame, b, after);
+        }
+        b = after;
+    }
+}
+
+void deform_ddm(const Frame& frame, std::size_t begin, std::size_t end) {
+    if (frame.moments == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
+    switch (static_cast<int>(frame.parameters[0])) {
+        case 1: return deform_by<Variant::quaternion>(frame, begin, end);
+        case 2: return deform_by<Variant::weights>(frame, begin, end);
+        default: return deform_by<Variant::nearest>(frame, begin, end);
+    }
+}
+
+void prepare_ddm(std::span<const std::int32_t> used, std::span<const Affine<float>> posed_from_rest,
+                 Palette& palette) {
+    prepare_rigid<CentreRows>(used, posed_from_rest, palette);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sinew
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace sinew {
+namespace {
+
+constexpr Kernel kKernel{kCentreRestRow, true, 0, prepare_rigid_method<Ddm, write_centre_bone>,
+                         SINEW_TARGETS(deform_ddm, prepare_ddm)};
+
+}  // namespace
+
+const Kernel& Ddm::kernel() noexcept { return kKernel; }
+
+}  // namespace sinew
+
+#endif

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string_view>
+
+#include "sinew/skinning/influence.h"
+#include "sinew/skinning/method_info.h"
+#include "sinew/skinning/moments.h"
+#include "sinew/skinning/rotation_about.h"
+#include "sinew/skinning/scaled_rigid.h"
+#include "sinew/transform/nearest_rotation.h"
+
+namespace sinew {
+
+/// A neighbourhood whose second moments have a trace of less than this times its centroid's square is a point: it has no
+/// rotation of its own.
+inline constexpr double kLeastExtent = 1e-10;
+
+/// Where the gap of NearestRotation is less than this times the largest entry, rotations are as near as each other.
+inline constexpr double kLeastGap = 1e-6;
+
+/// Direct delta mush (Le, Lewis 2019): the shape that smoothing the rest mesh and the posed one would give, by sums
+/// over bones alone. deform/direct_delta_mush.h finds what they take of the rest mesh.
+///
+/// Variant 0 rotates a vertex about its neighbourhood's centroid by the rotation that fits the neighbourhood best, 2 by
+/// the blended quaternion; 4 also moves the centroid as if all of the neighbourhood were there.
+struct Ddm {
+    static constexpr std::string_view kVariants[] = {"0", "2", "4"};
+    static constexpr Parameter kParameters[] = {
+        {.id = "variant",
+         .label = "Variant",
+         .description =
+             "0: the rotation that fits the neighbourhood best; 2: the blended quaternion, faster; 4: "
+             "fastest, of smoothed weights alone",
+         .unit = "",
+         .kind = ParameterKind::choice,
+         .choices = kVariants},
+        {.id = "radius",
+         .label = "Radius",
+         .description =
+             "How far the smoothing reaches, in units of the object, however dense the mesh is; another "
+             "value has the mesh bound anew",
+         .unit = "length",
+         .kind = ParameterKind::number,
+         .initial = 0.05,
+         .minimum = 0.0,
+         .maximum = 1e6}};
+    static constexpr MethodInfo info{
+        9,
+        "ddm",
+        "Direct Delta Mush",
+        MethodGroup::crude_weights,
+        "Makes smooth joints of crude weights, even of one bone a vertex; joints lose some volume, and large "
+        "meshes are "
+        "bound some seconds longer",
+        "Le, Lewis 2019",
+        Needs::rest_bones | Needs::vertex_data | Needs::topology | Needs::precomputation,
+        kParameters,
+        kMomentFloats,
+        true};
+    static const Kernel& kernel() noexcept;
+
+    template <class T>
+    using Bone = ScaledRigid<QuatVec<T>, T>;
+
+    /// rest_bone  orthonormal; only read where the motion has scale
+    template <class T>
+    [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
+                                         const Affine<T>& rest_bone) noexcept {
+        return scaled_rigid(posed_from_rest, rest_bone);
+    }
+
+    /// The deformed vertex.
+    ///
+    /// bones       one for each bone that `influences` or `rows` name; the signs of their quaternions are free
+    /// influences  at least one; weights >= 0 with sum 1: what bones scale is blended by them
+    /// rows        [any number][kMomentFloats] of the vertex, by rising numbers of bones, weights >= 0 with sum 1; or
+    ///             empty: the vertex is blended linearly
+    /// parameters  empty, or the index in kVariants, and the radius, which is not read
+    ///
+    /// Quaternions are added in the order of rows, each in the hemisphere of the sum before it: half a turn apart, a
+    /// vertex rotates the one way or the other. A neighbourhood that is a point, or of which no rotation is nearest,
+    /// has the blended quaternion under variant 0, too. Where it is folded over so far that another rotation becomes the
+    /// nearest, the vertex flips.
+    template <class T>
+    [[nodiscard]] static Vec3<T> deform_vertex(std::span<const Bone<T>> bones,
+                                               std::span<const Influence<T>> influences, const Vec3<T>& rest,
+                                               std::span<const T> rows = {},
+                                               std::span<const double> parameters = {}) noexcept {
+        Vec3<T> displacement{T(0)};
+        for (const Influence<T>& influence : influences) {
+            const Bone<T>& bone = bones[static_cast<std::size_t>(influence.bone)];
+            Vec3<T> moved(T(0));
+            if (rows.empty()) moved += moved_by(bone, rest, T(1));
+            if (bone.has_scale) moved += rotate(bone.rigid.rotation, bone.scale_displacement(rest));
+            displacement += influence.weight * moved;
+        }
+        if (rows.empty()) return rest + displacement;
+
+        const std::size_t variant = parameters.empty() ? 0 : static_cast<std::size_t>(parameters[0]);
+        Vec3<T> centroid(T(0));
+        T extent(0);
+        for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
+            const Moments<T> moments = moments_of(rows.subspan(i, kMomentFloats));
+            centroid += moments.first;
+            extent += moments.second[0][0] + moments.second[1][1] + moments.second[2][2];
+        }
+        Quat<T> rotation(T(0), T(0), T(0), T(0));
+        Vec3<T> by_bones(T(0));
+        for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
+            const Bone<T>& bone = bones[static_cast<std::size_t>(rows[i + 1])];
+            const Moments<T> moments = moments_of(rows.subspan(i, kMomentFloats));
+            const Quat<T>& q = bone.rigid.rotation;
+            rotation = rotation + q * (glm::dot(q, rotation) < T(0) ? -moments.weight : moments.weight);
+            by_bones +=
+                moved_by(bone, variant == 2 ? moments.weight * centroid : moments.first, moments.weight);
+        }
+        if (variant == 0 && extent > T(kLeastExtent) * glm::dot(centroid, centroid)) {
+            const Mat3<T> matrix = correlation(bones, rows, centroid, by_bones);
+            const NearestRotation<T> nearest = nearest_rotation(matrix);
+            if (nearest.gap > T(kLeastGap) * largest_entry(matrix)) rotation = nearest.rotation;
+        }
+        const T length = glm::length(rotation);
+        return rest + rotation_displacement(rotation * (T(1) / length), rest - centroid) + by_bones +
+               displacement;
+    }
+
+private:
+    /// What the bone adds to a point, times the weight that `point` was multiplied by.
+    template <class T>
+    static Vec3<T> moved_by(const Bone<T>& bone, const Vec3<T>& point, T weight) noexcept {
+        return rotation_displacement(bone.rigid.rotation, point) + weight * bone.rigid.translation;
+    }
+
+    template <class T>
+    static T largest_entry(const Mat3<T>& matrix) noexcept {
+        T largest(0);
+        for (int column = 0; column < 3; ++column) {
+            for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(matrix[column][row]));
+        }
+        return largest;
+    }
+
+    /// Of the posed neighbourhood with the one at rest, each about its centroid.
+    ///
+    /// displacement  of the centroid
+    template <class T>
+    static Mat3<T> correlation(std::span<const Bone<T>> bones, std::span<const T> rows,
+                               const Vec3<T>& centroid, const Vec3<T>& displacement) noexcept {
+        Mat3<T> sum(T(0));
+        for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
+            const Bone<T>& bone = bones[static_cast<std::size_t>(rows[i + 1])];
+            const Moments<T> moments = moments_of(rows.subspan(i, kMomentFloats));
+            const Vec3<T> from_centroid = moments.first - moments.weight * centroid;
+            // These have sum 0: only what bones differ by counts.
+            const Vec3<T> moved = moved_by(bone, centroid, T(1)) - displacement;
+            sum += to_mat3(bone.rigid.rotation) * moments.second + glm::outerProduct(moved, from_centroid);
+        }
+        return sum;
+    }
+};
+
+}  // namespace sinew

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Direct delta mush in Blender: its shape is the float64 reference's, and its radius makes its data anew."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+import sinew
+from conftest import REPOSITORY
+from program import run_sinew
+from sinew_addon.attach import attach, properties
+from sinew_addon.core.precompute import precomputations
+from sinew_addon.deform import precompute_watch, session
+from sinew_addon.deform.plan import State
+
+sys.path.append(str(REPOSITORY / "tests" / "python"))
+import reference
+
+if "ddm" not in {method.name for method in sinew.methods()}:
+    pytest.skip("built without ddm", allow_module_level=True)
+
+FRAME = 8
+
+
+@pytest.fixture(params=routes.ROUTES)
+def route(request):
+    routes.force(request.param)
+    yield request.param
+    routes.release()
+
+
+@pytest.fixture
+def in_window():
+    """As where somebody watches: nobody waits."""
+    precomputations.waits = False
+    yield
+    precomputations.cancel_all()
+    precomputations.waits = True
+    precomputations.stopped.clear()
+
+
+def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    bones = [bone.name for bone in attach.armature_of(obj).data.bones]
+    offsets, indices, weights = [0], [], []
+    for vertex in obj.data.vertices:
+        for entry in vertex.groups:
+            indices.append(bones.index(obj.vertex_groups[entry.group].name))
+            weights.append(entry.weight)
+        offsets.append(len(indices))
+    return np.int32(offsets), np.int32(indices), np.float32(weights)
+
+
+def moments_of(obj: bpy.types.Object, radius: float) -> np.ndarray:
+    obj.data.calc_loop_triangles()
+    triangles = np.int32([triangle.vertices[:] for triangle in obj.data.loop_triangles])
+    points = np.float32([vertex.co[:] for vertex in obj.data.vertices])
+    return sinew.direct_delta_mush(points, *weights_of(obj), triangles, np.float32(radius))
+
+
+def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str = "0") -> None:
+    armature = attach.armature_of(obj)
+    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
+    to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
+    # Motions of the object's space: a rotation and a translation take it to the armature's.
+    motions = np.linalg.inv(to_armature) @ motions @ to_armature
+    expected, margins = reference.deform(
+        "ddm",
+        scenes.rest_points(obj),
+        *weights_of(obj),
+        motions,
+        None,
+        {"ddm": moments_of(obj, radius)},
+        {"ddm.variant": variant},
+    )
+    decided = margins > 1e-3
+    assert decided.mean() > 0.9
+    found = scenes.final_points(obj)
+    assert scenes.worst(found[decided], expected[decided]) <= 2 * scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize("variant", ["0", "2", "4"])
+def test_a_mesh_that_lies_elsewhere(variant, route):
+    obj, armature = scenes.make_arm(bones=3)
+    obj.location, obj.rotation_euler = (0.4, -1.0, 0.3), (0.2, 0.5, 0.1)
+    armature.location = (1.0, 2.0, -0.5)
+    bpy.context.view_layer.update()
+    scenes.add_sinew(obj, "ddm")
+    settings = properties.of(obj).ddm
+    settings.radius, settings.variant = 0.2, variant
+    bpy.context.scene.frame_set(FRAME)
+    assert_equal_to_reference(obj, 0.2, variant)
+
+
+def test_another_radius_makes_the_data_anew(route):
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "ddm")
+    bpy.context.scene.frame_set(FRAME)
+    assert_equal_to_reference(obj, 0.05)
+    before = scenes.final_points(obj)
+    for radius in (0.3, 0.05):
+        properties.of(obj).ddm.radius = radius
+        bpy.context.view_layer.update()
+        assert_equal_to_reference(obj, radius)
+        is_back = radius == 0.05
+        assert (scenes.worst(scenes.final_points(obj), before) < 1e-6) == is_back
+
+
+def test_in_a_window_the_shape_of_the_old_radius_stays_until_the_new_is_made(in_window):
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "ddm")
+    look_until_done()
+    assert session.state_of(obj).plan.state is not State.WAITING
+    assert_equal_to_reference(obj, 0.05)
+    before = scenes.final_points(obj)
+    properties.of(obj).ddm.radius = 0.3
+    bpy.context.view_layer.update()
+    assert session.state_of(obj).plan.state is not State.WAITING
+    assert scenes.worst(scenes.final_points(obj), before) < 1e-6
+    look_until_done()
+    assert_equal_to_reference(obj, 0.3)
+
+
+def look_until_done() -> None:
+    for _ in range(300):
+        if precompute_watch.look() is None:
+            return
+        time.sleep(0.02)
+    raise AssertionError("it goes on and on")
+
+
+def test_it_is_kept_in_the_file(tmp_path, monkeypatch):
+    obj, _armature = scenes.make_arm(bones=3)
+    scenes.add_sinew(obj, "ddm")
+    properties.of(obj).ddm.radius = 0.2
+    bpy.context.scene.frame_set(FRAME)
+    before, name = scenes.final_points(obj), obj.name
+    path = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    monkeypatch.setattr(precomputations, "cache", None)
+    precomputations._made.clear()
+
+    def refuse(*_arguments, **_options):
+        raise AssertionError("it is computed again")
+
+    monkeypatch.setattr(sinew, "direct_delta_mush", refuse)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects[name]
+    bpy.context.scene.frame_set(FRAME)
+    np.testing.assert_array_equal(scenes.final_points(obj), before)
+
+
+def test_commands_take_its_parameters(tmp_path):
+    obj, _armature = scenes.make_arm(bones=3)
+    path, name = tmp_path / "arm.blend", obj.name
+    scenes.add_sinew(obj, "ddm")
+    bpy.context.scene.frame_set(FRAME)
+    expected = {}
+    for radius in (0.02, 0.3):
+        properties.of(obj).ddm.radius = radius
+        bpy.context.view_layer.update()
+        expected[radius] = scenes.final_points(obj)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    assert scenes.worst(expected[0.02], expected[0.3]) > 0.01
+    for radius, points in expected.items():
+        out, setting = tmp_path / "points.npz", f"ddm.radius={radius}"
+        run_sinew("points", path, "--method", "ddm", "--set", setting, "--frames", FRAME, "--out", out)
+        with np.load(out) as found:
+            assert scenes.worst(found[name][0], points) <= 1e-5

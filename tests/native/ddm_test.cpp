@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#if SINEW_WITH_DDM
+
+#include "sinew/skinning/ddm.h"
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <tuple>
+
+#include "scene.h"
+#include "sinew/deform/direct_delta_mush.h"
+#include "sinew/deform/simd.h"
+
+namespace sinew {
+namespace {
+
+using test::distance;
+using test::kTolerance;
+using test::Random;
+using test::Scene;
+
+/// A scene and the rows of its vertices, with neighbourhoods of an extent.
+struct Bound {
+    Scene scene;
+    std::vector<float> rows;
+    std::vector<std::size_t> starts{0};
+
+    [[nodiscard]] VertexData data() const { return {Ddm::info, rows}; }
+};
+
+/// Bones that differ by 100 degrees at most. Each block of 16 vertices has the same bones, or each vertex its own.
+///
+/// farthest  how far the farthest bone is
+Bound bound_scene(std::uint32_t seed, std::size_t bones, std::size_t of_vertex, bool is_mixed, bool is_scaled,
+                  double farthest = 1.0) {
+    Random random(seed);
+    Bound bound;
+    Scene& scene = bound.scene;
+    for (std::size_t bone = 0; bone < bones; ++bone) {
+        const Quat<double> rotation = test::about(random.vector(1.0), random.uniform(-50.0, 50.0));
+        Affine<double> motion = to_affine(QuatVec<double>{rotation, random.vector(1.0)});
+        if (bone == 0) motion.translation *= farthest;
+        const auto rest = to_affine(random.motion(1.0));
+        if (is_scaled && bone % 2 == 1) {
+            motion = motion * rest * test::scaling<double>({0.7, 1.5, 1.0}) * inverse(rest);
+        }
+        scene.rest_bones.push_back(cast<float>(rest));
+        scene.posed_from_rest.push_back(cast<float>(motion));
+    }
+    std::vector<Influence<float>> influences;
+    for (std::size_t vertex = 0; vertex < 320; ++vertex) {
+        if (is_mixed || vertex % 16 == 0) {
+            influences = random.influences<float>(of_vertex, static_cast<std::int32_t>(bones));
+        }
+        scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
+        auto sorted = influences;
+        std::ranges::sort(sorted, {}, &Influence<float>::bone);
+        const Vec3<double> centre = random.vector(1.0);
+        for (const auto& [bone, weight] : sorted) {
+            // The far bone has a small share.
+            const float share = bone == 0 ? weight / static_cast<float>(farthest) : weight;
+            const Vec3<float> first(static_cast<double>(share) * (centre + random.vector(0.05)));
+            bound.rows.insert(bound.rows.end(), {static_cast<float>(vertex), static_cast<float>(bone), share,
+                                                 first.x, first.y, first.z, share, 0.8f * share, 0.6f * share,
+                                                 0.1f * share, -0.1f * share, 0.05f * share});
+        }
+        // Of sum 1.
+        const std::size_t begin = bound.starts.back();
+        double sum = 0.0;
+        for (std::size_t i = begin; i < bound.rows.size(); i += kMomentFloats) {
+            sum += static_cast<double>(bound.rows[i + 2]);
+        }
+        for (std::size_t i = begin; i < bound.rows.size(); ++i) {
+            if ((i - begin) % kMomentFloats > 1) {
+                bound.rows[i] = static_cast<float>(static_cast<double>(bound.rows[i]) / sum);
+            }
+        }
+        bound.starts.push_back(bound.rows.size());
+    }
+    return bound;
+}
+
+double largest_error(const Bound& bound, double variant, const DeformOptions& space = {}) {
+    const Scene& scene = bound.scene;
+    BindData data = scene.data();
+    const VertexData rows = bound.data();
+    data.vertex_data = std::span(&rows, 1);
+    const double parameters[] = {variant};
+    DeformOptions options = space;
+    options.parameters = parameters;
+    const auto points = test::deformed(Deformer(data, Ddm::info), scene, options);
+    std::vector<Ddm::Bone<double>> bones;
+    for (std::size_t bone = 0; bone < scene.posed_from_rest.size(); ++bone) {
+        bones.push_back(
+            Ddm::prepare(cast<double>(scene.posed_from_rest[bone]), cast<double>(scene.rest_bones[bone])));
+    }
+    double largest = 0.0;
+    for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+        std::vector<Influence<double>> influences;
+        double sum = 0.0;
+        for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
+             i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
+            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i])});
+            sum += influences.back().weight;
+        }
+        for (auto& influence : influences) influence.weight /= sum;
+        const std::vector<double> own(
+            bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex]),
+            bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex + 1]));
+        const Vec3<double> expected = Ddm::deform_vertex<double>(
+            bones, influences, Vec3<double>(scene.rest_points[vertex]), own, parameters);
+        largest = std::max(largest, distance(Vec3<double>(points[vertex]), expected));
+    }
+    return largest;
+}
+
+class DdmKernels : public testing::TestWithParam<std::tuple<std::string_view, double>> {
+protected:
+    void SetUp() override { use_simd_target(std::get<0>(GetParam())); }
+    void TearDown() override { use_simd_target(simd_targets().front()); }
+    static double variant() { return std::get<1>(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(every, DdmKernels,
+                         testing::Combine(testing::ValuesIn(simd_targets()), testing::Values(0.0, 1.0, 2.0)),
+                         [](const auto& info) {
+                             return std::string(std::get<0>(info.param)) + "_" +
+                                    std::string(
+                                        Ddm::kVariants[static_cast<std::size_t>(std::get<1>(info.param))]);
+                         });
+
+TEST_P(DdmKernels, agree_with_skinning_in_double) {
+    for (const bool is_mixed : {false, true}) {
+        for (const bool is_scaled : {false, true}) {
+            for (const std::size_t count : {1, 2, 3, 4, 7}) {
+                const Bound bound =
+                    bound_scene(static_cast<std::uint32_t>(count), 12, count, is_mixed, is_scaled);
+                EXPECT_LT(largest_error(bound, variant()), 2.0 * kTolerance)
+                    << is_mixed << is_scaled << count;
+            }
+        }
+    }
+}
+
+TEST_P(DdmKernels, agree_for_more_bones_than_are_prepared) {
+    EXPECT_LT(largest_error(bound_scene(20, 50, 40, false, false), variant()), 2.0 * kTolerance);
+    EXPECT_LT(largest_error(bound_scene(21, 50, 40, true, false), variant()), 2.0 * kTolerance);
+}
+
+TEST_P(DdmKernels, a_far_bone_of_small_weight_costs_no_digits) {
+    EXPECT_LT(largest_error(bound_scene(22, 4, 4, false, false, 1e4), variant()), 2e-5);
+}
+
+TEST(DirectDeltaMush, of_a_mesh_without_vertices_has_no_rows) {
+    const std::int32_t offsets[] = {0};
+    const auto rows = direct_delta_mush({{}, offsets, {}, {}}, {}, 0.1);
+    ASSERT_TRUE(rows);
+    EXPECT_TRUE(rows->empty());
+}
+
+}  // namespace
+}  // namespace sinew
+
+#endif

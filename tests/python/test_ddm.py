@@ -1,0 +1,403 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Direct delta mush: its moments against scipy's sparse solve, its points against singular values, and what
+it makes of a tube."""
+
+import pickle
+import threading
+
+import numpy as np
+import pytest
+import reference
+import scipy.sparse
+import scipy.sparse.linalg
+import sinew
+from rigs import about, random_motion, random_rig, transform, translation
+from test_centres import Tube, bulge, three_bones
+
+if "ddm" not in {method.name for method in sinew.methods()}:
+    pytest.skip("built without ddm", allow_module_level=True)
+
+STEPS = 4
+VARIANTS = ("0", "2", "4")
+JOINT = translation([0.0, 0.0, 2.0])
+
+
+def moments(tube, radius, **options):
+    return sinew.direct_delta_mush(*tube.mesh, tube.triangles, radius, **options)
+
+
+def cotangents(points, triangles):
+    """The Laplacian [vertices, vertices], and the third of the areas about each vertex."""
+    count, mass = len(points), np.zeros(len(points))
+    weights = scipy.sparse.csr_matrix((count, count))
+    for k in range(3):
+        a, b, corner = triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3], triangles[:, k]
+        to_a, to_b = points[a] - points[corner], points[b] - points[corner]
+        area = np.linalg.norm(np.cross(to_a, to_b), axis=1) / 2.0
+        half = np.einsum("ij,ij->i", to_a, to_b) / (4.0 * area)
+        np.add.at(mass, corner, area / 3.0)
+        both = np.concatenate([half, half]), (np.concatenate([a, b]), np.concatenate([b, a]))
+        weights = weights + scipy.sparse.csr_matrix(both, shape=(count, count))
+    weights.data = np.maximum(weights.data, 0.0)
+    return scipy.sparse.diags(np.asarray(weights.sum(axis=1)).ravel()) - weights, mass
+
+
+def omega(points, triangles, weights, radius):
+    """Le and Lewis' Omega, float64 [vertices, bones, 4, 4], by scipy."""
+    laplacian, mass = cotangents(points, triangles)
+    step = scipy.sparse.diags(mass) + radius**2 / (2.0 * STEPS) * laplacian
+    solver = scipy.sparse.linalg.splu(step.tocsc())
+    ones = np.column_stack([points, np.ones(len(points))])
+    products = np.einsum("ia,ib->iab", ones, ones).reshape(-1, 16)
+    columns = (weights[:, :, None] * products[:, None, :]).reshape(len(points), -1)
+    for _ in range(STEPS):
+        columns = solver.solve(mass[:, None] * columns)
+    return columns.reshape(len(points), weights.shape[1], 4, 4)
+
+
+def omega_of(rows, vertices, bones):
+    """The same of rows as Binding takes them."""
+    rows = rows.astype(np.float64)
+    found = np.zeros((vertices, bones, 4, 4))
+    for vertex in range(vertices):
+        own = rows[slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1)))]
+        centroid = own[:, 3:6].sum(axis=0)
+        for row in own:
+            found[vertex, int(row[1])] = reference.second_moments(row[2:], centroid)
+    return found
+
+
+def shares_of(tube):
+    """As the library takes them."""
+    shares = tube.weights.astype(np.float32).astype(np.float64)
+    return shares / shares.sum(axis=1, keepdims=True)
+
+
+def crumpled():
+    """Three bones on a mesh with obtuse triangles, of uneven density."""
+    tube, rng = three_bones(), np.random.default_rng(3)
+    tube.points = tube.points + rng.uniform(-0.06, 0.06, tube.points.shape)
+    return tube
+
+
+@pytest.mark.parametrize("tube", [Tube(41, 16), crumpled()], ids=["two bones", "three bones"])
+@pytest.mark.parametrize("radius", [0.05, 0.3, 1.0])
+def test_moments_are_those_of_a_sparse_solve(tube, radius):
+    points = tube.points.astype(np.float32).astype(np.float64)
+    expected = omega(points, tube.triangles, shares_of(tube), radius)
+    count, bones = expected.shape[:2]
+    # Of a length of 4, as often as an entry has it.
+    lengths = np.array([4.0, 4.0, 4.0, 1.0])
+    error = np.abs(omega_of(moments(tube, radius, exact=True), count, bones) - expected)
+    assert (error / np.outer(lengths, lengths)).max() < 1e-6
+    rows = moments(tube, radius)
+    error = np.abs(omega_of(rows, count, bones) - expected)
+    assert (error / np.outer(lengths, lengths)).max() < 3e-6
+    assert len(rows) < len(moments(tube, radius, exact=True)) or radius > 0.05
+
+
+def svd_form(points, of_vertices, motions):
+    """Le and Lewis' variant 0, by the singular values."""
+    matrices = np.einsum("jab,ijbc->iac", motions, of_vertices)
+    totals = of_vertices.sum(axis=1)
+    centres, targets = totals[:, :3, 3], matrices[:, :3, 3]
+    fitted = np.array(
+        [
+            reference.nearest_rotation(m[:3, :3] - np.outer(m[:3, 3], c))
+            for m, c in zip(matrices, centres, strict=True)
+        ]
+    )
+    return np.einsum("iab,ib->ia", fitted, points - centres) + targets
+
+
+@pytest.mark.parametrize("degrees", [30, 90, 120])
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 0, 1), (1, 2, 3)])
+@pytest.mark.parametrize("radius", [0.05, 0.3])
+def test_points_are_those_of_the_singular_values(axis, degrees, radius):
+    tube = three_bones()
+    first = translation([0, 0, 1.4]) @ about(axis, degrees) @ translation([0, 0, -1.4])
+    second = first @ translation([0, 0, 2.8]) @ about(axis, -degrees) @ translation([0, 0, -2.8])
+    motions = np.array([np.eye(4), first, second])
+    points = tube.points.astype(np.float32).astype(np.float64)
+    expected = svd_form(points, omega(points, tube.triangles, shares_of(tube), radius), motions)
+    deformer = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": moments(tube, radius)})
+    found = deformer.deform(motions.astype(np.float32))
+    assert np.linalg.norm(found - expected, axis=1).max() < 1e-5 * np.linalg.norm(np.ptp(points, axis=0))
+
+
+def near_rig(seed, scaled=False, most_influences=6):
+    """Bones that differ by 120 degrees at most, and vertices with neighbourhoods of an extent."""
+    rig, rng = random_rig(seed, most_influences=most_influences, scaled=scaled), np.random.default_rng(seed)
+    motions = rig.transforms.astype(np.float64)
+    for bone, motion in enumerate(motions):
+        if bone % 2 == 0 or not scaled:
+            motion[:3, :3] = about(rng.normal(size=3), rng.uniform(-60.0, 60.0))[:3, :3]
+    rows = rig.moments.astype(np.float64)
+    extents = rng.normal(size=(len(rows), 3, 3)) * 0.1 + 0.3 * np.eye(3)
+    seconds = rows[:, 2, None, None] * np.einsum("nij,nkj->nik", extents, extents)
+    rows[:, 6:] = seconds.reshape(-1, 9)[:, [0, 4, 8, 5, 2, 1]]
+    # First moments about the centroid have sum 0.
+    offsets = rows[:, 2:3] * rng.uniform(-0.1, 0.1, (len(rows), 3))
+    for vertex in range(len(rig.rest_points)):
+        own = rows[:, 0] == vertex
+        offsets[own] -= rows[own, 2:3] * offsets[own].sum(axis=0) / rows[own, 2].sum()
+    rows[:, 3:6] += offsets
+    return rig.with_motions(motions), rows.astype(np.float32)
+
+
+def assert_agrees(points, rig, rows, parameters, tolerance=1e-5):
+    data = {"ddm": rows}
+    expected, margins = reference.deform("ddm", *rig.mesh, rig.transforms, rig.rest_bones, data, parameters)
+    sure = margins > 1e-3
+    assert sure.mean() > 0.7
+    assert np.linalg.norm(points - expected, axis=1)[sure].max() < tolerance
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+@pytest.mark.parametrize("most_influences", [1, 3, 12])
+def test_each_variant_agrees_with_its_definition(variant, scaled, most_influences):
+    rig, rows = near_rig(most_influences, scaled, most_influences)
+    parameters = {"ddm.variant": variant}
+    deformer = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones, {"ddm": rows})
+    points = deformer.deform(rig.transforms, parameters=parameters)
+    assert_agrees(points, rig, rows, parameters)
+    if variant == "0":
+        np.testing.assert_array_equal(deformer.deform(rig.transforms), points)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_bone_numbers_mean_nothing_but_rounding(variant):
+    rig, rows = near_rig(4)
+    number = np.random.default_rng(32).permutation(15)
+    order = np.argsort(number)
+    other = rows.copy()
+    other[:, 1] = number[rows[:, 1].astype(int)]
+    other = other[np.lexsort((other[:, 1], other[:, 0]))]
+    parameters = {"ddm.variant": variant}
+    points = sinew.Deformer(*rig.mesh, "ddm", vertex_data={"ddm": rows}).deform(
+        rig.transforms, parameters=parameters
+    )
+    mesh = rig.rest_points, rig.offsets, number[rig.bones].astype(np.int32), rig.weights
+    renumbered = sinew.Deformer(*mesh, "ddm", vertex_data={"ddm": other})
+    found = renumbered.deform(rig.transforms[order], parameters=parameters)
+    np.testing.assert_allclose(found, points, atol=2e-5)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_another_space_of_bones_is_that_by_hand(variant):
+    rig, rows = near_rig(5)
+    space = random_motion(np.random.default_rng(6), 2.0)
+    space[:3, :3] = space[:3, :3] @ np.diag([0.5, 1.0, 2.0])
+    parameters = {"ddm.variant": variant}
+    deformer = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones, {"ddm": rows})
+    points = deformer.deform(rig.transforms, bones_from_model=space.astype(np.float32), parameters=parameters)
+    moved = rows.astype(np.float64)
+    moved[:, 3:6] = rows[:, 3:6] @ space[:3, :3].T + rows[:, 2:3] * space[:3, 3]
+    xx, yy, zz, yz, xz, xy = rows[:, 6:].T
+    seconds = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+    seconds = space[:3, :3] @ seconds @ space[:3, :3].T
+    moved[:, 6:] = seconds.reshape(-1, 9)[:, [0, 4, 8, 5, 2, 1]]
+    other = rig.with_(rest_points=transform(space, rig.rest_points).astype(np.float32))
+    assert_agrees(transform(space, points.astype(np.float64)), other, moved, parameters, 3e-5)
+
+
+def test_rest_and_rigid_motions_are_exact():
+    tube = Tube()
+    deformer = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": moments(tube, 0.3)})
+    rest = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
+    for variant in VARIANTS:
+        parameters = {"ddm.variant": variant}
+        np.testing.assert_array_equal(deformer.deform(rest, parameters=parameters), tube.mesh[0])
+        motion = random_motion(np.random.default_rng(1), 5.0)
+        moved = deformer.deform(np.float32([motion, motion]), parameters=parameters)
+        np.testing.assert_allclose(moved, transform(motion, tube.points), atol=5e-6)
+
+
+def test_a_vertex_of_one_bone_goes_where_the_bone_takes_it():
+    tube = Tube()
+    rows = moments(tube, 0.1)
+    counts = np.bincount(rows[:, 0].astype(int), minlength=len(tube.points))
+    assert (counts == 1).sum() > 500
+    _, bones = tube.deformed("lbs", (1, 0, 0), 100)
+    bones[1, :3, :3] = bones[1, :3, :3] @ np.diag([1.3, 0.7, 1.0])
+    points = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": rows}).deform(bones.astype(np.float32))
+    for vertex in np.flatnonzero(counts == 1):
+        bone = int(rows[np.searchsorted(rows[:, 0], vertex), 1])
+        np.testing.assert_allclose(points[vertex], transform(bones[bone], tube.points[vertex]), atol=2e-6)
+
+
+def bent(tube, radius, axis, degrees, variant="0"):
+    bones = np.array([np.eye(4), JOINT @ about(axis, degrees) @ np.linalg.inv(JOINT)])
+    deformer = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": moments(tube, radius)})
+    points = deformer.deform(bones.astype(np.float32), parameters={"ddm.variant": variant})
+    return points.astype(np.float64), bones
+
+
+# Made apart from this code in numpy, by the radius: volume, bulge and longest edge of a bend by 90 degrees;
+# volume and least radius of a twist by 170.
+TABLE = {0.26: (0.932, 1.012, 1.531, 0.833, 0.201), 0.91: (0.860, 1.318, 1.084, 0.878, 0.772)}
+
+
+@pytest.mark.parametrize("radius", TABLE)
+def test_the_table_of_the_tube(radius):
+    tube = Tube()
+    points, bones = bent(tube, radius, (1, 0, 0), 90)
+    twisted, _ = bent(tube, radius, (0, 0, 1), 170)
+    volume = tube.volume(tube.points)
+    found = (
+        tube.volume(points) / volume,
+        bulge(points, bones),
+        tube.longest_edge(points),
+        tube.volume(twisted) / volume,
+        np.hypot(*twisted[:, :2].T).min() / 0.5,
+    )
+    np.testing.assert_allclose(found, TABLE[radius], atol=0.01)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("radius", [0.2, 0.5])
+def test_the_shape_does_not_depend_on_the_density(radius, variant):
+    volumes = []
+    for tube in (Tube(81, 32), Tube(161, 64)):
+        points, _ = bent(tube, radius, (1, 0, 0), 90, variant)
+        volumes.append(tube.volume(points) / tube.volume(tube.points))
+    assert abs(volumes[0] - volumes[1]) < 0.005
+
+
+def test_crude_weights_bend_as_painted_ones():
+    volumes, edges = [], []
+    for crude in (False, True):
+        tube = Tube()
+        if crude:
+            tube.weights = np.round(tube.weights + 1e-6)
+        points, _ = bent(tube, 0.5, (1, 0, 0), 90)
+        volumes.append(tube.volume(points) / tube.volume(tube.points))
+        edges.append(tube.longest_edge(points))
+    assert abs(volumes[0] - volumes[1]) < 0.02
+    crude_linear = sinew.Deformer(*tube.mesh, "lbs").deform(np.float32(bent(tube, 0.5, (1, 0, 0), 90)[1]))
+    assert edges[1] < 1.4 < 5.0 < tube.longest_edge(crude_linear)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("degrees", [150, 179.999, 180, 180.001, 360])
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 0, 1), (1, 2, 3)])
+def test_half_turns_are_finite_and_near(variant, degrees, axis):
+    tube = three_bones()
+    first = translation([0, 0, 1.4]) @ about(axis, degrees) @ translation([0, 0, -1.4])
+    motions = np.array([np.eye(4), first, first @ about(axis, degrees)], np.float32)
+    deformer = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": moments(tube, 0.3)})
+    points = deformer.deform(motions, parameters={"ddm.variant": variant})
+    assert np.isfinite(points).all()
+    assert np.abs(points).max() < 10.0
+
+
+def test_without_its_data_it_is_linear_blending():
+    rig = random_rig(3, scaled=True)
+    points = sinew.Deformer(*rig.mesh, "ddm", rig.rest_bones).deform(rig.transforms)
+    np.testing.assert_allclose(points, rig.deform("lbs"), atol=2e-5)
+
+
+def test_without_radius_or_triangles_vertices_are_their_own_neighbourhoods():
+    tube = Tube(21, 12)
+    linear, bones = tube.deformed("lbs", (1, 0, 0), 90)
+    for rows in (moments(tube, 0.0), sinew.direct_delta_mush(*tube.mesh, np.empty((0, 3), np.int32), 0.3)):
+        assert np.abs(rows[:, 6:]).max() < 1e-6
+        points = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": rows}).deform(bones.astype(np.float32))
+        np.testing.assert_allclose(points, linear, atol=5e-6)
+
+
+def test_degenerate_triangles_are_no_harm():
+    tube = Tube(21, 12)
+    expected = moments(tube, 0.3)
+    tube.triangles = np.vstack([tube.triangles, [[0, 0, 1], [5, 5, 5], [0, 12, 0]]]).astype(np.int32)
+    np.testing.assert_allclose(moments(tube, 0.3), expected, atol=1e-6)
+
+
+def test_vertices_without_weight_count_nowhere_and_stay():
+    tube = Tube(21, 12)
+    tube.weights[:12] = 0.0
+    rows = moments(tube, 0.3)
+    assert rows[:, 0].min() == 12.0
+    sums = np.bincount(rows[:, 0].astype(int), rows[:, 2])[12:]
+    np.testing.assert_allclose(sums, 1.0, atol=1e-6)
+    motions = np.float32([about((1, 0, 0), 40), about((1, 0, 0), 80)])
+    points = sinew.Deformer(*tube.mesh, "ddm", vertex_data={"ddm": rows}).deform(motions)
+    np.testing.assert_array_equal(points[:12], tube.mesh[0][:12])
+
+
+def test_a_binding_comes_back_from_its_pickle():
+    rig, rows = near_rig(8)
+    binding = sinew.Binding(*rig.mesh, rig.rest_bones, {"ddm": rows})
+    expected = sinew.Deformer(binding, "ddm").deform(rig.transforms)
+    again = pickle.loads(pickle.dumps(binding))
+    np.testing.assert_array_equal(sinew.Deformer(again, "ddm").deform(rig.transforms), expected)
+
+
+def test_rows_of_bones_that_no_vertex_uses_are_left_out():
+    tube = Tube(21, 12)
+    rows = moments(tube, 0.3)
+    points, offsets, bones, weights = tube.mesh
+    motions = np.tile(np.eye(4, dtype=np.float32), (10, 1, 1))
+    motions[1, 2, 3] = 3.0
+    # As if weights were painted since: all are of bone 0 now.
+    deformer = sinew.Deformer(
+        points, offsets, np.zeros_like(bones), weights, "ddm", vertex_data={"ddm": rows}
+    )
+    assert np.abs(deformer.deform(motions) - points).max() < 1e-6
+
+
+def test_threads_change_no_bit():
+    tube = three_bones()
+    expected = moments(tube, 0.3, threads=1)
+    for threads in (None, 2, 5):
+        np.testing.assert_array_equal(moments(tube, 0.3, threads=threads), expected)
+
+
+def test_progress_is_told_on_this_thread():
+    told = []
+    moments(Tube(), 0.3, progress=lambda done: told.append((done, threading.current_thread())), threads=2)
+    shares = [done for done, _thread in told]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert {thread for _done, thread in told} == {threading.current_thread()}
+
+
+@pytest.mark.parametrize("at", [0.0, 0.1, 0.5, 1.0])
+def test_false_cancels_and_what_is_raised_comes_through(at):
+    tube = Tube()
+    assert moments(tube, 0.3, progress=lambda done: done < at) is None
+
+    def stop(done):
+        if done >= at:
+            raise KeyError("enough")
+
+    with pytest.raises(KeyError, match="enough"):
+        moments(tube, 0.3, progress=stop)
+
+
+@pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
+def test_a_radius_that_is_none_is_refused(radius):
+    with pytest.raises(ValueError, match=r"^radius: expected a number of 0 or more, got "):
+        moments(Tube(5, 4), radius)
+
+
+GOOD = [0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "wanted", "got"),
+    [
+        (np.zeros((2, 3), np.float32), "of ddm float32 [rows, 12]", "float32 [2, 3]"),
+        ([[*GOOD[:5], np.nan, *GOOD[6:]]], "finite values", "NaN or infinity of ddm in row 0"),
+        ([[2, *GOOD[1:]]], "numbers of vertices", "another of ddm in row 0"),
+        ([[0, 0.5, *GOOD[2:]]], "numbers of bones", "another of ddm in row 0"),
+        ([[0, 0, -0.5, *GOOD[3:]]], "weights of 0 and more", "a negative one of ddm in row 0"),
+        ([GOOD, GOOD], "rising vertices and bones", "others of ddm in row 1"),
+    ],
+)
+def test_rows_that_are_refused(rows, wanted, got):
+    mesh = np.zeros((2, 3), np.float32), np.int32([0, 1, 2]), np.int32([0, 0]), np.float32([1, 1])
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared
+        sinew.Binding(*mesh, vertex_data={"ddm": np.asarray(rows, np.float32)})
+    assert str(caught.value) == f"vertex_data: expected {wanted}, got {got}"
