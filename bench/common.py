@@ -9,6 +9,7 @@ import platform
 import re
 import statistics
 import time
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -40,10 +41,10 @@ def spread(times: list[float]) -> dict:
     return {"least": min(times), "median": statistics.median(times), "runs": len(times)}
 
 
-def alternate(candidates: dict, seconds: float) -> dict:
+def alternate(candidates: dict, seconds: float, clock: Callable[[], float] = time.perf_counter) -> dict:
     """Calls the functions of {name: function} alternately, for `seconds` each: {name: spread() of seconds a
     call}. Each runs for some calls at a time: the first of these has to fill the caches again. What a
-    function has as `prepare` is called before it, out of the time."""
+    function has as `prepare` is called before it, out of the time, which is `clock`'s."""
     times = {name: [] for name in candidates}
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end:
@@ -54,11 +55,10 @@ def alternate(candidates: dict, seconds: float) -> dict:
             call()
             while True:
                 prepare()
-                start = time.perf_counter()
+                start = clock()
                 call()
-                now = time.perf_counter()
-                times[name].append(now - start)
-                if now > round_end:
+                times[name].append(clock() - start)
+                if time.perf_counter() > round_end:
                     break
     return {name: spread(of) for name, of in times.items()}
 

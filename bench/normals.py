@@ -14,6 +14,7 @@ import argparse
 import importlib
 import os
 import sys
+import time
 from collections.abc import Callable
 
 # Before bpy is imported: its threads are counted then.
@@ -189,7 +190,9 @@ def main() -> None:
         ):
             candidates = candidates_of(points, faces, case)
             kind = f"{case}, {'quads' if faces.shape[1] == 4 else 'triangles'}, {order}"
-            times = common.alternate(candidates, ARGUMENTS.seconds)
+            # Of the processor on one thread, so that other programs change it less.
+            clock = time.process_time if ARGUMENTS.threads == 1 else time.perf_counter
+            times = common.alternate(candidates, ARGUMENTS.seconds, clock)
             normals = {name: candidate.result() for name, candidate in candidates.items()}
             for name, spread in times.items():
                 spread["per_vertex"] = spread["least"] / len(points) * 1e9
