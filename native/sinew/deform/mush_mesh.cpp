@@ -117,14 +117,12 @@ std::vector<std::uint32_t> faces_of_edges(const MeshTopology& topology, const Co
 class Fans {
 public:
     Fans(const MeshTopology& topology, const CornerNeighbours& around, const ByVertex& corners) {
-        const auto vertex_at = [&](std::int32_t corner) {
-            return topology.corner_vertices[index(corner)];
-        };
+        const auto vertex_at = [&](std::int32_t corner) { return topology.corner_vertices[index(corner)]; };
         for (std::size_t vertex = 0; vertex + 1 < corners.offsets.size(); ++vertex) {
             corners_.clear();
             for (const std::int32_t corner : corners.of(vertex)) {
-                corners_.push_back({vertex_at(around.next[index(corner)]),
-                                    vertex_at(around.previous[index(corner)])});
+                corners_.push_back(
+                    {vertex_at(around.next[index(corner)]), vertex_at(around.previous[index(corner)])});
             }
             spokes_.offsets.push_back(spokes_.items.size());
             add_fan();
@@ -304,7 +302,8 @@ private:
             for (const std::int32_t neighbour : neighbours_.of(vertex)) {
                 sorted_.push_back(place_[index(neighbour)]);
                 const std::size_t of_neighbour = index(sorted_.back()) / MushMesh::kChunk;
-                mesh_.reach = std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
+                mesh_.reach =
+                    std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
             }
             std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
         }
