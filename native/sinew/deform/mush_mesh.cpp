@@ -345,7 +345,9 @@ private:
         for (const std::int32_t vertex : fans_.of(mesh_.vertices[i])) {
             spokes_.push_back(place_[index(vertex)]);
         }
-        if (count == corners) std::ranges::rotate(spokes_, std::ranges::min_element(spokes_));
+        if (count == corners) {
+            std::rotate(spokes_.begin(), std::ranges::min_element(spokes_), spokes_.end());
+        }
         return spokes_;
     }
 
