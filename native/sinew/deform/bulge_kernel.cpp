@@ -4,7 +4,6 @@
 #include "sinew/deform/bulge_kernel.h"
 
 #include <array>
-#include <limits>
 
 #include "sinew/deform/targets.h"
 
@@ -95,8 +94,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     if (!changes) return point;
     Vec<D> amount = hn::Set(d, frame.strength);
     if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
-    const Vec<D> finite = hn::Min(squared, hn::Set(d, std::numeric_limits<float>::max()));
-    const Vec<D> less = hn::NegMulAdd(allowed, inverse_root(d, finite), hn::Set(d, 1.0f));
+    const Vec<D> less = hn::Sub(hn::Set(d, 1.0f), hn::Div(allowed, hn::Sqrt(squared)));
     const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
     if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
     const float* const rows = frame.model_from_bones->value.data();

@@ -191,7 +191,8 @@ public:
         : chunks_(mesh.chunk_count()),
           reach_(mesh.reach),
           parts_(std::min(threads, chunks_)),
-          most_(std::min(kIterationsTogether, 1 + (parts_ > 1 ? chunks_ / parts_ / (2 * reach_) : kIterationsTogether))) {}
+          most_(std::min(kIterationsTogether,
+                         1 + (parts_ > 1 ? chunks_ / parts_ / (2 * reach_) : kIterationsTogether))) {}
 
     /// At most so many can be run together.
     [[nodiscard]] std::size_t most() const noexcept { return most_; }
@@ -207,14 +208,16 @@ public:
         parallel_for(
             parts_, parts_,
             [&work](std::size_t begin, std::size_t end) {
-                for (std::size_t part = begin; part < end; ++part) work.self.run_part(part, work.count, work.run);
+                for (std::size_t part = begin; part < end; ++part)
+                    work.self.run_part(part, work.count, work.run);
             },
             1);
         if (parts_ < 2 || count < 2) return;
         parallel_for(
             parts_ - 1, parts_,
             [&work](std::size_t begin, std::size_t end) {
-                for (std::size_t part = begin; part < end; ++part) work.self.run_between(part, work.count, work.run);
+                for (std::size_t part = begin; part < end; ++part)
+                    work.self.run_between(part, work.count, work.run);
             },
             1);
     }
@@ -260,8 +263,14 @@ std::size_t DeltaMush::State::smooth(const MushKernel& kernel, std::size_t threa
     for (std::size_t first = 0; first < iterations; first += together.most()) {
         together.run(std::min(together.most(), iterations - first), [&](std::size_t i, std::size_t chunk) {
             const std::size_t from = (first + i) % 2;
-            const MushFrame frame{&mesh, smoothed[from].data(), smoothed[1 - from].data(), factors.data(),
-                                  is_uniform, nullptr, 0.0f, nullptr};
+            const MushFrame frame{&mesh,
+                                  smoothed[from].data(),
+                                  smoothed[1 - from].data(),
+                                  factors.data(),
+                                  is_uniform,
+                                  nullptr,
+                                  0.0f,
+                                  nullptr};
             smooth_chunk(frame, chunk, chunk + 1);
         });
     }

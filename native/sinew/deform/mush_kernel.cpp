@@ -162,8 +162,8 @@ HWY_INLINE Points<D> to_lanes(D d, const OfPoints& points) {
 /// Points of vertices in lanes from `lane` on, of kLanes that follow each other.
 template <class D>
 HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
-    return to_lanes(
-        d, [&](std::size_t i) HWY_ATTR { return hn::LoadU(d, numbers_of(points + 4 * i + vertex_of(lane))); });
+    return to_lanes(d, [&](std::size_t i)
+                           HWY_ATTR { return hn::LoadU(d, numbers_of(points + 4 * i + vertex_of(lane))); });
 }
 
 /// The point of `vertex` and of those behind it.
@@ -181,9 +181,8 @@ HWY_INLINE Vec<D> collected(D d, const Float4* points, const Index& index_of, st
 /// index_of(vertex)  of the point
 template <class D, class Index>
 HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
-    return to_lanes(d, [&](std::size_t i) HWY_ATTR {
-        return collected(d, points, index_of, 4 * i + vertex_of(lane));
-    });
+    return to_lanes(
+        d, [&](std::size_t i) HWY_ATTR { return collected(d, points, index_of, 4 * i + vertex_of(lane)); });
 }
 
 template <class D>
@@ -303,18 +302,18 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
             const Points<D> point = consecutive_points(d, frame.from + block.first_vertex, lane);
             Points<D> sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
             auto weights = hn::Zero(d);
-            for_each_corner(
-                d, frame, block, lane, point, [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
-                    const MushDetails& details = frame.details[k];
-                    const auto along = [&](const Lanes<float>& detail, Vec<D> to_unit) HWY_ATTR {
-                        return hn::Mul(hn::Load(d, detail.lane.data() + lane),
-                                       hn::Mul(corner.weight, to_unit));
-                    };
-                    sum = add_scaled<D>(sum, along(details.x, corner.unit_x), corner.x);
-                    sum = add_scaled<D>(sum, along(details.y, corner.unit_y), corner.y);
-                    sum = add_scaled<D>(sum, along(details.z, corner.unit_z), corner.z);
-                    weights = hn::Add(weights, corner.weight);
-                });
+            for_each_corner(d, frame, block, lane, point,
+                            [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
+                                const MushDetails& details = frame.details[k];
+                                const auto along = [&](const Lanes<float>& detail, Vec<D> to_unit) HWY_ATTR {
+                                    return hn::Mul(hn::Load(d, detail.lane.data() + lane),
+                                                   hn::Mul(corner.weight, to_unit));
+                                };
+                                sum = add_scaled<D>(sum, along(details.x, corner.unit_x), corner.x);
+                                sum = add_scaled<D>(sum, along(details.y, corner.unit_y), corner.y);
+                                sum = add_scaled<D>(sum, along(details.z, corner.unit_z), corner.z);
+                                weights = hn::Add(weights, corner.weight);
+                            });
             const auto share =
                 hn::IfThenElseZero(hn::Gt(weights, hn::Zero(d)), hn::Div(hn::Set(d, frame.scale), weights));
             store_lanes(d, add_scaled<D>(point, share, sum), finished, lane);
@@ -337,15 +336,14 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
             const Points<D> point = consecutive_points(d, frame.from + block.first_vertex, lane);
             const Points<D> taken =
                 subtract<D>(consecutive_points(d, rest + block.first_vertex, lane), point);
-            const auto store = [&](Vec<D> detail, Lanes<float>& to) HWY_ATTR {
-                hn::Store(detail, d, to.lane.data() + lane);
-            };
-            for_each_corner(
-                d, frame, block, lane, point, [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
-                    store(hn::Mul(corner.unit_x, dot_of<D>(corner.x, taken)), details[k].x);
-                    store(hn::Mul(corner.unit_y, dot_of<D>(corner.y, taken)), details[k].y);
-                    store(hn::Mul(corner.unit_z, dot_of<D>(corner.z, taken)), details[k].z);
-                });
+            const auto store = [&](Vec<D> detail, Lanes<float>& to)
+                                   HWY_ATTR { hn::Store(detail, d, to.lane.data() + lane); };
+            for_each_corner(d, frame, block, lane, point,
+                            [&](std::size_t k, const CornerLanes<D>& corner) HWY_ATTR {
+                                store(hn::Mul(corner.unit_x, dot_of<D>(corner.x, taken)), details[k].x);
+                                store(hn::Mul(corner.unit_y, dot_of<D>(corner.y, taken)), details[k].y);
+                                store(hn::Mul(corner.unit_z, dot_of<D>(corner.z, taken)), details[k].z);
+                            });
         }
     }
 }
@@ -387,8 +385,7 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
             lengths = hn::Add(lengths, length);
         }
         const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
-        const auto factor =
-            frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
+        const auto factor = frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
         const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factor, lengths));
         store_lanes(d, add_scaled<D>(point, share, sum), result, lane);
     }
@@ -411,11 +408,12 @@ void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end
             if (run.is_consecutive) {
                 const auto behind = static_cast<std::int32_t>(i - run.begin);
                 smooth_lanes_by_length<true>(frame, valence, i, count,
-                                             [&](std::size_t, std::size_t k) HWY_ATTR { return neighbours[k] + behind; });
+                                             [&](std::size_t, std::size_t k)
+                                                 HWY_ATTR { return neighbours[k] + behind; });
             } else {
-                smooth_lanes_by_length<false>(frame, valence, i, count, [&](std::size_t vertex, std::size_t k) HWY_ATTR {
-                    return neighbours[vertex * valence + k];
-                });
+                smooth_lanes_by_length<false>(frame, valence, i, count,
+                                              [&](std::size_t vertex, std::size_t k)
+                                                  HWY_ATTR { return neighbours[vertex * valence + k]; });
                 neighbours += kLanes * valence;
             }
         }

@@ -25,14 +25,12 @@ std::vector<std::uint32_t> faces_of_edges(const MeshTopology& topology, const Co
 class Fans {
 public:
     Fans(const MeshTopology& topology, const CornerNeighbours& around, const ByVertex& corners) {
-        const auto vertex_at = [&](std::int32_t corner) {
-            return topology.corner_vertices[index(corner)];
-        };
+        const auto vertex_at = [&](std::int32_t corner) { return topology.corner_vertices[index(corner)]; };
         for (std::size_t vertex = 0; vertex + 1 < corners.offsets.size(); ++vertex) {
             corners_.clear();
             for (const std::int32_t corner : corners.of(vertex)) {
-                corners_.push_back({vertex_at(around.next[index(corner)]),
-                                    vertex_at(around.previous[index(corner)])});
+                corners_.push_back(
+                    {vertex_at(around.next[index(corner)]), vertex_at(around.previous[index(corner)])});
             }
             spokes_.offsets.push_back(spokes_.items.size());
             add_fan();
@@ -212,7 +210,8 @@ private:
             for (const std::int32_t neighbour : neighbours_.of(vertex)) {
                 sorted_.push_back(place_[index(neighbour)]);
                 const std::size_t of_neighbour = index(sorted_.back()) / MushMesh::kChunk;
-                mesh_.reach = std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
+                mesh_.reach =
+                    std::max(mesh_.reach, std::max(chunk, of_neighbour) - std::min(chunk, of_neighbour));
             }
             std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(first_sorted_.back()), sorted_.end());
         }
@@ -254,7 +253,9 @@ private:
         for (const std::int32_t vertex : fans_.of(mesh_.vertices[i])) {
             spokes_.push_back(place_[index(vertex)]);
         }
-        if (count == corners) std::ranges::rotate(spokes_, std::ranges::min_element(spokes_));
+        if (count == corners) {
+            std::rotate(spokes_.begin(), std::ranges::min_element(spokes_), spokes_.end());
+        }
         return spokes_;
     }
 

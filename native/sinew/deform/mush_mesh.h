@@ -58,8 +58,8 @@ struct MushMesh {
     std::vector<std::uint32_t> first_blocks;  // [chunks + 1]
     std::vector<Lanes<std::int32_t>> spokes;  // where they lead
     std::vector<std::int32_t> first_spokes;   // of a block's first vertex, where it is consecutive
-    std::size_t detail_count = 0;           // of all blocks
-    std::vector<std::uint8_t> on_boundary;  // [vertices] an edge of one face ends there
+    std::size_t detail_count = 0;             // of all blocks
+    std::vector<std::uint8_t> on_boundary;    // [vertices] an edge of one face ends there
 
     [[nodiscard]] std::size_t chunk_count() const noexcept { return first_runs.size() - 1; }
 };
