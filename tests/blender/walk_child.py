@@ -238,10 +238,6 @@ class Child:
             return None
         if claim is None or not side.is_on(obj) or obj.data.is_editmode:
             return None
-        keys = obj.data.shape_keys
-        names = (claim["method"], claim["stages"].get("mix", {}).get("method"))
-        if "sdef" in names and keys is not None and "mmd_sdef_c" in keys.key_blocks:
-            return None
         return self.shapes_of.expected(
             obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render
         )

@@ -392,7 +392,7 @@ def compute_beside(w: Walker, r: random.Random) -> str | None:
     return f"what methods need is computed {'on a thread' if on else 'at once'}"
 
 
-@operation(0.5)
+@operation(1.5)
 def sdef_keys(w: Walker, r: random.Random) -> str | None:
     """As mmd_tools stores them."""
     obj = w.editable(r)

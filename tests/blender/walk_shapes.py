@@ -44,12 +44,15 @@ class _Armature:
     bones_from_model: np.ndarray
     mask: np.ndarray | None
     multi: bool
+    group_of_bone: list[int]
 
 
 @dataclass
 class _Read:
-    """rest  float32 [vertices, 3], what comes to the first Armature modifier; own: the mesh's own, None where
-    modifiers in front give it other vertices."""
+    """rest       float32 [vertices, 3], what comes to the first Armature modifier
+    own        the same of the mesh's own; None where modifiers in front give it other vertices
+    sdef_keys  the same of the basis and of SDEF's three keys, where it has these
+    """
 
     rest: np.ndarray
     own: np.ndarray | None
@@ -57,6 +60,7 @@ class _Read:
     topology: tuple[np.ndarray, np.ndarray, np.ndarray]
     groups: dict[str, dict[int, float]]
     armatures: list[_Armature]
+    sdef_keys: list[np.ndarray] | None
 
 
 def expected(
@@ -93,8 +97,12 @@ def expected(
             read = _read(obj, obj.evaluated_get(depsgraph).data, active, depsgraph)
     if not active:
         return read.rest
-    if read.own is None and "cor" in (method, stages.get("mix", {}).get("method")):
+    methods = (method, stages.get("mix", {}).get("method"))
+    if read.own is None and "cor" in methods:
         # The centres are of the mesh as it came first.
+        return None
+    keys = obj.data.shape_keys
+    if "sdef" in methods and keys is not None and (is_moved or not keys.use_relative):
         return None
     points = start_before = read.rest
     for armature in read.armatures:
@@ -195,7 +203,21 @@ def _read(
         _topology(mesh),
         groups,
         [_read_armature(obj, mesh, modifier, groups, depsgraph) for modifier in modifiers],
+        _sdef_keys(obj.data),
     )
+
+
+def _sdef_keys(mesh: bpy.types.Mesh) -> list[np.ndarray] | None:
+    blocks = {} if mesh.shape_keys is None else mesh.shape_keys.key_blocks
+    names = ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1")
+    if not all(name in blocks for name in names):
+        return None
+    found = []
+    for block in (mesh.shape_keys.reference_key, *(blocks[name] for name in names)):
+        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        block.data.foreach_get("co", points.ravel())
+        found.append(points)
+    return found
 
 
 def _read_armature(
@@ -225,6 +247,7 @@ def _read_armature(
         np.linalg.inv(np.array(rig.matrix_world, dtype=np.float64)) @ place,
         mask,
         modifier.use_multi_modifier,
+        [obj.vertex_groups.find(bone.name) for bone in bones],
     )
 
 
@@ -264,7 +287,9 @@ def _blend(
     shapes = []
     for name in (method,) if mix is None else (method, mix[0]):
         data = {}
-        if name == "cor":
+        if name == "sdef" and read.sdef_keys is not None:
+            data[name] = _spheres(read.sdef_keys, armature)
+        elif name == "cor":
             data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles)
         binding = sinew.Binding(points, *influences, rest_bones=armature.rest, vertex_data=data)
         shapes.append(
@@ -279,6 +304,20 @@ def _blend(
     share = np.zeros((len(points), 1))
     share[list(mix[1]), 0] = list(mix[1].values())
     return shapes[0] + np.clip(share, 0.0, 1.0) * (shapes[1].astype(np.float64) - shapes[0])
+
+
+def _spheres(keys: list[np.ndarray], armature: _Armature) -> np.ndarray:
+    """As sinew.Binding takes them: R0 belongs to the bone whose vertex group comes first."""
+    basis, centres, first, second = keys
+    own, found = armature.influences, np.zeros((len(basis), 10), dtype=np.float32)
+    for vertex in range(len(basis)):
+        bones = own.bones[own.offsets[vertex] : own.offsets[vertex + 1]]
+        ends = [first[vertex], second[vertex]]
+        if len(bones) == 2 and armature.group_of_bone[bones[0]] > armature.group_of_bone[bones[1]]:
+            ends.reverse()
+        is_used = len(bones) == 2 and (centres[vertex] != basis[vertex]).any()
+        found[vertex] = [*centres[vertex], *ends[0], *ends[1], float(is_used)]
+    return found
 
 
 def _limit(read: _Read, points: np.ndarray, options: Mapping[str, Any] | None) -> np.ndarray:
