@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import sinew
 from sinew_addon.core import session as core_session
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
@@ -21,6 +22,7 @@ import delta_mush_reference
 import reference
 from sinew_addon.core.bulge_limit import segments
 
+METHODS = {method.name: method for method in sinew.methods()}
 MARGIN = 1e-3
 # Near half a turn from rest, the logarithm of a rotation in float32 errs by its rounding divided by the
 # margin.
@@ -157,17 +159,35 @@ def _by_one_method(
         np.concatenate([influences.weights[span] for span in spans]),
         frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64)),
         binding.bones.rest_axes.astype(np.float64),
-        {} if kept is None else {method: _kept_in_armature(space, kept[vertices].astype(np.float64))},
+        {} if kept is None else {method: _kept(method, kept.astype(np.float64), vertices, space)},
         frame.parameters,
     )
     return _moved(back, deformed), margins > MARGINS.get(method, MARGIN)
 
 
-def _kept_in_armature(space: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """What a method keeps of each vertex: points, one after the other, and after them what is none."""
+def _kept(method: str, kept: np.ndarray, vertices: np.ndarray, space: np.ndarray) -> np.ndarray:
+    """What a method keeps of these vertices, in armature space."""
+    if METHODS[method].keeps_moments:
+        return _moments(kept, vertices, space)
+    # Points, one after the other, and after them what is none.
+    kept = kept[vertices]
     count = kept.shape[1] // 3
     points = kept[:, : 3 * count].reshape(len(kept), count, 3)
     return np.hstack([_moved(space, points).reshape(len(kept), -1), kept[:, 3 * count :]])
+
+
+def _moments(rows: np.ndarray, vertices: np.ndarray, space: np.ndarray) -> np.ndarray:
+    """[rows, 12]: place in `vertices`, bone, weight, first moment, and xx, yy, zz, yz, xz, xy of the second."""
+    spans = [slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1))) for vertex in vertices]
+    found = np.concatenate([rows[span] for span in spans])
+    found[:, 0] = np.repeat(np.arange(len(vertices)), [span.stop - span.start for span in spans])
+    linear = space[:3, :3]
+    found[:, 3:6] = found[:, 3:6] @ linear.T + found[:, 2:3] * space[:3, 3]
+    i, j = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
+    second = np.empty((len(found), 3, 3))
+    second[:, i, j] = second[:, j, i] = found[:, 6:]
+    found[:, 6:] = (linear @ second @ linear.T)[:, i, j]
+    return found
 
 
 def _moved(transform: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -98,8 +98,8 @@ def expected(
     if not active:
         return read.rest
     methods = (method, stages.get("mix", {}).get("method"))
-    if read.own is None and "cor" in methods:
-        # The centres are of the mesh as it came first.
+    if read.own is None and not {"cor", "ddm"}.isdisjoint(methods):
+        # What they keep is of the mesh as it came first.
         return None
     keys = obj.data.shape_keys
     if "sdef" in methods and keys is not None and (is_moved or not keys.use_relative):
@@ -291,6 +291,9 @@ def _blend(
             data[name] = _spheres(read.sdef_keys, armature)
         elif name == "cor":
             data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles)
+        elif name == "ddm":
+            radius = parameters.get("ddm.radius", RADIUS)
+            data[name] = sinew.direct_delta_mush(read.own, *influences, read.triangles, radius)
         binding = sinew.Binding(points, *influences, rest_bones=armature.rest, vertex_data=data)
         shapes.append(
             sinew.Deformer(binding, name).deform(
