@@ -24,6 +24,8 @@ from sinew_addon.core.bulge_limit import segments
 
 METHODS = {method.name: method for method in sinew.methods()}
 MARGIN = 1e-3
+# As a part of the diagonal.
+LEAST_STABLE = 2e-6
 # Near half a turn from rest, the logarithm of a rotation in float32 errs by its rounding divided by the
 # margin.
 MARGINS = {"log": 0.03}
@@ -151,43 +153,80 @@ def _by_one_method(
     influences = binding.weighting.influences_over_joints(in_armature)
     spans = [slice(influences.offsets[v], influences.offsets[v + 1]) for v in vertices]
     kept = None if binding.vertex_data is None else binding.vertex_data.of(method, space)
-    deformed, margins = reference.deform(
-        method,
-        in_armature[vertices],
-        np.cumsum([0, *(span.stop - span.start for span in spans)]),
-        np.concatenate([influences.bones[span] for span in spans]),
-        np.concatenate([influences.weights[span] for span in spans]),
-        frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64)),
-        binding.bones.rest_axes.astype(np.float64),
-        {} if kept is None else {method: _kept(method, kept.astype(np.float64), vertices, space)},
-        frame.parameters,
-    )
-    return _moved(back, deformed), margins > MARGINS.get(method, MARGIN)
+    data: dict[str, np.ndarray] = {}
+    if kept is not None and METHODS[method].keeps_moments:
+        data = {method: _moments(kept.astype(np.float64), vertices, space, influences, in_armature)}
+    elif kept is not None:
+        data = {method: _points_kept(space, kept[vertices].astype(np.float64))}
+
+    def by(data: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        return reference.deform(
+            method,
+            in_armature[vertices],
+            np.cumsum([0, *(span.stop - span.start for span in spans)]),
+            np.concatenate([influences.bones[span] for span in spans]),
+            np.concatenate([influences.weights[span] for span in spans]),
+            frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64)),
+            binding.bones.rest_axes.astype(np.float64),
+            data,
+            frame.parameters,
+        )
+
+    deformed, margins = by(data)
+    decided = margins > MARGINS.get(method, MARGIN)
+    if data and METHODS[method].keeps_moments:
+        # Bones that move far apart make much of the rounding of a small neighbourhood's moments.
+        rounded = {name: _with_other_rounding(rows) for name, rows in data.items()}
+        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+        decided &= np.abs(by(rounded)[0] - deformed).max(axis=1) <= LEAST_STABLE * extent
+    return _moved(back, deformed), decided
 
 
-def _kept(method: str, kept: np.ndarray, vertices: np.ndarray, space: np.ndarray) -> np.ndarray:
-    """What a method keeps of these vertices, in armature space."""
-    if METHODS[method].keeps_moments:
-        return _moments(kept, vertices, space)
-    # Points, one after the other, and after them what is none.
-    kept = kept[vertices]
+def _points_kept(space: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """What a method keeps of each vertex: points, one after the other, and after them what is none."""
     count = kept.shape[1] // 3
     points = kept[:, : 3 * count].reshape(len(kept), count, 3)
     return np.hstack([_moved(space, points).reshape(len(kept), -1), kept[:, 3 * count :]])
 
 
-def _moments(rows: np.ndarray, vertices: np.ndarray, space: np.ndarray) -> np.ndarray:
-    """[rows, 12]: place in `vertices`, bone, weight, first moment, and xx, yy, zz, yz, xz, xy of the second."""
-    spans = [slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1))) for vertex in vertices]
-    found = np.concatenate([rows[span] for span in spans])
-    found[:, 0] = np.repeat(np.arange(len(vertices)), [span.stop - span.start for span in spans])
-    linear = space[:3, :3]
-    found[:, 3:6] = found[:, 3:6] @ linear.T + found[:, 2:3] * space[:3, 3]
-    i, j = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
-    second = np.empty((len(found), 3, 3))
-    second[:, i, j] = second[:, j, i] = found[:, 6:]
-    found[:, 6:] = (linear @ second @ linear.T)[:, i, j]
-    return found
+def _moments(
+    rows: np.ndarray, vertices: np.ndarray, space: np.ndarray, influences: Any, points: np.ndarray
+) -> np.ndarray:
+    """[rows, 12]: place in `vertices`, bone, weight, first moment, and xx, yy, zz, yz, xz, xy of the second,
+    in armature space. Those of bones that no vertex uses are left out, and a vertex that has none is its own
+    neighbourhood."""
+    found = []
+    used = np.unique(influences.bones)
+    for place, vertex in enumerate(vertices):
+        own = rows[slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1)))]
+        own = own[np.isin(own[:, 1], used)]
+        total = own[:, 2].sum()
+        if total <= 0.0:
+            span = slice(influences.offsets[vertex], influences.offsets[vertex + 1])
+            share = influences.weights[span] / influences.weights[span].sum()
+            of_point = share[:, None] * np.array([1.0, *points[vertex], *np.zeros(6)])
+            found.append(np.column_stack([np.full(len(share), place), influences.bones[span], of_point]))
+            continue
+        own = np.column_stack([np.full(len(own), place), own[:, 1:]])
+        own[:, 2:] /= total if total < 0.999 else 1.0
+        found.append(_moved_moments(space, own))
+    return np.concatenate(found)
+
+
+def _moved_moments(space: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    linear, (i, j) = space[:3, :3], ([0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1])
+    second = np.empty((len(rows), 3, 3))
+    second[:, i, j] = second[:, j, i] = rows[:, 6:]
+    first = rows[:, 3:6] @ linear.T + rows[:, 2:3] * space[:3, 3]
+    return np.column_stack([rows[:, :3], first, (linear @ second @ linear.T)[:, i, j]])
+
+
+def _with_other_rounding(rows: np.ndarray) -> np.ndarray:
+    """First moments as another rounding to float32 could have them."""
+    rows = rows.copy()
+    steps = np.random.default_rng(len(rows)).uniform(-1.0, 1.0, (len(rows), 3))
+    rows[:, 3:6] += steps * np.finfo(np.float32).eps * np.abs(rows[:, 3:6]).max(initial=0.0)
+    return rows
 
 
 def _moved(transform: np.ndarray, points: np.ndarray) -> np.ndarray:
