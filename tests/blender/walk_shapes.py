@@ -17,6 +17,8 @@ import numpy as np
 import sinew
 import walk_sides
 
+# Of parameters, by their full names.
+DEFAULTS = {f"{m.name}.{p.id}": p.default for m in sinew.methods() for p in m.parameters}
 # What the Armature modifier takes for no weight at all.
 LEAST_WEIGHT = 1e-4
 
@@ -292,7 +294,7 @@ def _blend(
         elif name == "cor":
             data[name] = sinew.centres_of_rotation(read.own, *influences, read.triangles)
         elif name == "ddm":
-            radius = parameters.get("ddm.radius", RADIUS)
+            radius = parameters.get("ddm.radius", DEFAULTS["ddm.radius"])
             data[name] = sinew.direct_delta_mush(read.own, *influences, read.triangles, radius)
         binding = sinew.Binding(points, *influences, rest_bones=armature.rest, vertex_data=data)
         shapes.append(

@@ -11,7 +11,7 @@ import pytest
 import reference
 import sinew
 from rigs import about, translation
-from tube import TABLE, Tube, numbers
+from tube import TABLE, Tube, numbers, three_bones
 
 SIGMA = 0.1
 
@@ -60,16 +60,6 @@ def defined_centres(points, weights, triangles):
             share = similarity * areas
             centres[vertex] = share @ centroids / share.sum()
     return centres
-
-
-def three_bones():
-    """A tube whose weights of three bones change along it and around it."""
-    tube = Tube(21, 12)
-    x, _y, z = tube.points.T
-    raw = np.column_stack([np.exp(-((z - c - 0.6 * x) ** 2)) for c in (0.7, 2.1, 3.3)])
-    raw[raw < 0.15] = 0.0
-    tube.weights = (raw / raw.sum(axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
-    return tube
 
 
 @pytest.mark.parametrize("tube", [Tube(41, 16), three_bones()], ids=["two bones", "three bones"])

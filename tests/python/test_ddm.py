@@ -12,7 +12,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 import sinew
 from rigs import about, random_motion, random_rig, transform, translation
-from test_centres import Tube, bulge, three_bones
+from tube import Tube, bulge, three_bones
 
 if "ddm" not in {method.name for method in sinew.methods()}:
     pytest.skip("built without ddm", allow_module_level=True)

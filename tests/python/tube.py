@@ -5,6 +5,9 @@ import numpy as np
 import sinew
 from rigs import about, transform, translation
 
+# How far ddm smooths.
+RADIUS = 0.26
+
 
 class Tube:
     """Length 4, radius 0.5, along z; two bones meet in its middle, and weights change over 1 unit."""
@@ -38,9 +41,17 @@ class Tube:
         joint = translation([0.0, 0.0, 2.0])
         return np.array([np.eye(4), joint @ about(axis, degrees) @ np.linalg.inv(joint)])
 
+    def vertex_data(self, method):
+        """What the method keeps of the tube, as sinew.Binding takes it."""
+        if method == "cor":
+            return {method: self.centres()}
+        if method == "ddm":
+            return {method: sinew.direct_delta_mush(*self.mesh, self.triangles, RADIUS)}
+        return {}
+
     def deformed(self, method, axis, degrees):
         bones = self.bones(axis, degrees)
-        deformer = sinew.Deformer(*self.mesh, method, vertex_data={"cor": self.centres()})
+        deformer = sinew.Deformer(*self.mesh, method, vertex_data=self.vertex_data(method))
         return deformer.deform(bones.astype(np.float32)).astype(np.float64), bones
 
     def volume(self, points):
@@ -58,6 +69,16 @@ class Tube:
         edges = np.concatenate([self.quads[:, [k, (k + 1) % 4]] for k in range(4)]).T
         posed, rest = (np.linalg.norm(p[edges[0]] - p[edges[1]], axis=1) for p in (points, self.points))
         return (posed / rest).max()
+
+
+def three_bones():
+    """A tube whose weights of three bones change along it and around it."""
+    tube = Tube(21, 12)
+    x, _y, z = tube.points.T
+    raw = np.column_stack([np.exp(-((z - c - 0.6 * x) ** 2)) for c in (0.7, 2.1, 3.3)])
+    raw[raw < 0.15] = 0.0
+    tube.weights = (raw / raw.sum(axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
+    return tube
 
 
 def bulge(points, bones):
