@@ -269,8 +269,8 @@ vertex is from its bones than at rest, in units of the file ([metrics.md](metric
 ## A tube
 
 Of length 4 and radius 0.5, 81 rings of 32 vertices, two bones, weights that change over 1 unit; bulge and
-radius are over the radius at rest; the radius of `ddm` is 0.26. In brackets: the same, computed apart from the
-library.
+radius are over the radius at rest; the radius of `ddm` is 0.26. In brackets: the same, computed apart from
+the library.
 
 """
 
