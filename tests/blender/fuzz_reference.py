@@ -208,7 +208,7 @@ def _moments(
             found.append(np.column_stack([np.full(len(share), place), influences.bones[span], of_point]))
             continue
         own = np.column_stack([np.full(len(own), place), own[:, 1:]])
-        own[:, 2:] /= total if total < 0.999 else 1.0
+        own[:, 2:] /= total if total < 1.0 - 1e-6 else 1.0
         found.append(_moved_moments(space, own))
     return np.concatenate(found)
 

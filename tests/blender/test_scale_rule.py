@@ -48,15 +48,20 @@ def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
         rigid[bone, :3, 3] = (motion @ np.append(head, 1.0))[:3] - rigid[bone, :3, :3] @ head
     points = frame.rest_points.astype(np.float64)
     bound = (influences.offsets, influences.bones, influences.weights)
-    # Mesh and armature are in one space; by every rule, centres are those of the mesh as it is at rest.
+    # Mesh and armature are in one space; by every rule, what methods keep is of the mesh as it is at rest.
     mesh = obj.data
     mesh.calc_loop_triangles()
     triangles = np.int32([triangle.vertices[:] for triangle in mesh.loop_triangles])
-    centres = sinew.centres_of_rotation(frame.rest_points, *bound, triangles)
+    kept = {}
+    if method == "cor":
+        kept[method] = sinew.centres_of_rotation(frame.rest_points, *bound, triangles)
+    elif method == "ddm":
+        radius = properties.of(obj).ddm.radius
+        kept[method] = sinew.direct_delta_mush(frame.rest_points, *bound, triangles, radius)
     if rule == "3.x":
         points, _ = reference.deform("lbs", points, *bound, np.linalg.inv(rigid) @ motions)
     motions = motions if rule == "4.0" else rigid
-    return reference.deform(method, points, *bound, motions, rest, {"cor": centres})[0]
+    return reference.deform(method, points, *bound, motions, rest, kept)[0]
 
 
 @pytest.mark.parametrize("rule", ["4.0", "3.x", "none"])

@@ -11,6 +11,8 @@ namespace {
 // vertices have, each has a list of its own.
 constexpr std::size_t kMostShared = 2;
 
+constexpr double kLeastSum = 1.0 - 1e-6;
+
 using Row = std::array<float, kMomentNumbers>;
 
 /// Of one vertex.
@@ -39,7 +41,7 @@ public:
         for (const BoneRow& row : found) sum += static_cast<double>(row.numbers[0]);
         if (!(sum > 0.0)) add_point(b, lane, found);
         // Of sum 1 but for rounding, unless some were left out.
-        if (sum > 0.0 && sum < 0.999) {
+        if (sum > 0.0 && sum < kLeastSum) {
             for (BoneRow& row : found) {
                 for (float& number : row.numbers)
                     number = static_cast<float>(static_cast<double>(number) / sum);
