@@ -116,7 +116,7 @@ private:
             for (const BoneRow& row : lanes_[lane]) bones.push_back(row.bone);
         }
         std::ranges::sort(bones);
-        bones.erase(std::ranges::unique(bones).begin(), bones.end());
+        bones.erase(std::unique(bones.begin(), bones.end()), bones.end());
         MomentBlock block{static_cast<std::uint32_t>(moments_.rows.size()), 0,
                           static_cast<std::uint32_t>(bones.size()), bones.size() > kMostShared * most};
         if (block.mixed) {

@@ -265,7 +265,7 @@ void add_rows(std::uint32_t vertex, const Vec3<double>& point,
     for (const auto& [bone, found] : of_bones) {
         const double weight = at(*found, 0) / total;
         const Vec3<double> first = Vec3<double>(at(*found, 1), at(*found, 2), at(*found, 3)) / total;
-        const auto second = [&](std::size_t column, int a, int b) {
+        const auto second = [&, found = found](std::size_t column, int a, int b) {
             const double moment = at(*found, column) / total;
             return static_cast<float>(moment - first[a] * centre[b] - centre[a] * first[b] +
                                       weight * centre[a] * centre[b]);
