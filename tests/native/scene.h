@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <map>
 #include <ostream>
+#include <utility>
+#include <vector>
 
 #include "sinew/deform/deformer.h"
 #include "sinew/skinning/methods.h"
@@ -83,11 +88,21 @@ struct Scene {
 private:
     bool has_no_weight(std::size_t vertex) const { return total_weight(vertex) == 0.0; }
 
+    /// The first of a vertex and the one after its last; none where what a scene holds does not fit, as in tests of that.
+    std::pair<std::size_t, std::size_t> influences_of(std::size_t vertex) const {
+        if (vertex + 1 >= offsets.size()) return {0, 0};
+        const std::int32_t begin = offsets[vertex];
+        const std::int32_t end = offsets[vertex + 1];
+        if (begin < 0 || end < begin) return {0, 0};
+        const auto after = static_cast<std::size_t>(end);
+        if (after > std::min(bones.size(), weights.size())) return {0, 0};
+        return {static_cast<std::size_t>(begin), after};
+    }
+
     double total_weight(std::size_t vertex) const {
+        const auto [begin, end] = influences_of(vertex);
         double sum = 0.0;
-        for (std::int32_t i = offsets[vertex]; i < offsets[vertex + 1]; ++i) {
-            sum += static_cast<double>(weights[static_cast<std::size_t>(i)]);
-        }
+        for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(weights[i]);
         return sum;
     }
 
@@ -96,9 +111,9 @@ private:
     template <class T>
     std::vector<T> moments_at(std::size_t vertex) const {
         std::map<std::int32_t, double> shares;
-        for (std::int32_t i = offsets[vertex]; i < offsets[vertex + 1]; ++i) {
-            const auto influence = static_cast<std::size_t>(i);
-            shares[bones[influence]] += static_cast<double>(weights[influence]) / total_weight(vertex);
+        const auto [begin, end] = influences_of(vertex);
+        for (std::size_t i = begin; i < end; ++i) {
+            shares[bones[i]] += static_cast<double>(weights[i]) / total_weight(vertex);
         }
         std::vector<T> rows;
         const float* const centre = &vertex_numbers[kVertexNumbers * vertex];
