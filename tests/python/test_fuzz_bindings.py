@@ -106,7 +106,7 @@ def arrays(draw, shape, wild=True):
     with np.errstate(all="ignore"):
         array = numbers.astype(dtype)
     given = laid_out(array, draw(st.sampled_from(LAYOUTS)))
-    # A list has no type of elements but that which numpy gives it; without axes it is a number, which has none.
+    # A list has no type but that which numpy gives it; without axes it is a number, which has none.
     if isinstance(given, list):
         return given, np.asarray(given)
     return given, array if isinstance(given, np.ndarray) else given
