@@ -45,7 +45,9 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
 def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     _subscribe_behind_others("frame_change_post", on_frame_change)
     _begin_evaluation()
-    if any(state.dirtied_by_frames for state in current.skinned.values()) and not is_rendering_in_window():
+    if is_rendering_in_window():
+        return
+    if any(state.dirtied_by_frames for state in current.skinned.values()):
         events.call_last("frame_change_pre", close_gate)
         events.call_first("frame_change_post", open_gate)
     else:

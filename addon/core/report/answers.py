@@ -82,12 +82,15 @@ def orders_that_agree(measurements: Measurements) -> tuple[list[str], list[str]]
         plain = {row: measurements.unoptimised[f"{table}/{candidates[row][0]}"].median for row in seconds}
         if sorted(seconds, key=plain.__getitem__) == theirs:
             as_reported.append(table)
-        best = {
-            row: min(_nanoseconds(measurements, table, name) for name in candidates[row]) for row in seconds
-        }
+        best = {row: _nanoseconds(measurements, table, _fastest(measurements, table, row)) for row in seconds}
         if sorted(seconds, key=best.__getitem__) == theirs:
             fastest.append(table)
     return as_reported, fastest
+
+
+def _fastest(measurements: Measurements, table: str, row: str) -> str:
+    """The name of the fastest implementation of a table's row."""
+    return min(_TIMED[table][1][row], key=lambda name: _nanoseconds(measurements, table, name))
 
 
 def _in_words(numbers: list[str]) -> str:
@@ -96,8 +99,7 @@ def _in_words(numbers: list[str]) -> str:
 
 def _best(measurements: Measurements, table: str, row: str) -> str:
     """The time of the fastest implementation of a table's row, who made it, and how far the runs spread."""
-    names = _TIMED[table][1][row]
-    name = min(names, key=lambda each: _nanoseconds(measurements, table, each))
+    name = _fastest(measurements, table, row)
     spread = measurements.optimised[f"{table}/{name}"].spread / OPERATIONS[table] * 1e9
     maker = _MAKERS[name.split("_")[0]]
     return f"{_nanoseconds(measurements, table, name):.1f} ± {spread / 2:.1f} ({maker})"
@@ -115,10 +117,7 @@ def _matrices(measurements: Measurements | None) -> Answer:
         f"{task} {', '.join(_best(measurements, table, row) for row in _TIMED[table][0])}"
         for table, task in _TASKS.items()
     ]
-    dlb, sclerp = (
-        min(_nanoseconds(measurements, "3.9", name) for name in _TIMED["3.9"][1][row])
-        for row in ("dlb", "sclerp")
-    )
+    slower = _ratio_of_best(measurements, "3.9", "sclerp", "dlb")
     seconds = printed.INTERPOLATION_SECONDS
     return Answer(
         question,
@@ -126,7 +125,7 @@ def _matrices(measurements: Measurements | None) -> Answer:
         f"Tables 3.4, 3.5, 3.9 and 3.10: {_in_words(as_reported)}. Optimised, by the fastest implementation "
         f"of each: {_in_words(fastest)}. In nanoseconds those take, for matrix, pair and dual quaternion "
         f"(± half the range of the middle half of the runs): {'; '.join(parts)}. ScLERP takes "
-        f"{sclerp / dlb:.1f} times as long as DLB (printed {seconds['sclerp'] / seconds['dlb']:.1f}).",
+        f"{slower:.1f} times as long as DLB (printed {seconds['sclerp'] / seconds['dlb']:.1f}).",
     )
 
 
@@ -141,9 +140,8 @@ def _fact(figures: tuple[Figure, ...], number: str, key: str) -> float | None:
 
 def _ratio_of_best(measurements: Measurements, table: str, row: str, other: str) -> float:
     """The time of one row to that of another, each by its fastest implementation."""
-    candidates = _TIMED[table][1]
     of_row, of_other = (
-        min(_nanoseconds(measurements, table, name) for name in candidates[each]) for each in (row, other)
+        _nanoseconds(measurements, table, _fastest(measurements, table, each)) for each in (row, other)
     )
     return of_row / of_other
 

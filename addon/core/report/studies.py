@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 import sinew
 
-LAYOUTS: dict[str, Any] = {
-    "affine": sinew.affine,
-    "quat_vec": sinew.quat_vec,
-    "dual_quat": sinew.dual_quat,
-}
+from .tables import LAYOUTS
+
 CHAINS = 2000
 LENGTHS = (4, 16, 64, 256)
 # Where nlerp and slerp are farthest apart, and near it; from half way on it is the same mirrored.
