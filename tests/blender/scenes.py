@@ -189,3 +189,21 @@ def write_slow_file(path: Path, vertices: int, iterations: int) -> Path:
     bpy.data.libraries.write(str(path), {bpy.context.scene}, compress=True)
     bpy.data.objects.remove(obj)
     return path
+
+
+def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Offsets, bones and weights, read one by one, by no code of Sinew's."""
+    bones = [bone.name for bone in attach.armature_of(obj).data.bones]
+    offsets, indices, weights = [0], [], []
+    for vertex in obj.data.vertices:
+        for entry in vertex.groups:
+            indices.append(bones.index(obj.vertex_groups[entry.group].name))
+            weights.append(entry.weight)
+        offsets.append(len(indices))
+    return np.int32(offsets), np.int32(indices), np.float32(weights)
+
+
+def triangles_of(obj: bpy.types.Object) -> np.ndarray:
+    """int32 [triangles, 3]"""
+    obj.data.calc_loop_triangles()
+    return np.int32([triangle.vertices[:] for triangle in obj.data.loop_triangles])

@@ -15,7 +15,6 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.core.bulge_limit import segments
 from sinew_addon.deform import session
 from sinew_addon.io import files
-from test_methods_against_reference import weights_of
 
 sys.path.append(str(REPOSITORY / "tests" / "python"))
 import bulge_limit_reference
@@ -51,7 +50,14 @@ def expected_points(
         return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
     rest = scenes.rest_points(obj) if rest is None else rest
-    of = (moved(to_armature, before), moved(to_armature, rest), *weights_of(obj), heads, tails, motions)
+    of = (
+        moved(to_armature, before),
+        moved(to_armature, rest),
+        *scenes.weights_of(obj),
+        heads,
+        tails,
+        motions,
+    )
     return moved(np.linalg.inv(to_armature), bulge_limit_reference.limit(*of, mask=mask, **options))
 
 
@@ -194,7 +200,7 @@ def elbow_bulge(obj: bpy.types.Object, points: np.ndarray) -> float:
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     to_armature = np.array(armature.matrix_world.inverted() @ obj.matrix_world)
     worst = 0.0
-    offsets, bones, weights = weights_of(obj)
+    offsets, bones, weights = scenes.weights_of(obj)
     names = [bone.name for bone in armature.data.bones]
     rest = scenes.rest_points(obj) @ to_armature[:3, :3].T + to_armature[:3, 3]
     posed = points @ to_armature[:3, :3].T + to_armature[:3, 3]

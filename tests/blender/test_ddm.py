@@ -45,22 +45,10 @@ def in_window():
     precomputations.stopped.clear()
 
 
-def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    bones = [bone.name for bone in attach.armature_of(obj).data.bones]
-    offsets, indices, weights = [0], [], []
-    for vertex in obj.data.vertices:
-        for entry in vertex.groups:
-            indices.append(bones.index(obj.vertex_groups[entry.group].name))
-            weights.append(entry.weight)
-        offsets.append(len(indices))
-    return np.int32(offsets), np.int32(indices), np.float32(weights)
-
-
 def moments_of(obj: bpy.types.Object, radius: float) -> np.ndarray:
-    obj.data.calc_loop_triangles()
-    triangles = np.int32([triangle.vertices[:] for triangle in obj.data.loop_triangles])
     points = np.float32([vertex.co[:] for vertex in obj.data.vertices])
-    return sinew.direct_delta_mush(points, *weights_of(obj), triangles, np.float32(radius))
+    influences, triangles = scenes.weights_of(obj), scenes.triangles_of(obj)
+    return sinew.direct_delta_mush(points, *influences, triangles, np.float32(radius))
 
 
 def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str = "0") -> None:
@@ -73,7 +61,7 @@ def assert_equal_to_reference(obj: bpy.types.Object, radius: float, variant: str
     expected, margins = reference.deform(
         "ddm",
         scenes.rest_points(obj),
-        *weights_of(obj),
+        *scenes.weights_of(obj),
         motions,
         None,
         {"ddm": moments_of(obj, radius)},

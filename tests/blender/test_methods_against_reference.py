@@ -22,24 +22,10 @@ METHODS = ("cor", "sbs", "dib")
 STEP = 7
 
 
-def weights_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Offsets, bones and weights, read one by one, by no code of Sinew's."""
-    bones = [bone.name for bone in attach.armature_of(obj).data.bones]
-    offsets, indices, weights = [0], [], []
-    for vertex in obj.data.vertices:
-        for entry in vertex.groups:
-            indices.append(bones.index(obj.vertex_groups[entry.group].name))
-            weights.append(entry.weight)
-        offsets.append(len(indices))
-    return np.int32(offsets), np.int32(indices), np.float32(weights)
-
-
 def centres_of(obj: bpy.types.Object) -> np.ndarray:
-    mesh = obj.data
-    mesh.calc_loop_triangles()
-    triangles = np.int32([triangle.vertices[:] for triangle in mesh.loop_triangles])
-    points = np.float32([vertex.co[:] for vertex in mesh.vertices])
-    return sinew.centres_of_rotation(points, *weights_of(obj), triangles, exact=len(points) < 1000)
+    points = np.float32([vertex.co[:] for vertex in obj.data.vertices])
+    influences, triangles = scenes.weights_of(obj), scenes.triangles_of(obj)
+    return sinew.centres_of_rotation(points, *influences, triangles, exact=len(points) < 1000)
 
 
 def assert_equal_to_reference(
@@ -54,7 +40,7 @@ def assert_equal_to_reference(
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     motions = np.array([np.array(b.matrix @ b.bone.matrix_local.inverted()) for b in evaluated.pose.bones])
     rest_bones = np.array([np.array(bone.matrix_local) for bone in armature.data.bones])
-    offsets, indices, weights = weights_of(obj)
+    offsets, indices, weights = scenes.weights_of(obj)
     chosen = range(0, len(obj.data.vertices), STEP)
     spans = [range(offsets[vertex], offsets[vertex + 1]) for vertex in chosen]
     entries = [entry for span in spans for entry in span]

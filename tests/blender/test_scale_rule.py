@@ -49,9 +49,7 @@ def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
     points = frame.rest_points.astype(np.float64)
     bound = (influences.offsets, influences.bones, influences.weights)
     # Mesh and armature are in one space; by every rule, what methods keep is of the mesh as it is at rest.
-    mesh = obj.data
-    mesh.calc_loop_triangles()
-    triangles = np.int32([triangle.vertices[:] for triangle in mesh.loop_triangles])
+    triangles = scenes.triangles_of(obj)
     kept = {}
     if method == "cor":
         kept[method] = sinew.centres_of_rotation(frame.rest_points, *bound, triangles)
