@@ -768,6 +768,13 @@ def _vertices(w: Walker, r: random.Random, obj: bpy.types.Object) -> list[int]:
     return sorted(r.sample(range(count), r.randint(1, max(1, count // 2)))) if count else []
 
 
+def _tag_mesh_of_unseen(obj: bpy.types.Object) -> None:
+    """Blender tags the object whose weights change. Where that is not evaluated, others of its mesh show the
+    old weights until something else tags the mesh, as Sinew's copies do."""
+    if not obj.evaluated_get(bpy.context.view_layer.depsgraph).is_evaluated:
+        obj.data.update_tag()
+
+
 @operation(8)
 def weights(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.data.override_library is None)
@@ -777,8 +784,10 @@ def weights(w: Walker, r: random.Random) -> str | None:
     vertices = _vertices(w, r, obj)
     if r.random() < 0.3:
         group.remove(vertices)
+        _tag_mesh_of_unseen(obj)
         return f"take {len(vertices)} vertices of {obj.name} out of {group.name}"
     group.add(vertices, r.uniform(0.0, 1.0), r.choice(("REPLACE", "ADD", "SUBTRACT")))
+    _tag_mesh_of_unseen(obj)
     if r.random() < 0.2:
         obj.data.update()
     return f"weigh {len(vertices)} vertices of {obj.name} in {group.name}"
