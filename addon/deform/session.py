@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ..attach import attach, note, overrides, point_store, properties, stack
+from ..attach import attach, note, orphans, overrides, point_store, properties, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
@@ -290,6 +290,8 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     """Found out anew where objects may have come or gone."""
     if current.objects is None or changes.structure or len(bpy.data.objects) != current.object_count:
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+        if not is_rendering_in_window():
+            orphans.remove()
         current.object_count = len(bpy.data.objects)
         notify(subscribers.objects_changed, current.objects)
         point_store.unshare(current.objects)
