@@ -501,14 +501,16 @@ class SinewSide:
         precomputations.waits = not on
 
     def wait(self) -> None:
-        """Until no object waits for what a thread computes, which a timer of the window sees to."""
-        from sinew_addon.deform import precompute_watch
+        """What timers of the window see to: that no object waits for what a thread computes, and what Blender
+        evaluates without telling anybody."""
+        from sinew_addon.deform import handlers, precompute_watch
 
         until = time.monotonic() + 30.0
         while precompute_watch.look() is not None:
             if time.monotonic() > until:
                 raise RuntimeError("what methods need is still computed after half a minute")
             time.sleep(0.002)
+        handlers.check_unannounced()
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         numbers = {m.name: m.number for m in self._properties.METHODS.values()}
