@@ -768,6 +768,13 @@ def _vertices(w: Walker, r: random.Random, obj: bpy.types.Object) -> list[int]:
     return sorted(r.sample(range(count), r.randint(1, max(1, count // 2)))) if count else []
 
 
+def _show_weights(obj: bpy.types.Object) -> None:
+    """Weights that change through an object that Blender does not evaluate, it shows in none of the others
+    that have the mesh (seen on 4.2 and 5.2)."""
+    if not obj.visible_get():
+        obj.data.update()
+
+
 @operation(8)
 def weights(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.data.override_library is None)
@@ -777,10 +784,12 @@ def weights(w: Walker, r: random.Random) -> str | None:
     vertices = _vertices(w, r, obj)
     if r.random() < 0.3:
         group.remove(vertices)
+        _show_weights(obj)
         return f"take {len(vertices)} vertices of {obj.name} out of {group.name}"
     group.add(vertices, r.uniform(0.0, 1.0), r.choice(("REPLACE", "ADD", "SUBTRACT")))
     if r.random() < 0.2:
         obj.data.update()
+    _show_weights(obj)
     return f"weigh {len(vertices)} vertices of {obj.name} in {group.name}"
 
 
@@ -818,6 +827,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
     if what == "new" or group is None:
         made = obj.vertex_groups.new(name=w.new_name("group"))
         made.add(_vertices(w, r, obj), r.random(), "REPLACE")
+        _show_weights(obj)
         return f"group {made.name} of {obj.name}"
     if what == "rename":
         group.name = w.new_name("group")
@@ -971,6 +981,10 @@ def apply_pose(w: Walker, r: random.Random) -> str | None:
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.pose.armature_apply(selected=False)
     bpy.ops.object.mode_set(mode="OBJECT")
+    for child in rig.children:
+        # Blender gives those of bones other transforms, and evaluates these only when something else is
+        # changed (seen on 4.2 and 5.2).
+        child.update_tag()
     return f"apply the pose of {rig.name} as its rest pose"
 
 

@@ -567,7 +567,11 @@ class SinewSide:
 
     def apply(self, obj: bpy.types.Object) -> None:
         modifier = self.own_modifier(obj)
-        if self.is_on(obj) and modifier is not None and modifier.show_viewport:
+        # Sinew's is on whatever an animation makes of the Armature modifiers, and shows what that has.
+        paths = {curve.data_path for curve in curves_of(obj)}
+        keyed = [m for m in armature_modifiers(obj) if m.path_from_id("show_viewport") in paths]
+        is_shown = modifier is not None and modifier.show_viewport and all(m.show_viewport for m in keyed)
+        if self.is_on(obj) and is_shown:
             bpy.ops.object.modifier_apply(modifier=modifier.name)
         else:
             for armature in armature_modifiers(obj):
