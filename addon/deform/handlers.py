@@ -194,8 +194,7 @@ def check_unannounced() -> float:
     add-on's handler changed behind Sinew's, and a view layer that is shown for the first time."""
     if any(state.evaluation.changed_unannounced for _obj, state in current.pairs):
         session.refresh(bpy.context)
-    # Within the evaluation the shapes are right by themselves.
-    if any(state.plan.after_update for _obj, state in current.pairs):
+    if session.needs_first_evaluations():
         for window in bpy.context.window_manager.windows:
             if session.identity_of_layer(window.scene, window.view_layer) not in current.view_layers:
                 with bpy.context.temp_override(window=window):

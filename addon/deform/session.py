@@ -295,6 +295,18 @@ def identity_of_layer(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tup
     return scene.session_uid, layer.name
 
 
+def needs_first_evaluations() -> bool:
+    """Whether an object is not deformed within Blender's evaluation alone, but by who is told of it."""
+    with contextlib.suppress(ReferenceError):
+        return any(
+            (state := state_of(obj)) is None or state.plan.after_update
+            for obj in current.objects or ()
+            if properties.of(obj).enabled
+        )
+    # Deleted since the objects were listed: an event comes.
+    return False
+
+
 def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     """Found out anew where objects may have come or gone."""
     if current.objects is None or changes.structure or len(bpy.data.objects) != current.object_count:

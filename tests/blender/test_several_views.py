@@ -76,6 +76,38 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
         routes.release()
 
 
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_path, route):
+    obj, armature = scenes.make_arm()
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(1, 0)
+    collection = bpy.data.collections.new("Character")
+    scene = bpy.context.scene
+    scene.collection.children.link(collection)
+    for each in (obj, armature):
+        scene.collection.objects.unlink(each)
+        collection.objects.link(each)
+    bpy.context.view_layer.layer_collection.children["Character"].exclude = True
+    scene.view_layers.new("Second").layer_collection.children["Character"].exclude = False
+    routes.force(route)
+    try:
+        scenes.add_sinew(obj, "lbs")
+        scene.frame_set(9)
+        path = str(tmp_path / "arm.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        obj = bpy.data.objects["Arm"]
+        bpy.context.window.view_layer = bpy.context.scene.view_layers["Second"]
+        bpy.context.view_layer.update()
+        handlers.check_unannounced()
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        assert scenes.worst(shown, expected) <= 1e-5
+    finally:
+        routes.release()
+
+
 def test_an_instanced_collection():
     obj, armature = scenes.make_arm()
     collection = bpy.data.collections.new("Character")
