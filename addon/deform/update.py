@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import attach, point_store, pose_driver, properties, stack
+from ..attach import attach, point_store, pose_driver, properties, stack, upstream_proxy
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..io import armature_io
@@ -48,6 +48,9 @@ def update(
     before = None if skinned is None else skinned.plan
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
+    if plan.uses_builtin and upstream_proxy.is_needed(obj):
+        # In a mode of the modifier. What stands in front is not evaluated apart then.
+        return None
     # First of all, as groups are renamed along with bones.
     bones_changed = skinned is not None and bound.have_bones_changed(
         obj, skinned.bound, depsgraph, None if skinned.plan.state is State.OFF else changes

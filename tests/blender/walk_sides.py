@@ -71,7 +71,7 @@ def shows_own_shape_in_its_mode(obj: bpy.types.Object) -> bool:
     """Whether Sinew leaves the mode that the object is in to the Armature modifiers."""
     if obj.mode != "WEIGHT_PAINT":
         return obj.mode in {"EDIT", "SCULPT"}
-    keyed = {curve.data_path for curve in curves_of(obj)}
+    keyed = animated_paths(obj)
     return any(
         f'modifiers["{modifier.name}"].show_{where}' in keyed
         for modifier in armature_modifiers(obj)
@@ -90,6 +90,13 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     slot = animation.action_slot
     bags = [s.channelbag(slot) for layer in action.layers for s in layer.strips] if slot is not None else []
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+def animated_paths(obj: bpy.types.Object) -> set[str]:
+    """What its curves and drivers set."""
+    animation = obj.animation_data
+    drivers = animation.drivers if animation is not None else ()
+    return {curve.data_path for curve in (*curves_of(obj), *drivers)}
 
 
 def remove_curves(owner: bpy.types.ID, end: str) -> None:
@@ -568,7 +575,7 @@ class SinewSide:
     def apply(self, obj: bpy.types.Object) -> None:
         modifier = self.own_modifier(obj)
         # Sinew's is on whatever an animation makes of the Armature modifiers, and shows what that has.
-        paths = {curve.data_path for curve in curves_of(obj)}
+        paths = animated_paths(obj)
         keyed = [m for m in armature_modifiers(obj) if m.path_from_id("show_viewport") in paths]
         is_shown = modifier is not None and modifier.show_viewport and all(m.show_viewport for m in keyed)
         if self.is_on(obj) and is_shown:
@@ -615,7 +622,8 @@ class SinewSide:
                 continue
             found += [f"modifier {m.name} of {obj.name}" for m in obj.modifiers if "Sinew" in m.name]
             drivers = obj.animation_data.drivers if obj.animation_data is not None else ()
-            found += [f"driver {d.data_path} of {obj.name}" for d in drivers]
+            own = [d for d in drivers if not d.data_path.endswith((".show_viewport", ".show_render"))]
+            found += [f"driver {d.data_path} of {obj.name}" for d in own]
         for mesh in bpy.data.meshes:
             names = mesh.attributes.keys() if mesh.library is None and mesh in used else ()
             found += [f"attribute {name} of {mesh.name}" for name in names if "sinew" in name.lower()]
