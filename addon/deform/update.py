@@ -45,7 +45,7 @@ def update(
         if skinned is None:
             return None
         skinned.needs_apply, inspect = True, False
-    before = None if skinned is None else skinned.plan
+    before, known = (None, None) if skinned is None else (skinned.plan, skinned.bound)
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
     if plan.uses_builtin and upstream_proxy.is_needed(obj):
@@ -57,10 +57,7 @@ def update(
     )
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
-        # What is hidden, or in another scene, stays as it is.
-        is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
-        return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
-    known = None if skinned is None else skinned.bound
+        return _while_waiting(obj, skinned, depsgraph)
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
     plan = _with_data(obj, skinned, plan, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
@@ -83,6 +80,15 @@ def update(
         skinned.shown.frames = None
     skinned.bound.source.known_key_values = skinned.bound.source.key_values
     return skinned
+
+
+def _while_waiting(
+    obj: bpy.types.Object, skinned: SkinnedObject | None, depsgraph: bpy.types.Depsgraph
+) -> SkinnedObject | None:
+    """What is known of an object whose front is not evaluated yet. One that is hidden, or in another scene,
+    stays as it is."""
+    is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
+    return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
 
 
 def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
