@@ -81,9 +81,9 @@ class Source:
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
     """False as long as Blender has not evaluated what stands in front: it was just made, or Sinew was off and
-    nothing needed it; or the Armature modifier deforms, and there is no upstream proxy."""
+    nothing needed it."""
     if properties.of(obj).upstream_proxy is None:
-        return not upstream_proxy.is_needed(obj)
+        return True
     return was_on and upstream_proxy.evaluated_mesh(obj, depsgraph) is not None
 
 
