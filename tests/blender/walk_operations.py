@@ -1161,7 +1161,8 @@ def _set_up(
         modifier.vertex_group, modifier.falloff_type = w.one(r, obj.vertex_groups).name, "SMOOTH"
     elif modifier.type == "HOOK":
         modifier.object, modifier.strength = rig, 0.3
-        modifier.vertex_indices_set(_vertices(w, r, obj))
+        # Assigned vertices are others behind Sinew's modifier (docs/parity.md).
+        modifier.vertex_group = w.one(r, obj.vertex_groups).name
     elif modifier.type == "NODES":
         modifier.node_group = _make_nodes(modifier.name)
 
@@ -1176,7 +1177,7 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     if kind in once and any(m.type == kind for m in w.modifiers(obj)):
         return None
     front |= kind in IN_FRONT
-    if kind in ("HOOK", *IN_FRONT) and obj.override_library is not None:
+    if kind in ("HOOK", *IN_FRONT) and (obj.override_library is not None or not obj.vertex_groups):
         return None
     modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
     if modifier is None:
