@@ -29,16 +29,18 @@ def register() -> None:
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
     from .features.suggest import feature as suggest
-    from .ui import main_panel, operators, precomputing, preferences
+    from .ui import character, main_panel, meshes_panel, operators, precomputing, preferences
 
     # Panels appear in this order.
     for owner in (
-        *(preferences, properties, stored_vertex_data, operators, precomputing, main_panel),
+        *(preferences, properties, stored_vertex_data, character, operators, precomputing),
+        *(main_panel, meshes_panel),
         *(suggest, inbetween, bake, compare, heat, diagnose),
     ):
         _register_classes(owner.CLASSES)
     properties.register()
     stored_vertex_data.register()
+    character.register()
     precomputing.register()
     # Its handlers come first: poses before what they deform.
     inbetween.register()
@@ -61,7 +63,7 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
-        from .ui import precomputing
+        from .ui import character, precomputing
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
@@ -72,6 +74,7 @@ def unregister() -> None:
         handlers.unregister()
         inbetween.unregister()
         precomputing.unregister()
+        character.unregister()
         stored_vertex_data.unregister()
         properties.unregister()
     while _registered:

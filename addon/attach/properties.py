@@ -161,6 +161,12 @@ class SinewSettings(bpy.types.PropertyGroup):
         update=_enabled_changed,
         override=OVERRIDABLE,
     )
+    is_own: bpy.props.BoolProperty(
+        name="Own Settings",
+        description="This mesh keeps settings of its own: what is set for the character does not change it",
+        options=set(),
+        override=OVERRIDABLE,
+    )
     heat: bpy.props.BoolProperty(
         name="Heat Map",
         description="Show a measure of the deformation as colours of the mesh",

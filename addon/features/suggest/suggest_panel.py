@@ -7,11 +7,10 @@ from collections.abc import Iterator
 
 import bpy
 
-from ...attach import attach, properties
+from ...attach import properties
 from ...core.suggestion import CRITERIA, Criterion, Worst
-from ...deform import session
 from ...io import units
-from ...ui import operators, stepped
+from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from . import suggest
@@ -49,9 +48,7 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
         if self.method not in properties.METHODS:
             self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
             return {"CANCELLED"}
-        with session.changing(context):
-            for obj in sinew_targets(context):
-                attach.use_one_method(obj, self.method)
+        character.set_method(context, self.method)
         return {"FINISHED"}
 
 
