@@ -29,18 +29,31 @@ def register() -> None:
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
     from .features.suggest import feature as suggest
-    from .ui import character, main_panel, meshes_panel, operators, precomputing, preferences
+    from .ui import (
+        character,
+        character_operators,
+        main_panel,
+        manual,
+        menus,
+        meshes_panel,
+        operators,
+        precomputing,
+        preferences,
+        presets,
+    )
 
     # Panels appear in this order.
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
-        *(main_panel, meshes_panel),
+        *(character_operators, presets, menus, main_panel, meshes_panel),
         *(suggest, inbetween, bake, compare, heat, diagnose),
     ):
         _register_classes(owner.CLASSES)
     properties.register()
     stored_vertex_data.register()
     character.register()
+    menus.register()
+    manual.register()
     precomputing.register()
     # Its handlers come first: poses before what they deform.
     inbetween.register()
@@ -63,7 +76,7 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
-        from .ui import character, precomputing
+        from .ui import character, manual, menus, precomputing
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
@@ -73,6 +86,8 @@ def unregister() -> None:
         exporters.unregister()
         handlers.unregister()
         inbetween.unregister()
+        manual.unregister()
+        menus.unregister()
         precomputing.unregister()
         character.unregister()
         stored_vertex_data.unregister()

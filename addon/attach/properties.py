@@ -297,7 +297,7 @@ class SinewSettings(bpy.types.PropertyGroup):
 # One group of settings for each stage, and for each method that has parameters, by its name.
 SinewSettings.__annotations__.update(
     {
-        name: bpy.props.PointerProperty(type=group, override=OVERRIDABLE)
+        name: bpy.props.PointerProperty(type=group, description=group.__doc__, override=OVERRIDABLE)
         for name, group in (*STAGE_GROUPS.items(), *METHOD_GROUPS.items())
     }
 )

@@ -155,7 +155,10 @@ SinewCharacter.__annotations__.update(
             options={"HIDDEN"},
         ),
         "chosen": bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}),
-        **{name: bpy.props.PointerProperty(type=cls) for name, cls in _GROUP_CLASSES.items()},
+        **{
+            name: bpy.props.PointerProperty(type=cls, description=GROUPS[name].__doc__)
+            for name, cls in _GROUP_CLASSES.items()
+        },
     }
 )
 

@@ -8,12 +8,17 @@ import bpy
 from ..attach import attach, properties, stage_settings
 from ..deform import session
 from . import character, operators, precomputing, state_text
+from .presets import SINEW_PT_method_presets
 from .settings_layout import draw_method, draw_stages
 from .sidebar import Sidebar, draw_text, names_text
 
 
 class SINEW_PT_main(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        if operators.sinew_targets(context):
+            SINEW_PT_method_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -5,38 +5,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import properties, shared_settings
+from ..attach import properties
 from ..deform import session
 from . import character, operators, state_text
 from .settings_layout import draw_method, draw_stages
 from .sidebar import Sidebar, characters, draw_text, shortened
 
 MOST_ROWS = 6
-
-
-class SINEW_OT_own_settings(operators.OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.own_settings"
-    bl_label = "Own Settings"
-    bl_description = (
-        "Let this mesh differ: it keeps settings of its own, which can have keys, and the character's do not "
-        "change it. Once more: it follows the character again"
-    )
-    bl_options = {"REGISTER", "UNDO"}
-
-    name: bpy.props.StringProperty(name="Mesh", options={"HIDDEN", "SKIP_SAVE"})
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = next((o for o in operators.sinew_targets(context) if o.name == self.name), None)
-        if obj is None:
-            self.report({"ERROR"}, f"{self.name!r} is no mesh of this character that has Sinew")
-            return {"CANCELLED"}
-        settings = properties.of(obj)
-        settings.is_own = not settings.is_own
-        others = [other for other in character.followers(context) if other != obj]
-        if not settings.is_own and others:
-            with session.changing(context):
-                shared_settings.share(others[0], obj)
-        return {"FINISHED"}
 
 
 class SINEW_UL_meshes(bpy.types.UIList):
@@ -150,4 +125,4 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         split.label(text=value)
 
 
-CLASSES = (SINEW_OT_own_settings, SINEW_UL_meshes, SINEW_PT_meshes)
+CLASSES = (SINEW_UL_meshes, SINEW_PT_meshes)

@@ -71,10 +71,13 @@ def draw_character(
     for obj in meshes:
         if properties.of(obj).error:
             draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
-    by_builtin = [obj.name for obj in meshes if properties.of(obj).enabled and uses_builtin(obj)]
-    if by_builtin:
-        text = f"{names_text(by_builtin)}: by the Armature modifier, see Meshes"
-        draw_text(layout, context, text, icon="INFO")
+    by_reason: dict[str, list[str]] = {}
+    for obj in meshes:
+        if properties.of(obj).enabled and uses_builtin(obj):
+            by_reason.setdefault(reason_of(obj), []).append(obj.name)
+    for reason, names in by_reason.items():
+        who = f"All {len(meshes)} meshes" if len(names) == len(meshes) else names_text(names, most=2)
+        draw_text(layout, context, f"{who}: {reason}", icon="INFO")
     warned = [obj.name for obj in meshes if not properties.of(obj).error and problems_of(obj)]
     if warned:
         draw_text(layout, context, f"{names_text(warned)}: warnings, see Meshes", icon="ERROR")

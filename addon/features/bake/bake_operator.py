@@ -26,6 +26,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
 
     kind: bpy.props.EnumProperty(
         name="To",
+        description="What plays the shapes: a modifier or shape keys of this file, or another program",
         items=[
             ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
             ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),

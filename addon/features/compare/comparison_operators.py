@@ -56,6 +56,7 @@ class SINEW_OT_compare(bpy.types.Operator):
 
     methods: bpy.props.EnumProperty(
         name="Methods",
+        description="Show a copy of the character under each of these",
         items=[
             *((m.name, m.label, m.description) for m in properties.METHODS.values()),
             (

@@ -54,7 +54,7 @@ class SINEW_OT_check_frames(_OnDeformed, stepped.Stepped, bpy.types.Operator):
     )
     bl_options = {"REGISTER"}
 
-    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="ACTION")
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="ACTION")
     saying = "Sinew checks poses"
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
@@ -75,7 +75,7 @@ class SINEW_OT_select_finding(bpy.types.Operator):
     bl_idname = "sinew.select_finding"
     bl_label = "Select"
     bl_description = "Enter edit mode with exactly these vertices selected; hidden ones are shown"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     object: bpy.props.StringProperty(options={"HIDDEN"})
     finding: bpy.props.StringProperty(options={"HIDDEN"})

@@ -10,7 +10,7 @@ import bpy
 from ...attach import properties
 from ...core.suggestion import CRITERIA, Criterion, Worst
 from ...io import units
-from ...ui import character, operators, stepped
+from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from . import suggest
@@ -26,29 +26,13 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     bl_options = {"REGISTER"}
     saying = "Sinew measures every method"
 
-    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         return suggest.scan(context.scene, sinew_targets(context), self.over)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         self.report({"INFO"}, suggest.suggestions[context.scene.session_uid].text)
-        return {"FINISHED"}
-
-
-class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.use_method"
-    bl_label = "Use Method"
-    bl_description = "Deform the selected meshes by this method"
-    bl_options = {"REGISTER", "UNDO"}
-
-    method: bpy.props.StringProperty(name="Method")
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if self.method not in properties.METHODS:
-            self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
-            return {"CANCELLED"}
-        character.set_method(context, self.method)
         return {"FINISHED"}
 
 
@@ -94,4 +78,4 @@ def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None
     return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")
 
 
-CLASSES = (SINEW_OT_suggest, SINEW_OT_use_method, SINEW_PT_suggest)
+CLASSES = (SINEW_OT_suggest, SINEW_PT_suggest)

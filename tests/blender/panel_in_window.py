@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In Blender's window, with Sinew's zip: a character of five meshes by clicks and keys. Prints "FACTS" and a line
+of JSON; pictures of each step lie in the folder.
+
+    blender --factory-startup --enable-event-simulate --python panel_in_window.py -- sinew.zip FOLDER
+
+The window has 1280 x 800 pixels. Places are those of its picture: from the left, from the top.
+"""  # noqa: E501
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import five_meshes
+import window
+
+ZIP, FOLDER = window.arguments()
+HEIGHT = 800
+VIEW = (400, 500)
+# In the sidebar.
+ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
+# In the menu of methods.
+DUAL_QUATERNION = (483, 276)
+facts: dict[str, object] = {}
+
+
+def main_window() -> bpy.types.Window:
+    return bpy.context.window_manager.windows[0]
+
+
+def move(place: tuple[int, int]) -> None:
+    main_window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=place[0], y=HEIGHT - place[1])
+
+
+def press(key: str, place: tuple[int, int] = VIEW, text: str = "", **held: bool) -> None:
+    """text  what the key types"""
+    move(place)
+    at = {"x": place[0], "y": HEIGHT - place[1]}
+    typed = {"unicode": text} if text else {}
+    main_window().event_simulate(type=key, value="PRESS", **at, **typed, **held)
+    main_window().event_simulate(type=key, value="RELEASE", **at, **held)
+
+
+def click(place: tuple[int, int]) -> Iterator[None]:
+    move(place)
+    yield
+    press("LEFTMOUSE", place)
+    yield
+    yield
+
+
+def meshes() -> list[bpy.types.Object]:
+    return [bpy.data.objects[name] for name in five_meshes.MESHES]
+
+
+def methods() -> list[str]:
+    return [obj.sinew.method if obj.sinew.stand_ins else "" for obj in meshes()]
+
+
+def scene() -> bpy.types.Scene:
+    return main_window().scene
+
+
+def search(text: str) -> Iterator[None]:
+    """F3, as without Developer Extras."""
+    press("F3")
+    yield
+    yield
+    for letter in text:
+        key = "SPACE" if letter == " " else letter.upper()
+        press(key, text=letter)
+        yield
+    yield
+    window.photograph(FOLDER / f"search-{text.replace(' ', '-')}.png")
+    press("RET")
+    yield
+    yield
+
+
+def start() -> Iterator[None]:
+    window.install(ZIP)
+    bpy.context.preferences.view.show_developer_ui = False
+    bpy.context.preferences.filepaths.temporary_directory = str(FOLDER)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    five_meshes.make(vertices=1200)
+    scene().frame_set(12)
+    window.open_sidebar()
+    yield
+    yield
+    window.choose_tab()
+    bpy.ops.ed.undo_push(message="made")
+    yield
+    yield
+
+
+def one_click_for_a_method() -> Iterator[None]:
+    window.photograph(FOLDER / "before.png")
+    yield from click(ADD)
+    facts["added"] = methods()
+    window.photograph(FOLDER / "added.png")
+    yield from click(METHOD)
+    window.photograph(FOLDER / "methods.png")
+    yield from click(DUAL_QUATERNION)
+    facts["chosen"] = methods()
+    yield from click(SWITCH)
+    facts["switched off"] = [obj.sinew.enabled for obj in meshes()]
+    press("Z", ctrl=True)
+    yield
+    yield
+    facts["on again"] = [obj.sinew.enabled for obj in meshes()]
+    press("Z", ctrl=True)
+    yield
+    yield
+    facts["chosen undone"] = methods()
+    press("Z", ctrl=True)
+    yield
+    yield
+    facts["added undone"] = methods()
+
+
+def by_search_and_keys() -> Iterator[None]:
+    yield from search("add sinew")
+    facts["added by search"] = methods()
+    yield from search("switch on off")
+    facts["switched by search"] = [obj.sinew.enabled for obj in meshes()]
+    yield from search("switch on off")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.compare("EXEC_DEFAULT", methods={"lbs", "dq"})
+    yield
+    yield
+    press("F", alt=True, shift=True)
+    yield
+    yield
+    facts["flipped"] = [scene().sinew_comparison.arrangement, scene().sinew_comparison.shows_second]
+    yield from search("flip comparison")
+    facts["flipped by search"] = scene().sinew_comparison.shows_second
+    press("Y", alt=True, shift=True)
+    yield
+    yield
+    yield
+    window.photograph(FOLDER / "pie.png")
+    press("ESC")
+    yield
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
+    yield
+
+
+def menus() -> Iterator[None]:
+    with window.in_view3d("WINDOW"):
+        bpy.ops.wm.call_menu(name="SINEW_MT_menu")
+    yield
+    yield
+    window.photograph(FOLDER / "menu.png")
+    press("ESC")
+    yield
+    press("ESC")
+    yield
+
+
+def shortcuts() -> list[str]:
+    keyconfigs = bpy.context.window_manager.keyconfigs
+    items = [item for keymap in keyconfigs.addon.keymaps for item in keymap.keymap_items]
+    names = [f"{item.idname} {getattr(item.properties, 'name', '')}" for item in items]
+    return sorted(name for name in names if "sinew" in name.lower())
+
+
+def goes_without_a_trace() -> Iterator[None]:
+    facts["shortcuts"] = shortcuts()
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.ops.preferences.addon_show(module="bl_ext.user_default.sinew")
+    yield
+    yield
+    yield
+    window.photograph(FOLDER / "preferences.png")
+    bpy.ops.preferences.addon_disable(module="bl_ext.user_default.sinew")
+    facts["shortcuts afterwards"] = shortcuts()
+    functions = bpy.types.VIEW3D_MT_object.draw._draw_funcs
+    facts["menus afterwards"] = [each.__module__ for each in functions if "sinew" in each.__module__]
+    yield
+    yield
+
+
+def steps() -> Iterator[None]:
+    yield from start()
+    yield from one_click_for_a_method()
+    yield from by_search_and_keys()
+    yield from menus()
+    yield from goes_without_a_trace()
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+window.run(steps(), 0.15)
