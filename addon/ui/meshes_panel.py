@@ -122,7 +122,7 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     for name, value in rows:
         split = column.split(factor=0.4)
         split.label(text=name)
-        split.label(text=value)
+        split.label(text=shortened(value))
 
 
 CLASSES = (SINEW_UL_meshes, SINEW_PT_meshes)

@@ -55,6 +55,11 @@ def sinew_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in targets(context) if properties.has_sinew(obj)]
 
 
+def are_any_on(context: bpy.types.Context) -> bool:
+    """Whether Sinew is on for any mesh: else panels are grey whose numbers are its own."""
+    return any(properties.of(obj).enabled for obj in sinew_targets(context))
+
+
 def waits_for_render() -> str:
     """What a button has to wait for, as its thread reads what the button would change; else empty."""
     return "Wait for the end of the render" if is_rendering_in_window() else ""
@@ -128,7 +133,7 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
         items=[
             (
                 AS_BEFORE,
-                "As the Armature Modifier Is Set",
+                "As the Armature modifier is set",
                 "Each mesh keeps its shape; one that joins others has their settings",
                 0,
             ),

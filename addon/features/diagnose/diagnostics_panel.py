@@ -11,7 +11,7 @@ from ...attach import attach, stack
 from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...ui import operators, stepped
-from ...ui.sidebar import Sidebar, draw_text
+from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
 from . import diagnose
 
 NAMES_SHOWN = 5
@@ -117,7 +117,7 @@ class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
 def _draw_check(
     layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, found: diagnose.Check
 ) -> None:
-    layout.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    layout.label(text=shortened(obj.name, characters(context) - 4), icon="OUTLINER_OB_MESH")
     if found.stale:
         text = "Weights, groups or bones have changed since: press Check again"
         draw_text(layout, context, text, icon="FILE_REFRESH", alert=True)
@@ -140,9 +140,7 @@ def _draw_finding(
 ) -> None:
     draw_text(layout, context, f"{finding.title}: {finding.count:,}", icon="ERROR")
     if finding.groups:
-        more = len(finding.groups) - NAMES_SHOWN
-        names = ", ".join(finding.groups[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")
-        draw_text(layout, context, names)
+        draw_text(layout, context, names_text(finding.groups, NAMES_SHOWN))
     draw_text(layout, context, finding.advice)
     if len(finding.vertices):
         text = f"Select {_vertices(len(finding.vertices)).title()}"

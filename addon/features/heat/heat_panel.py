@@ -26,6 +26,7 @@ class SINEW_PT_measures(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, measures.of(context.scene)
+        layout.active = operators.are_any_on(context)
         shown = any(properties.of(obj).heat for obj in operators.sinew_targets(context))
         layout.operator("sinew.heat_map", icon="SHADING_RENDERED", depress=shown)
         layout.prop(settings, "quantity", text="")

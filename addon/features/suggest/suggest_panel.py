@@ -46,6 +46,7 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
+        layout.active = operators.are_any_on(context)
         layout.operator_menu_enum("sinew.suggest", "over", text="Measure All Methods", icon="VIEWZOOM")
         suggestion = suggest.suggestions.get(context.scene.session_uid)
         if suggestion is None:
