@@ -25,6 +25,7 @@ _SECTIONS = {
     "bpy.ops.sinew.go_to_frame*": "heat-map",
     "bpy.ops.sinew.check*": "diagnostics",
     "bpy.ops.sinew.*finding*": "diagnostics",
+    "bpy.ops.sinew.mend*": "diagnostics",
     "bpy.ops.sinew.*precomput*": "method",
     "bpy.ops.sinew.*": "character",
     "bpy.types.object.sinew_inbetween*": "in-betweens",

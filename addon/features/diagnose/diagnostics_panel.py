@@ -12,7 +12,7 @@ from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
-from . import diagnose
+from . import diagnose, mending
 
 NAMES_SHOWN = 5
 
@@ -94,6 +94,49 @@ class SINEW_OT_select_finding(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SINEW_OT_mend(bpy.types.Operator):
+    bl_idname = "sinew.mend"
+    bl_label = "Mend"
+    bl_description = (
+        "Mend this fault, on exactly these vertices, and check again. Locked groups stay as they are"
+    )
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    object: bpy.props.StringProperty(options={"HIDDEN"})
+    finding: bpy.props.StringProperty(options={"HIDDEN"})
+    how: bpy.props.EnumProperty(
+        name="How",
+        description="What to do",
+        items=[(each.name, each.label, each.description) for each in mending.ALL.values()],
+        options={"HIDDEN"},
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, given: bpy.types.OperatorProperties) -> str:
+        return f"{mending.ALL[given.how].description}; then check again. Locked groups stay as they are"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, manager = context.scene, context.window_manager
+        obj = scene.objects.get(self.object)
+        if obj is None:
+            self.report({"ERROR"}, f"{self.object} is not in this scene any more; press Check again")
+            return {"CANCELLED"}
+        most = scene.sinew_most_influences
+        manager.progress_begin(0.0, 1.0)
+        try:
+            done = mending.mend(obj, self.finding, self.how, most)
+            for share in diagnose.check_again(scene, obj, most):
+                manager.progress_update(share)
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        finally:
+            manager.progress_end()
+        left = next((each.count for each in diagnose.of(obj).findings if each.name == self.finding), 0)
+        self.report({"INFO"}, f"Mended {done}. Checked again: {left:,} left")
+        return {"FINISHED"}
+
+
 class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
     bl_label = "Diagnostics"
     bl_options = {"DEFAULT_CLOSED"}
@@ -108,10 +151,14 @@ class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("sinew.check", icon="CHECKMARK")
         row.operator_menu_enum("sinew.check_frames", "over", text="Over Frames")
-        for obj in _checkable(context):
-            found = diagnose.of(obj)
-            if found is not None:
+        checks = [(obj, diagnose.of(obj)) for obj in _checkable(context)]
+        known = [(obj, found) for obj, found in checks if found is not None]
+        clean = [obj.name for obj, found in known if not (found.findings or found.stale)]
+        for obj, found in known:
+            if len(known) == 1 or obj.name not in clean:
                 _draw_check(layout.box(), context, obj, found)
+        if clean and len(known) > 1:
+            draw_text(layout, context, f"Nothing found: {names_text(clean)}", icon="CHECKMARK")
 
 
 def _draw_check(
@@ -146,6 +193,10 @@ def _draw_finding(
         text = f"Select {_vertices(len(finding.vertices)).title()}"
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
         button.object, button.finding = obj.name, finding.name
+    row = layout.row(align=True)
+    for each in mending.MENDS.get(finding.name, ()):
+        button = row.operator("sinew.mend", text=each.label)
+        button.object, button.finding, button.how = obj.name, finding.name, each.name
     layout.separator(factor=0.5)
 
 
@@ -153,4 +204,10 @@ def _vertices(count: int) -> str:
     return f"{count:,} vert{'ices' if count != 1 else 'ex'}"
 
 
-CLASSES = (SINEW_OT_check, SINEW_OT_check_frames, SINEW_OT_select_finding, SINEW_PT_diagnostics)
+CLASSES = (
+    SINEW_OT_check,
+    SINEW_OT_check_frames,
+    SINEW_OT_select_finding,
+    SINEW_OT_mend,
+    SINEW_PT_diagnostics,
+)
