@@ -36,6 +36,7 @@ def register() -> None:
         manual,
         menus,
         meshes_panel,
+        modifier_panel,
         operators,
         precomputing,
         preferences,
@@ -54,6 +55,7 @@ def register() -> None:
     character.register()
     menus.register()
     manual.register()
+    modifier_panel.register()
     precomputing.register()
     # Its handlers come first: poses before what they deform.
     inbetween.register()
@@ -76,7 +78,7 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
-        from .ui import character, manual, menus, precomputing
+        from .ui import character, manual, menus, modifier_panel, precomputing
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
@@ -86,6 +88,7 @@ def unregister() -> None:
         exporters.unregister()
         handlers.unregister()
         inbetween.unregister()
+        modifier_panel.unregister()
         manual.unregister()
         menus.unregister()
         precomputing.unregister()

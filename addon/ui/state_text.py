@@ -28,6 +28,21 @@ def reason_of(obj: bpy.types.Object) -> str:
     return plan(facts).reason or (state.plan.reason if state is not None else "")
 
 
+def sentence_of(obj: bpy.types.Object) -> str:
+    """What is at work: who deforms the mesh, by which method, and why if not as usual."""
+    settings, state = properties.of(obj), session.state_of(obj)
+    replaced = names_text([each.name for each in settings.replaced_modifiers])
+    if settings.error:
+        return settings.error
+    if not settings.enabled:
+        return f"Off: {replaced} deforms it"
+    reason, method = reason_of(obj), properties.method_label(settings.method)
+    if state is None or uses_builtin(obj) or state.plan.state is State.WAITING:
+        return f"{method}. {reason or f'{replaced} deforms it until the next frame'}"
+    text = f"{method} in the place of {replaced}"
+    return f"{text}, after Blender's evaluation: {reason}" if reason else text
+
+
 def icon_of(obj: bpy.types.Object) -> str:
     settings, state = properties.of(obj), session.state_of(obj)
     if settings.error or (settings.enabled and problems_of(obj)):

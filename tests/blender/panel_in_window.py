@@ -164,6 +164,23 @@ def menus() -> Iterator[None]:
     yield
 
 
+def modifiers() -> Iterator[None]:
+    """What stands above the stack, and its button, while the sidebar is closed."""
+    area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
+    area.spaces[0].context = "MODIFIER"
+    view = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
+    view.spaces[0].show_region_ui = False
+    yield
+    yield
+    window.photograph(FOLDER / "modifiers.png")
+    with bpy.context.temp_override(window=main_window(), area=area, region=area.regions[-1]):
+        bpy.ops.sinew.open_tab("INVOKE_DEFAULT")
+    for _tick in range(4):
+        yield
+    region = next(region for region in view.regions if region.type == "UI")
+    facts["tab"] = [view.spaces[0].show_region_ui, region.active_panel_category]
+
+
 def shortcuts() -> list[str]:
     keyconfigs = bpy.context.window_manager.keyconfigs
     items = [item for keymap in keyconfigs.addon.keymaps for item in keymap.keymap_items]
@@ -181,7 +198,7 @@ def goes_without_a_trace() -> Iterator[None]:
     window.photograph(FOLDER / "preferences.png")
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.sinew")
     facts["shortcuts afterwards"] = shortcuts()
-    functions = bpy.types.VIEW3D_MT_object.draw._draw_funcs
+    functions = [*bpy.types.VIEW3D_MT_object.draw._draw_funcs, *bpy.types.DATA_PT_modifiers.draw._draw_funcs]
     facts["menus afterwards"] = [each.__module__ for each in functions if "sinew" in each.__module__]
     yield
     yield
@@ -192,6 +209,7 @@ def steps() -> Iterator[None]:
     yield from one_click_for_a_method()
     yield from by_search_and_keys()
     yield from menus()
+    yield from modifiers()
     yield from goes_without_a_trace()
     print("FACTS " + json.dumps(facts), flush=True)
 

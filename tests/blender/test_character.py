@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.ui import character, operators
+from sinew_addon.deform import small_meshes
+from sinew_addon.ui import character, operators, state_text
 from sinew_addon.ui.sidebar import names_text, shortened
 
 
@@ -169,6 +170,27 @@ def test_undo_is_one_step(armature):
     assert methods() == ["dq"] * 5
     bpy.ops.ed.undo()
     assert not any(properties.has_sinew(obj) for obj in meshes())
+
+
+def test_what_is_at_work_is_said_above_the_modifiers(armature, monkeypatch):
+    monkeypatch.setattr(small_meshes, "is_used", True)
+    body = bpy.data.objects["Body"]
+    bpy.ops.sinew.add()
+    assert "same shape in less time" in state_text.sentence_of(body)
+    shared().method = "dq"
+    assert state_text.sentence_of(body) == "Dual Quaternion in the place of Armature"
+    bpy.ops.sinew.heat_map()
+    assert state_text.sentence_of(body).startswith(
+        "Dual Quaternion in the place of Armature, after Blender's"
+    )
+    bpy.ops.sinew.heat_map()
+    shared().enabled = False
+    assert state_text.sentence_of(body) == "Off: Armature deforms it"
+    shared().enabled = True
+    body.modifiers["Armature"].object = None
+    properties.of(body).error = "Body: no armature"
+    assert state_text.sentence_of(body) == "Body: no armature"
+    assert state_text.icon_of(body) == "ERROR"
 
 
 def test_long_names_lose_their_middle():

@@ -78,5 +78,9 @@ def test_shortcuts_and_menus_go_with_the_add_on(facts):
     assert facts["menus afterwards"] == []
 
 
+def test_the_button_above_the_modifiers_opens_the_tab(facts):
+    assert facts["tab"] == [True, "Sinew"]
+
+
 def test_panels_print_no_errors(facts):
     assert facts["printed"] == []

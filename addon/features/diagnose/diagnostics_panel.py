@@ -164,7 +164,7 @@ class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
 def _draw_check(
     layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, found: diagnose.Check
 ) -> None:
-    layout.label(text=shortened(obj.name, characters(context) - 4), icon="OUTLINER_OB_MESH")
+    layout.label(text=shortened(obj.name, characters(context) - 8), icon="OUTLINER_OB_MESH")
     if found.stale:
         text = "Weights, groups or bones have changed since: press Check again"
         draw_text(layout, context, text, icon="FILE_REFRESH", alert=True)

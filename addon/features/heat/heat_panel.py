@@ -19,6 +19,7 @@ _WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of 
 
 class SINEW_PT_measures(Sidebar, bpy.types.Panel):
     bl_label = "Heat Map"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
