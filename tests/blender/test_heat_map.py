@@ -360,7 +360,7 @@ def test_a_duplicate_has_colours_of_its_own():
 
 
 def test_a_render_shows_it(tmp_path):
-    """Cycles, seen from beside the tube: most of it violet to yellow, nothing of the red material."""
+    """Cycles, seen from beside the tube: most of it neutral, nothing of the red material."""
     obj, _armature = scenes.make_arm()
     red = bpy.data.materials.new("Red")
     if bpy.app.version < (5, 0):
