@@ -19,6 +19,8 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 import five_meshes
 import window
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 ZIP, FOLDER = window.arguments()
 HEIGHT = 800
@@ -27,6 +29,8 @@ VIEW = (400, 500)
 ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
 # In the menu of methods.
 DUAL_QUATERNION = (483, 276)
+# In the dialog of a comparison, which opens at this place.
+DIALOG, QUATERNION_VECTOR, LOG_MATRIX = (400, 400), (171, 534), (171, 577)
 facts: dict[str, object] = {}
 
 
@@ -152,6 +156,50 @@ def by_search_and_keys() -> Iterator[None]:
     yield
 
 
+def copies_in_view() -> bool:
+    """Whether the view shows the corners of all copies, beside the sidebar."""
+    area = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    depsgraph = main_window().view_layer.depsgraph
+    copies = [obj for obj in bpy.data.objects if obj.is_property_set("sinew") and obj.sinew.copied_for]
+    for copy in copies:
+        evaluated = copy.evaluated_get(depsgraph)
+        for corner in evaluated.bound_box:
+            point = evaluated.matrix_world @ Vector(corner)
+            place = location_3d_to_region_2d(region, area.spaces[0].region_3d, point)
+            if place is None or not (0 <= place.x <= sidebar.x - region.x and 0 <= place.y <= region.height):
+                return False
+    return bool(copies)
+
+
+def comparison_by_clicks() -> Iterator[None]:
+    with window.in_view3d("WINDOW"):
+        bpy.ops.view3d.view_selected()
+    move(DIALOG)
+    yield
+    yield
+    with window.in_view3d():
+        bpy.ops.sinew.compare("INVOKE_DEFAULT")
+    yield
+    yield
+    yield from click(QUATERNION_VECTOR)
+    yield from click(LOG_MATRIX)
+    window.photograph(FOLDER / "compare.png")
+    press("RET", LOG_MATRIX)
+    for _tick in range(4):
+        yield
+    state = scene().sinew_comparison
+    facts["compared"] = sorted({obj.sinew.copied_for for obj in state.collection.objects})
+    facts["copies in view"] = copies_in_view()
+    window.photograph(FOLDER / "compared.png")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
+        bpy.ops.view3d.view_all()
+    yield
+    yield
+
+
 def menus() -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")
@@ -208,6 +256,7 @@ def steps() -> Iterator[None]:
     yield from start()
     yield from one_click_for_a_method()
     yield from by_search_and_keys()
+    yield from comparison_by_clicks()
     yield from menus()
     yield from modifiers()
     yield from goes_without_a_trace()

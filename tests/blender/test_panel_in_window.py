@@ -78,6 +78,12 @@ def test_shortcuts_and_menus_go_with_the_add_on(facts):
     assert facts["menus afterwards"] == []
 
 
+def test_plain_clicks_choose_what_is_compared_and_the_view_shows_it(facts):
+    """Linear blend, dual and vector quaternions were chosen; a click takes one away, another adds one."""
+    assert facts["compared"] == ["dq", "lbs", "log"]
+    assert facts["copies in view"] is True
+
+
 def test_the_button_above_the_modifiers_opens_the_tab(facts):
     assert facts["tab"] == [True, "Sinew"]
 
