@@ -23,7 +23,6 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 ZIP, FOLDER = window.arguments()
-HEIGHT = 800
 VIEW = (400, 500)
 # In the sidebar.
 ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
@@ -36,27 +35,6 @@ facts: dict[str, object] = {}
 
 def main_window() -> bpy.types.Window:
     return bpy.context.window_manager.windows[0]
-
-
-def move(place: tuple[int, int]) -> None:
-    main_window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=place[0], y=HEIGHT - place[1])
-
-
-def press(key: str, place: tuple[int, int] = VIEW, text: str = "", **held: bool) -> None:
-    """text  what the key types"""
-    move(place)
-    at = {"x": place[0], "y": HEIGHT - place[1]}
-    typed = {"unicode": text} if text else {}
-    main_window().event_simulate(type=key, value="PRESS", **at, **typed, **held)
-    main_window().event_simulate(type=key, value="RELEASE", **at, **held)
-
-
-def click(place: tuple[int, int]) -> Iterator[None]:
-    move(place)
-    yield
-    press("LEFTMOUSE", place)
-    yield
-    yield
 
 
 def meshes() -> list[bpy.types.Object]:
@@ -73,16 +51,16 @@ def scene() -> bpy.types.Scene:
 
 def search(text: str) -> Iterator[None]:
     """F3, as without Developer Extras."""
-    press("F3")
+    window.press("F3", VIEW)
     yield
     yield
     for letter in text:
         key = "SPACE" if letter == " " else letter.upper()
-        press(key, text=letter)
+        window.press(key, VIEW, text=letter)
         yield
     yield
     window.photograph(FOLDER / f"search-{text.replace(' ', '-')}.png")
-    press("RET")
+    window.press("RET", VIEW)
     yield
     yield
 
@@ -105,24 +83,24 @@ def start() -> Iterator[None]:
 
 def one_click_for_a_method() -> Iterator[None]:
     window.photograph(FOLDER / "before.png")
-    yield from click(ADD)
+    yield from window.click(ADD)
     facts["added"] = methods()
     window.photograph(FOLDER / "added.png")
-    yield from click(METHOD)
+    yield from window.click(METHOD)
     window.photograph(FOLDER / "methods.png")
-    yield from click(DUAL_QUATERNION)
+    yield from window.click(DUAL_QUATERNION)
     facts["chosen"] = methods()
-    yield from click(SWITCH)
+    yield from window.click(SWITCH)
     facts["switched off"] = [obj.sinew.enabled for obj in meshes()]
-    press("Z", ctrl=True)
+    window.press("Z", VIEW, ctrl=True)
     yield
     yield
     facts["on again"] = [obj.sinew.enabled for obj in meshes()]
-    press("Z", ctrl=True)
+    window.press("Z", VIEW, ctrl=True)
     yield
     yield
     facts["chosen undone"] = methods()
-    press("Z", ctrl=True)
+    window.press("Z", VIEW, ctrl=True)
     yield
     yield
     facts["added undone"] = methods()
@@ -138,18 +116,18 @@ def by_search_and_keys() -> Iterator[None]:
         bpy.ops.sinew.compare("EXEC_DEFAULT", methods={"lbs", "dq"})
     yield
     yield
-    press("F", alt=True, shift=True)
+    window.press("F", VIEW, alt=True, shift=True)
     yield
     yield
     facts["flipped"] = [scene().sinew_comparison.arrangement, scene().sinew_comparison.shows_second]
     yield from search("flip comparison")
     facts["flipped by search"] = scene().sinew_comparison.shows_second
-    press("Y", alt=True, shift=True)
+    window.press("Y", VIEW, alt=True, shift=True)
     yield
     yield
     yield
     window.photograph(FOLDER / "pie.png")
-    press("ESC")
+    window.press("ESC", VIEW)
     yield
     with window.in_view3d("WINDOW"):
         bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
@@ -176,17 +154,17 @@ def copies_in_view() -> bool:
 def comparison_by_clicks() -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.view_selected()
-    move(DIALOG)
+    window.move(DIALOG)
     yield
     yield
     with window.in_view3d():
         bpy.ops.sinew.compare("INVOKE_DEFAULT")
     yield
     yield
-    yield from click(QUATERNION_VECTOR)
-    yield from click(LOG_MATRIX)
+    yield from window.click(QUATERNION_VECTOR)
+    yield from window.click(LOG_MATRIX)
     window.photograph(FOLDER / "compare.png")
-    press("RET", LOG_MATRIX)
+    window.press("RET", LOG_MATRIX)
     for _tick in range(4):
         yield
     state = scene().sinew_comparison
@@ -206,9 +184,9 @@ def menus() -> Iterator[None]:
     yield
     yield
     window.photograph(FOLDER / "menu.png")
-    press("ESC")
+    window.press("ESC", VIEW)
     yield
-    press("ESC")
+    window.press("ESC", VIEW)
     yield
 
 
