@@ -209,7 +209,11 @@ def render() -> None:
     scene.display.shading.light = "STUDIO"
     scene.render.resolution_x, scene.render.resolution_y = 1280, 720
     scene.render.resolution_percentage = 100
+    scene.render.film_transparent = False
+    scene.display.shading.background_type = "VIEWPORT"
+    scene.display.shading.background_color = (0.05, 0.05, 0.05)
     scene.render.image_settings.file_format = "WEBP"
+    scene.render.image_settings.color_mode = "RGB"
     scene.render.image_settings.quality = 80
     scene.render.filepath = str(FOLDER / "tour-10-render.webp")
     bpy.ops.render.render(write_still=True)

@@ -9,8 +9,6 @@ mesh's own settings.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -32,8 +30,7 @@ def followers(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 def lead(context: bpy.types.Context) -> bpy.types.Object | None:
     """The mesh whose values are shown: the active one, else the first that follows; else the first."""
-    meshes = operators.sinew_targets(context)
-    return min(meshes, key=lambda obj: properties.of(obj).is_own, default=None)
+    return min(known_meshes(context), key=lambda obj: properties.of(obj).is_own, default=None)
 
 
 def set_method(context: bpy.types.Context, method: str) -> None:
@@ -43,25 +40,34 @@ def set_method(context: bpy.types.Context, method: str) -> None:
             attach.use_one_method(obj, method)
 
 
-class _Drawn:
-    """The name of the lead while a panel draws: to find it takes longer than to draw a button."""
+class _Known:
+    """The character's meshes as they were found last, by their names, and what was selected then. To find
+    them goes through the whole scene, and each button reads its value several times."""
 
-    name = ""
-
-
-@contextmanager
-def drawing(obj: bpy.types.Object) -> Iterator[None]:
-    """Inside, the properties read this mesh."""
-    _Drawn.name = obj.name
-    try:
-        yield
-    finally:
-        _Drawn.name = ""
+    selection: tuple[object, ...] = ()
+    names: tuple[str, ...] = ()
 
 
-def _lead_settings(scene: bpy.types.Scene) -> properties.SinewSettings | None:
-    obj = scene.objects.get(_Drawn.name) or lead(bpy.context)
-    return None if obj is None else properties.of(obj)
+def find_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Those of the characters meant that have Sinew; known_meshes() has them from now on."""
+    found = operators.sinew_targets(context)
+    _Known.selection, _Known.names = _selection(context), tuple(obj.name for obj in found)
+    return found
+
+
+def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The same as they were found last, as long as the same objects are selected and all still have Sinew."""
+    if _Known.names and _Known.selection == _selection(context):
+        found = [context.scene.objects.get(name) for name in _Known.names]
+        if all(obj is not None and properties.has_sinew(obj) for obj in found):
+            return found
+    return find_meshes(context)
+
+
+def _selection(context: bpy.types.Context) -> tuple[object, ...]:
+    active = context.active_object
+    names = (obj.name for obj in context.selected_objects)
+    return (context.scene.session_uid, active.name if active is not None else "", *names)
 
 
 def _computed(deferred: Any, group: str, name: str) -> object:
@@ -74,8 +80,9 @@ def _computed(deferred: Any, group: str, name: str) -> object:
     def of_mesh(settings: properties.SinewSettings) -> bpy.types.PropertyGroup:
         return getattr(settings, group) if group else settings
 
-    def get(own: bpy.types.PropertyGroup) -> object:
-        settings = _lead_settings(own.id_data)
+    def get(_own: bpy.types.PropertyGroup) -> object:
+        obj = lead(bpy.context)
+        settings = None if obj is None else properties.of(obj)
         prop = CLASSES_OF[group].bl_rna.properties[name]
         value = prop.default if settings is None else getattr(of_mesh(settings), name)
         return prop.enum_items[value].value if prop.type == "ENUM" else value
@@ -111,7 +118,7 @@ SinewCharacter = _class_of("", SHARED)
 
 
 def _is_on(_own: bpy.types.PropertyGroup) -> bool:
-    return any(properties.of(obj).enabled for obj in operators.sinew_targets(bpy.context))
+    return any(properties.of(obj).enabled for obj in known_meshes(bpy.context))
 
 
 def _switch(_own: bpy.types.PropertyGroup, on: bool) -> None:

@@ -17,7 +17,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
     bl_label = "Sinew"
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
-        if operators.sinew_targets(context):
+        if operators.has_sinew_targets(context):
             SINEW_PT_method_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -36,10 +36,10 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
         column.enabled = not waits
         _draw_title(column, context, meshes)
         _draw_add(column, meshes)
+        skinned = character.find_meshes(context)
         lead = character.lead(context)
         if lead is not None:
-            with character.drawing(lead):
-                _draw_character(column, context, lead)
+            _draw_character(column, context, skinned, lead)
 
 
 def _draw_title(
@@ -63,8 +63,13 @@ def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> Non
     row.operator_menu_enum("sinew.add", "method", text="", icon="DOWNARROW_HLT")
 
 
-def _draw_character(layout: bpy.types.UILayout, context: bpy.types.Context, lead: bpy.types.Object) -> None:
-    meshes, shared = operators.sinew_targets(context), character.of(context.scene)
+def _draw_character(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    meshes: list[bpy.types.Object],
+    lead: bpy.types.Object,
+) -> None:
+    shared = character.of(context.scene)
     # Of one mesh, its own settings: those can have keys.
     settings = properties.of(lead) if len(meshes) == 1 else shared
     row = layout.row(align=True)
@@ -75,7 +80,8 @@ def _draw_character(layout: bpy.types.UILayout, context: bpy.types.Context, lead
     column = layout.column()
     column.active = shared.enabled
     draw_method(column, settings, lead)
-    methods = {properties.method_label(properties.of(obj).method) for obj in character.followers(context)}
+    followers = [properties.of(obj) for obj in meshes if not properties.of(obj).is_own]
+    methods = {properties.method_label(settings.method) for settings in followers}
     if len(methods) > 1:
         text = f"The meshes differ: {', '.join(sorted(methods))}. A method that you choose goes to all"
         draw_text(column, context, text, icon="INFO")
@@ -93,7 +99,7 @@ class SINEW_PT_stages(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(operators.sinew_targets(context))
+        return operators.has_sinew_targets(context)
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
         lead = character.lead(context)
@@ -105,13 +111,12 @@ class SINEW_PT_stages(Sidebar, bpy.types.Panel):
         lead = character.lead(context)
         if lead is None:
             return
-        is_one = len(operators.sinew_targets(context)) == 1
+        is_one = len(character.known_meshes(context)) == 1
         settings = properties.of(lead) if is_one else character.of(context.scene)
         layout = self.layout
         layout.enabled = not operators.waits_for_render()
         layout.active = properties.of(lead).enabled
-        with character.drawing(lead):
-            draw_stages(layout, context, settings, lead)
+        draw_stages(layout, context, settings, lead)
 
 
 CLASSES = (SINEW_PT_main, SINEW_PT_stages)

@@ -74,7 +74,7 @@ class SINEW_MT_methods(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        has_sinew = bool(operators.sinew_targets(context))
+        has_sinew = operators.has_sinew_targets(context)
         for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
             layout.label(text=group)
             for method in methods:
@@ -110,7 +110,7 @@ class SINEW_MT_pie(bpy.types.Menu):
         pie = self.layout.menu_pie()
         pie.operator("sinew.flip_comparison", icon="UV_SYNC_SELECT")
         pie.menu(SINEW_MT_methods.__name__, icon="MOD_ARMATURE")
-        if operators.sinew_targets(context):
+        if operators.has_sinew_targets(context):
             pie.operator("sinew.switch", icon="HIDE_OFF")
         else:
             pie.operator("sinew.add", icon="ADD")

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
 
 import bpy
 
-from ..attach import attach, corrective_smooth, properties, shared_settings, stage_settings
+from ..attach import attach, corrective_smooth, properties, shared_settings, stack, stage_settings
 from ..attach.method_items import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..core.errors import SinewError
@@ -39,25 +39,48 @@ def armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
     return sorted(found, key=lambda o: (o != context.active_object, o.name))
 
 
+def _each_target(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+    """The meshes of targets(), those that are selected first: most who ask need only one."""
+    chosen, meant = _chosen(context), set(armatures(context))
+    yield from attach.deformed_meshes([obj for obj in chosen if obj.name in context.scene.objects])
+    if not meant:
+        return
+    for obj in context.scene.objects:
+        if obj.type == "MESH" and obj not in chosen and _is_of(obj, meant):
+            yield obj
+
+
+def _is_of(obj: bpy.types.Object, meant: Collection[bpy.types.Object]) -> bool:
+    """Whether one of the armatures deforms a mesh; of most meshes of a scene that is seen at once."""
+    has_modifier = any(modifier.type == "ARMATURE" for modifier in obj.modifiers)
+    if not (has_modifier or stack.parent_deforms(obj) or properties.has_sinew(obj)):
+        return False
+    return attach.armature_of(obj) in meant and bool(attach.deformed_meshes([obj]))
+
+
 def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The meshes meant: all that the armatures meant deform, as clothes, hair and eyes belong to the body
     that is selected; the active one first."""
-    chosen, meant = _chosen(context), set(armatures(context))
-    meshes = [
-        obj
-        for obj in attach.deformed_meshes(list(context.scene.objects))
-        if obj in chosen or attach.armature_of(obj) in meant
-    ]
-    return sorted(meshes, key=lambda obj: obj != context.active_object)
+    active, found = context.active_object, list(_each_target(context))
+    order = {name: place for place, name in enumerate(context.scene.objects.keys())} if found else {}
+    return sorted(found, key=lambda obj: (obj != active, order[obj.name]))
+
+
+def has_targets(context: bpy.types.Context) -> bool:
+    return next(_each_target(context), None) is not None
 
 
 def sinew_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in targets(context) if properties.has_sinew(obj)]
 
 
+def has_sinew_targets(context: bpy.types.Context) -> bool:
+    return any(properties.has_sinew(obj) for obj in _each_target(context))
+
+
 def are_any_on(context: bpy.types.Context) -> bool:
     """Whether Sinew is on for any mesh: else panels are grey whose numbers are its own."""
-    return any(properties.of(obj).enabled for obj in sinew_targets(context))
+    return any(properties.of(obj).enabled for obj in _each_target(context) if properties.has_sinew(obj))
 
 
 def waits_for_render() -> str:
@@ -145,7 +168,7 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(not properties.has_sinew(obj) for obj in targets(context)):
+        if any(not properties.has_sinew(obj) for obj in _each_target(context)):
             return can_change(cls)
         others = attach.not_meshes(context.selected_objects)
         if others:
@@ -175,7 +198,7 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
 class OnSinewObjects:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if sinew_targets(context):
+        if has_sinew_targets(context):
             return can_change(cls)
         cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
         return False

@@ -61,6 +61,13 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             return context.window_manager.invoke_props_dialog(self)
         return super().invoke(context, event)
 
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        writes_files = self.kind != bake.SHAPE_KEYS
+        for name in ("kind", "frames", "step", *(("folder", "overwrite") if writes_files else ())):
+            layout.prop(self, name)
+
     def cancel(self, context: bpy.types.Context) -> None:
         # Of the dialog there is nothing to end.
         if self.in_steps:

@@ -42,7 +42,7 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(operators.sinew_targets(context))
+        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
