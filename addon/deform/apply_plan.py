@@ -8,8 +8,9 @@ import logging
 import bpy
 import numpy as np
 
-from ..attach import attach, node_group, point_store, properties, stack, upstream_proxy
+from ..attach import attach, node_group, normals, point_store, properties, stack, upstream_proxy
 from ..core.errors import SinewError
+from ..io import mesh_io
 from . import safe_mode, small_meshes
 from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
 
@@ -29,6 +30,8 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
     # While Sinew is off, the modifiers have the flags that it would keep.
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
+    gives_normals = settings.normals != properties.LEAVE_NORMALS
+    domain = normals.domain_of(mesh) if gives_normals else ""
     return ObjectFacts(
         enabled=settings.enabled,
         is_linked=obj.library is not None,
@@ -45,6 +48,9 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
         safe_mode=safe_mode.is_on(),
         failure=failure,
         waits_for=waits_for,
+        gives_normals=gives_normals,
+        normals_domain=domain,
+        normals_obstacle=normals.obstacle(obj) if domain else "",
     )
 
 
@@ -59,7 +65,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
         elif obj.mode not in MODES_OF_THE_MODIFIER:
             point_store.remove(obj)
         return
-    point_store.ensure(obj, wanted.in_buffer)
+    point_store.ensure(obj, wanted.in_buffer, wanted.normals)
     attach.switch(obj, on=True)
     attach.restore_pointers(obj)
 
@@ -74,16 +80,23 @@ def has_lost_modifier(obj: bpy.types.Object) -> bool:
     return stack.sinew_modifier(obj) is None or (uses_builtin and stack.armature_modifier(obj) is None)
 
 
-def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:
+def follow_removal(
+    obj: bpy.types.Object,
+    rest: np.ndarray | None,
+    shown: np.ndarray | None,
+    custom_normals: np.ndarray | None = None,
+) -> None:
     """Takes Sinew off an object that has lost its modifier.
 
     Applied, or converted to a mesh, its shape is the mesh's own, and the Armature modifiers in whose place
     it stood go as they would have gone; deleted, it gives the mesh back to them.
 
-    rest, shown  float32 [vertices, 3], as the mesh was bound, and its last shape; None where unknown
+    rest, shown     float32 [vertices, 3], as the mesh was bound, and its last shape; None where unknown
+    custom_normals  that it had, as Shading.custom; None for none
     """
     if point_store.are_applied(obj, rest, shown):
         applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
+        mesh_io.restore_custom_normals(obj.data, custom_normals)
         attach.take_off(obj)
         for name in applied:
             obj.modifiers.remove(obj.modifiers[name])
@@ -118,10 +131,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         log.error("%s", error)
         return True
     settings = properties.of(obj)
-    settings.scale_rule, settings.leave_small = (
-        properties.of(origin).scale_rule,
-        properties.of(origin).leave_small,
-    )
+    for name in ("scale_rule", "leave_small", "normals"):
+        setattr(settings, name, getattr(properties.of(origin), name))
     groups = (*properties.STAGE_GROUPS, *properties.METHOD_GROUPS, "replaced_smooth")
     properties.copy_groups(properties.of(origin), settings, groups)
     for replaced in list(settings.replaced_modifiers)[1:]:

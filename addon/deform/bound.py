@@ -83,6 +83,8 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     pairs = attach.replaced_modifiers(obj)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     groups = stage_settings.vertex_groups(properties.of(obj))
+    if old is not None:
+        read_now.keep_normals_of(old.source)
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
@@ -127,6 +129,7 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
     Requires that the mesh is the one that was read, and source.is_ready().
     """
     read_now = source.with_surface(obj, depsgraph, old.source)
+    read_now.keep_normals_of(old.source)
     for stage in old.skin_stack.skin_stages:
         stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
     return replace(old, source=read_now)

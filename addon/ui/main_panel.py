@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import sinew
 
-from ..attach import attach, corrective_smooth, properties, stage_settings
+from ..attach import attach, corrective_smooth, normals, properties, stage_settings
 from ..deform import method_needs, session, small_meshes
 from ..deform.plan import ObjectFacts, plan
 from . import operators, precomputing
@@ -64,8 +64,18 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context, obj: 
             _draw_stage(layout, context, obj, stage)
     _draw_take_over(layout, context, obj)
     layout.prop(settings, "scale_rule")
+    _draw_normals(layout, context, obj)
     if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
         layout.prop(settings, "leave_small")
+
+
+def _draw_normals(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    if not normals.ARE_SUPPORTED:
+        return
+    layout.prop(properties.of(obj), "normals")
+    state = session.state_of(obj)
+    if state is not None and state.plan.normals_reason:
+        draw_text(layout, context, f"Blender computes normals: {state.plan.normals_reason}", icon="INFO")
 
 
 def _draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
