@@ -373,7 +373,7 @@ def test_copied_modifiers_bring_the_choice():
 
 
 def light_scene(obj):
-    """A camera and a lamp that see the arm, whose material shows normals, by a tangent-space map over seams."""
+    """A camera and a lamp that see the arm, whose material has a tangent-space map of normals over seams."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.location, camera.rotation_euler = (1.0, -5.0, 1.0), (1.4, 0.0, 0.0)
@@ -489,7 +489,10 @@ def test_exported_files_are_the_same(shading, kind, tmp_path):
 
     given, left = both(obj, written)
     if kind == "abc":
-        assert imported_alembic(given, tmp_path) == imported_alembic(left, tmp_path)
+        (given, kinds), (left, others) = (imported_alembic(data, tmp_path) for data in (given, left))
+        assert kinds == others
+        # As near as a mesh stores them.
+        np.testing.assert_allclose(given, left, rtol=0, atol=1e-4)
     elif kind in ("obj", "usda"):
         assert_same_numbers(given, left)
     else:
@@ -515,8 +518,8 @@ def imported_alembic(data, tmp_path):
     (obj,) = (each for each in made if each.type == "MESH")
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     found = (
+        vectors(mesh, "corner_normals"),
         sorted((each.name, each.data_type, each.domain) for each in mesh.attributes),
-        np.round(vectors(mesh, "corner_normals"), 5).tolist(),
     )
     for each in made:
         bpy.data.objects.remove(each)
