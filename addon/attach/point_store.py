@@ -32,7 +32,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "") -> None:
         made = upstream_proxy.ensure(obj)
         if settings.attribute:
             remove_attributes(obj)
-            settings.attribute = settings.normals_attribute = ""
+            _forget_names(settings)
         kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Front": made}
     else:
         upstream_proxy.remove(obj)
@@ -146,9 +146,13 @@ def remove_point_attributes(obj: bpy.types.Object) -> None:
     and exports would have them."""
     if not obj.data.is_editmode:
         remove_attributes(obj)
-        for name in ("attribute", "normals_attribute"):
-            if getattr(properties.of(obj), name):
-                setattr(properties.of(obj), name, "")
+        _forget_names(properties.of(obj))
+
+
+def _forget_names(settings: properties.SinewSettings) -> None:
+    for name in ("attribute", "normals_attribute"):
+        if getattr(settings, name):
+            setattr(settings, name, "")
 
 
 def remove(obj: bpy.types.Object) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..attach import attach, node_group, normals, point_store, properties, stack, upstream_proxy
 from ..core.errors import SinewError
-from ..io import mesh_io
 from . import safe_mode, small_meshes
 from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
 
@@ -80,23 +79,16 @@ def has_lost_modifier(obj: bpy.types.Object) -> bool:
     return stack.sinew_modifier(obj) is None or (uses_builtin and stack.armature_modifier(obj) is None)
 
 
-def follow_removal(
-    obj: bpy.types.Object,
-    rest: np.ndarray | None,
-    shown: np.ndarray | None,
-    custom_normals: np.ndarray | None = None,
-) -> None:
+def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:
     """Takes Sinew off an object that has lost its modifier.
 
     Applied, or converted to a mesh, its shape is the mesh's own, and the Armature modifiers in whose place
     it stood go as they would have gone; deleted, it gives the mesh back to them.
 
-    rest, shown     float32 [vertices, 3], as the mesh was bound, and its last shape; None where unknown
-    custom_normals  that it had, as Shading.custom; None for none
+    rest, shown  float32 [vertices, 3], as the mesh was bound, and its last shape; None where unknown
     """
     if point_store.are_applied(obj, rest, shown):
         applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
-        mesh_io.restore_custom_normals(obj.data, custom_normals)
         attach.take_off(obj)
         for name in applied:
             obj.modifiers.remove(obj.modifiers[name])

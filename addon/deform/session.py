@@ -394,11 +394,10 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
     if not apply_plan.has_lost_modifier(obj):
         return False
     # The last shape is computed only here: not at each pose.
-    if state is None:
-        apply_plan.follow_removal(obj, None, None)
-    else:
-        source = state.bound.source
-        apply_plan.follow_removal(obj, source.points, state.points, source.shading.custom)
+    rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
+    apply_plan.follow_removal(obj, rest, shown)
+    if state is not None:
+        state.take_off_normals(obj.data)
     current.skinned.pop(obj.session_uid, None)
     current.objects = None
     return True

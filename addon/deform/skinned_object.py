@@ -14,6 +14,7 @@ from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
 from ..core.session import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
+from ..io import mesh_io
 from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
@@ -166,6 +167,12 @@ class SkinnedObject:
         """The shape of the last frame, float32 [vertices, 3], object space; the stack's own."""
         with self.lock:
             return self.bound.skin_stack.points
+
+    def take_off_normals(self, mesh: bpy.types.Mesh) -> None:
+        """Gives a mesh that was made of the object's evaluated one the custom normals that this would have
+        without those that Sinew gave."""
+        if self.plan.normals:
+            mesh_io.restore_custom_normals(mesh, self.bound.source.shading.custom)
 
     def is_untouched_by(self, changes: Changes) -> bool:
         """Whether nothing that the shape depends on is among the changes."""
