@@ -16,8 +16,8 @@ from . import node_group, properties, stack
 
 # Set Mesh Normal has free normals.
 ARE_SUPPORTED = bpy.app.version >= (4, 5)
-# Behind Sinew's modifier these neither read normals, nor move points, nor change faces.
-HARMLESS_DOWNSTREAM = {
+# In front of Sinew's modifier and behind it these neither read nor change normals, points and faces.
+HARMLESS = {
     "UV_PROJECT",
     "UV_WARP",
     "VERTEX_WEIGHT_EDIT",
@@ -43,8 +43,11 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
 
 def obstacle(obj: bpy.types.Object) -> str:
     """Why Blender has to compute the normals of a skinned object, as a clause; empty where it need not."""
+    for modifier in stack.upstream(obj):
+        if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
+            return f"{modifier.name} is in front"
     for modifier in downstream(obj):
-        if modifier.type not in HARMLESS_DOWNSTREAM:
+        if modifier.type not in HARMLESS:
             return f"{modifier.name} follows"
     if obj.instance_type != "NONE":
         return "it has instances on its vertices or faces"

@@ -248,7 +248,13 @@ def instance_faces(obj):
     obj.instance_type = "FACES"
 
 
+def weigh_normals(obj):
+    modifier = obj.modifiers.new("Weighted", "WEIGHTED_NORMAL")
+    obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
+
+
 OBSTACLES = {
+    "weighted": (weigh_normals, "Weighted is in front"),
     "subdivision": (lambda obj: obj.modifiers.new("Subdivision", "SUBSURF"), "Subdivision follows"),
     "cast": (lambda obj: obj.modifiers.new("Cast", "CAST"), "Cast follows"),
     "nodes": (add_nodes_that_read, "another object"),
@@ -533,3 +539,90 @@ def test_before_4_5_blender_computes_them():
     assert not has_given(obj)
     assert session.state_of(obj).plan.normals == ""
     assert not any("normals" in each.name for each in obj.data.attributes)
+
+
+@needs_support
+def test_objects_with_one_mesh_and_painted_ones():
+    obj, _armature = make(custom)
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    for frame in (4, 9):
+        bpy.context.scene.frame_set(frame)
+        for each in (obj, other):
+            assert session.state_of(each).plan.in_buffer
+            assert has_given(each)
+            given, left = both(each)
+            np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+    bpy.data.objects.remove(other)
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = obj
+    for mode in ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.scene.frame_set(6)
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for mode in ("EDIT", "SCULPT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.scene.frame_set(8)
+        assert session.state_of(obj) is None
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_library_overrides_keep_the_choice(tmp_path):
+    obj, _armature = make(sharp)
+    name = obj.name
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (source, target):
+        target.collections, target.objects = source.collections, source.objects
+    linked = next(each for each in target.objects if each.name == name)
+    bpy.context.scene.collection.objects.link(linked)
+    override = linked.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    assert override is not None
+    own = next(each for each in bpy.data.objects if each.name == name and each.library is None)
+    choose(own, LEAVE)
+    bpy.context.scene.frame_set(5)
+    assert not has_given(own)
+    user = str(tmp_path / "user.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=user)
+    bpy.ops.wm.open_mainfile(filepath=user)
+    own = next(each for each in bpy.data.objects if each.name == name and each.library is None)
+    assert properties.of(own).normals == LEAVE
+    bpy.context.scene.frame_set(5)
+    given, left = both(own)
+    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_undo_brings_the_choice_back():
+    obj, _armature = make(smooth)
+    bpy.ops.ed.undo_push(message="as Blender")
+    properties.of(obj).normals = LEAVE
+    bpy.ops.ed.undo_push(message="left")
+    assert not has_given(obj)
+    bpy.ops.ed.undo()
+    obj = bpy.data.objects["Arm"]
+    bpy.context.view_layer.update()
+    assert properties.of(obj).normals == GIVE
+    assert has_given(obj)
+
+
+@needs_support
+@pytest.mark.parametrize("method", [each for each in properties.METHODS if each != "ddm"])
+def test_every_method_and_stage(method):
+    obj, _armature = make(custom)
+    settings = properties.of(obj)
+    settings.method = method
+    settings.delta_mush.enabled = True
+    for frame in (4, 9):
+        bpy.context.scene.frame_set(frame)
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
