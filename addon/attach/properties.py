@@ -68,7 +68,7 @@ def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 SAME_METHOD = "SAME"
 # Who computes normals.
-AS_BLENDER, LEAVE_NORMALS = "AS_BLENDER", "LEAVE"
+AS_BLENDER, SKINNED_NORMALS, LEAVE_NORMALS = "AS_BLENDER", "SKINNED", "LEAVE"
 
 
 def method_of_modifier(method: str, own: str, is_first: bool) -> str:
@@ -168,6 +168,12 @@ class SinewSettings(bpy.types.PropertyGroup):
         description="Who computes the normals that the mesh is drawn with (Blender 4.5 and later)",
         items=[
             (AS_BLENDER, "As Blender", "Sinew computes them with the points: the same, in less time", 0),
+            (
+                SKINNED_NORMALS,
+                "Skinned",
+                "Those of the rest pose move with the skin, as in game engines; imported ones are kept",
+                2,
+            ),
             (LEAVE_NORMALS, "Leave to Blender", "Blender computes them whenever they are read", 1),
         ],
         default=AS_BLENDER,

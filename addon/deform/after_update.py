@@ -37,7 +37,7 @@ def deform(
     if changes.frame:
         is_reshaped = before is not None and shown.rest_points is not before
         skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
-    count = source.normal_count(skinned.plan.normals)
+    count = source.normal_count(skinned.plan.normals.domain)
     is_stored = not is_inspected or point_store.are_written(obj, len(shown.rest_points) + count)
     if differs or is_first or not is_stored:
         _store(obj, skinned)
@@ -46,11 +46,11 @@ def deform(
 
 
 def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
-    points, source, domain = skinned.bound.skin_stack.points, skinned.bound.source, skinned.plan.normals
+    points, source, given = skinned.bound.skin_stack.points, skinned.bound.source, skinned.plan.normals
     normals = None
-    if domain:
-        normals = np.empty((source.normal_count(domain), 3), dtype=np.float32)
-        source.normals.write(points, domain, normals)
+    if given.domain:
+        normals = np.empty((source.normal_count(given.domain), 3), dtype=np.float32)
+        skinned.bound.write_normals(points, skinned.shown.rest_points, given, normals)
     point_store.write(obj, points, source.points, normals)
 
 

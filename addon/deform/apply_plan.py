@@ -48,6 +48,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
         failure=failure,
         waits_for=waits_for,
         gives_normals=gives_normals,
+        skins_normals=settings.normals == properties.SKINNED_NORMALS,
         normals_domain=domain,
         normals_obstacle=normals.obstacle(obj) if domain else "",
     )
@@ -64,7 +65,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
         elif obj.mode not in MODES_OF_THE_MODIFIER:
             point_store.remove(obj)
         return
-    point_store.ensure(obj, wanted.in_buffer, wanted.normals)
+    point_store.ensure(obj, wanted.in_buffer, wanted.normals.domain)
     attach.switch(obj, on=True)
     attach.restore_pointers(obj)
 

@@ -22,6 +22,7 @@ from ..core.vertex_data import VertexData
 from ..io import armature_io
 from . import method_needs, source, survey
 from .changes import Changes
+from .plan import Normals
 from .source import Source
 
 
@@ -67,6 +68,24 @@ class Bound:
                 if triangles is not None and not len(triangles)
             ),
         ]
+
+    def write_normals(
+        self, points: np.ndarray, rest_points: np.ndarray, given: Normals, out: np.ndarray
+    ) -> None:
+        """
+        points       float32 [vertices, 3], the shape of the last frame
+        rest_points  float32 [vertices, 3], what it was deformed from
+        out          float32 [vertices or corners, 3], C-contiguous
+        """
+        source = self.source
+        if given.are_skinned:
+            vertices = None if given.domain == "POINT" else source.topology.corner_vertices
+            rest_normals = source.rest_normals(rest_points, given.domain)
+            moved = self.skin_stack.skinned_normals(rest_normals, vertices)
+            if moved is not None:
+                out[:] = moved
+                return
+        source.normals.write(points, given.domain, out)
 
     @property
     def binding(self) -> Binding:

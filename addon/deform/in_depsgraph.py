@@ -90,7 +90,8 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mode, or the users of its mesh, changed"
     if [armature is None for armature in armatures] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
-    memory = _memory_to_write(settings, mesh, skinned)
+    given = skinned.plan.normals
+    memory = _memory_to_write(settings, mesh, skinned, given.domain)
     if memory is None:
         return "its mesh changed"
     out, normals = memory
@@ -110,7 +111,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
         shown.number += 1
     if len(normals):
-        bound.source.normals.write(out, skinned.plan.normals, normals)
+        bound.write_normals(out, rest_points, given, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
     shown.first_point = out[0].tobytes()
@@ -131,11 +132,14 @@ def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
 
 
 def _memory_to_write(
-    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject
+    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject, domain: str
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Of the points and of the normals, none where Blender computes these: in the evaluated mesh, or in the
-    evaluated point buffer. None where it is not there, or not for as many."""
-    source, domain = skinned.bound.source, skinned.plan.normals
+    evaluated point buffer. None where it is not there, or not for as many.
+
+    domain  of the normals; empty where Blender computes them
+    """
+    source = skinned.bound.source
     points, count = len(source.points), source.normal_count(domain)
     if not skinned.plan.in_buffer:
         to_points = mesh_io.vectors_in(mesh, skinned.attribute)

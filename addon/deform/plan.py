@@ -23,11 +23,23 @@ class State(Enum):
 
 
 @dataclass(frozen=True)
+class Normals:
+    """Those that Sinew gives with the points.
+
+    domain       POINT or CORNER: what has a normal of its own; empty for none: Blender computes them
+    are_skinned  they move with the skin, instead of being those of the deformed surface
+    """
+
+    domain: str = ""
+    are_skinned: bool = False
+
+
+@dataclass(frozen=True)
 class Plan:
     """reason        one clause for the panel; empty for the rule and for what the user chose
     in_buffer     an object of their own stores the points (point_buffer.py), not an attribute of the mesh
     after_update  where Sinew deforms: not within Blender's evaluation
-    normals       the domain of the normals that it gives with the points; empty where Blender computes them
+    normals       those that it gives with the points
     normals_reason  why Blender does, though Sinew was to; a clause for the panel
     """
 
@@ -35,7 +47,7 @@ class Plan:
     reason: str = ""
     in_buffer: bool = False
     after_update: bool = False
-    normals: str = ""
+    normals: Normals = Normals()
     normals_reason: str = ""
 
     @property
@@ -65,6 +77,7 @@ class ObjectFacts:
     failure              what failed there; empty where nothing did
     waits_for            what its method needs and is not computed yet, as a clause; empty where nothing is
     gives_normals        the user chose that Sinew computes normals
+    skins_normals        and that they move with the skin
     normals_domain       POINT or CORNER: which draw the mesh; empty where Blender computes them in any case
     normals_obstacle     why Blender has to, as a clause; empty where it need not
     """
@@ -85,6 +98,7 @@ class ObjectFacts:
     failure: str = ""
     waits_for: str = ""
     gives_normals: bool = False
+    skins_normals: bool = False
     normals_domain: str = ""
     normals_obstacle: str = ""
 
@@ -124,17 +138,18 @@ def plan(facts: ObjectFacts) -> Plan:
     )
 
 
-def _normals(facts: ObjectFacts) -> tuple[str, str]:
+def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
     """Plan.normals and Plan.normals_reason."""
     if not (facts.gives_normals and facts.normals_domain):
-        return "", ""
+        return Normals(), ""
     reasons = (
         (bool(facts.normals_obstacle), facts.normals_obstacle),
         (facts.has_upstream, "modifiers in front change the mesh"),
         (facts.has_heat_map, "it shows a heat map"),
     )
     obstacle = next((reason for holds, reason in reasons if holds), "")
-    return ("", obstacle) if obstacle else (facts.normals_domain, "")
+    given = Normals() if obstacle else Normals(facts.normals_domain, facts.skins_normals)
+    return given, obstacle
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

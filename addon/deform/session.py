@@ -438,7 +438,7 @@ def _note_readers(changes: Changes) -> None:
     with contextlib.suppress(ReferenceError):
         if any(normals.may_read_meshes(obj) for obj in changes.edited):
             for state in current.skinned.values():
-                state.needs_apply |= bool(state.plan.normals or state.plan.normals_reason)
+                state.needs_apply |= bool(state.plan.normals.domain or state.plan.normals_reason)
 
 
 def _expect_mesh_update(obj: bpy.types.Object) -> None:

@@ -171,7 +171,7 @@ class SkinnedObject:
     def take_off_normals(self, mesh: bpy.types.Mesh) -> None:
         """Gives a mesh that was made of the object's evaluated one the custom normals that this would have
         without those that Sinew gave."""
-        if self.plan.normals:
+        if self.plan.normals.domain:
             mesh_io.restore_custom_normals(mesh, self.bound.source.shading.custom)
 
     def is_untouched_by(self, changes: Changes) -> bool:

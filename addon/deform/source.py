@@ -50,6 +50,7 @@ class Source:
     key_values: np.ndarray | None = None
     known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
+    _rest_normals: tuple[np.ndarray, str, np.ndarray] | None = None
 
     @property
     def own_points(self) -> np.ndarray | None:
@@ -87,6 +88,15 @@ class Source:
     @cached_property
     def normals(self) -> SurfaceNormals:
         return SurfaceNormals(len(self.points), self.topology, self.shading)
+
+    def rest_normals(self, rest_points: np.ndarray, domain: str) -> np.ndarray:
+        """float32 [vertices or corners, 3], those of the rest points; the same array for the same points."""
+        known = self._rest_normals
+        if known is None or known[0] is not rest_points or known[1] != domain:
+            found = np.empty((self.normal_count(domain), 3), dtype=np.float32)
+            self.normals.write(rest_points, domain, found)
+            known = self._rest_normals = (rest_points, domain, found)
+        return known[2]
 
     def normal_count(self, domain: str) -> int:
         """domain  POINT or CORNER; empty for no normals"""

@@ -175,7 +175,7 @@ def _with_data(
     that does not."""
     if plan.uses_builtin:
         return plan
-    if plan.normals:
+    if plan.normals.domain:
         # Not within Blender's evaluation: it takes as long as some frames.
         skinned.bound.source.make_normals()
     precomputing.request(obj, skinned, depsgraph)
@@ -252,7 +252,7 @@ def _request_points(
     skinned.dirtied_by_frames = False
     if skinned.plan.in_buffer:
         source = skinned.bound.source
-        count = source.normal_count(skinned.plan.normals)
+        count = source.normal_count(skinned.plan.normals.domain)
         point_store.set_rest_points(obj, source.points, count, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True

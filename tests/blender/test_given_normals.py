@@ -304,7 +304,7 @@ def test_free_normals_of_the_mesh_stay():
     attribute.data.foreach_set("vector", np.tile(np.float32([0, 0, 1]), len(obj.data.vertices)))
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(7)
-    assert session.state_of(obj).plan.normals == ""
+    assert session.state_of(obj).plan.normals.domain == ""
     assert (corners(obj) == (0, 0, 1)).all()
 
 
@@ -537,7 +537,7 @@ def test_before_4_5_blender_computes_them():
     obj, _armature = make(sharp)
     assert properties.of(obj).normals == GIVE
     assert not has_given(obj)
-    assert session.state_of(obj).plan.normals == ""
+    assert session.state_of(obj).plan.normals.domain == ""
     assert not any("normals" in each.name for each in obj.data.attributes)
 
 
@@ -612,6 +612,66 @@ def test_undo_brings_the_choice_back():
     bpy.context.view_layer.update()
     assert properties.of(obj).normals == GIVE
     assert has_given(obj)
+
+
+def bone_motions(obj, armature):
+    """float64 [bones, 4, 4]: from the rest pose to this frame's, in the object's space."""
+    evaluated_armature = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    place = np.linalg.inv(np.array(obj.matrix_world)) @ np.array(armature.matrix_world)
+    return [
+        place @ np.array(bone.matrix) @ np.linalg.inv(np.array(bone.bone.matrix_local)) @ np.linalg.inv(place)
+        for bone in evaluated_armature.pose.bones
+    ]
+
+
+@needs_support
+@pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
+def test_skinned_normals_move_by_the_inverse_transpose_of_the_blend(shading):
+    obj, armature = make(shading)
+    properties.of(obj).method = "lbs"
+    armature.location = (0.3, 0.2, -0.1)
+    armature.rotation_euler = (0.2, 0.1, 0.4)
+    for bone in armature.pose.bones:
+        bone.scale = (1.0, 1.4, 0.7)
+    properties.of(obj).normals = properties.SKINNED_NORMALS
+    rest = vectors(obj.data, "corner_normals").astype(np.float64)
+    corner_vertices = np.array([loop.vertex_index for loop in obj.data.loops])
+    offsets, bones, weights = scenes.weights_of(obj)
+    for frame in (5, 11):
+        bpy.context.scene.frame_set(frame)
+        assert session.state_of(obj).plan.normals.are_skinned
+        assert has_given(obj)
+        motions = bone_motions(obj, armature)
+        blends = np.zeros((len(obj.data.vertices), 3, 3))
+        for vertex in range(len(blends)):
+            own = slice(offsets[vertex], offsets[vertex + 1])
+            total = weights[own].astype(np.float64).sum()
+            for bone, weight in zip(bones[own], weights[own], strict=True):
+                blends[vertex] += weight / total * motions[bone][:3, :3]
+        expected = np.einsum("nji,nj->ni", np.linalg.inv(blends)[corner_vertices], rest)
+        expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+        np.testing.assert_allclose(corners(obj), expected, rtol=0, atol=2e-5)
+    # Shape keys change the rest normals.
+    scenes.key_shape(obj)
+    for point in obj.data.shape_keys.key_blocks["Key"].data:
+        point.co.y *= 0.4
+    bpy.context.scene.frame_set(9)
+    before = corners(obj)
+    obj.data.shape_keys.key_blocks["Key"].mute = True
+    bpy.context.view_layer.update()
+    assert np.abs(before - corners(obj)).max() > 0.01
+
+
+@needs_support
+def test_skinned_normals_of_what_is_not_one_blend_are_blenders():
+    obj, _armature = make(smooth)
+    settings = properties.of(obj)
+    settings.normals = properties.SKINNED_NORMALS
+    settings.delta_mush.enabled = True
+    bpy.context.scene.frame_set(9)
+    given = corners(obj)
+    choose(obj, LEAVE)
+    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
 
 
 @needs_support

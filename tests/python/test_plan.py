@@ -89,6 +89,7 @@ NORMALS = [
     ({**SMOOTH, "safe_mode": True}, "POINT", ""),
     ({**SMOOTH, "mesh_is_shared": True}, "POINT", ""),
     ({**SMOOTH, "waits_for": "until found"}, "POINT", ""),
+    ({**SMOOTH, "skins_normals": True}, "POINT", ""),
     ({**SMOOTH, "mode": "EDIT"}, "", ""),
     ({**SMOOTH, "enabled": False}, "", ""),
 ]
@@ -97,7 +98,8 @@ NORMALS = [
 @pytest.mark.parametrize(("facts", "domain", "reason"), NORMALS)
 def test_who_computes_normals(facts, domain, reason):
     found = plan(ObjectFacts(**facts))
-    assert found.normals == domain
+    assert found.normals.domain == domain
+    assert found.normals.are_skinned == facts.get("skins_normals", False)
     assert reason in found.normals_reason
     assert bool(found.normals_reason) == bool(reason)
 
