@@ -9,6 +9,8 @@ and 5.2): the normal of a face, and that of a vertex where the corners have thei
 
 from __future__ import annotations
 
+from enum import Enum
+
 import bpy
 
 from ..io import mesh_io
@@ -27,6 +29,21 @@ HARMLESS = {
 # Modifiers and constraints that read another object's normals or take over its attributes; how they name it.
 READERS = {"BOOLEAN", "DATA_TRANSFER", "NODES", "SHRINKWRAP"}
 _POINTERS = ("object", "collection", "target", "auxiliary_target")
+
+
+class Kind(Enum):
+    """Of the normals of a mesh, by what they take to compute."""
+
+    VERTEX = "vertex"
+    CORNER = "corner"  # some edges or faces are sharp
+    CUSTOM = "custom"  # of corners, in relation to the computed ones
+
+
+def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
+    """domain  as domain_of()"""
+    if domain and mesh_io.CUSTOM_NORMALS in mesh.attributes:
+        return Kind.CUSTOM
+    return {"POINT": Kind.VERTEX, "CORNER": Kind.CORNER}.get(domain)
 
 
 def domain_of(mesh: bpy.types.Mesh) -> str:

@@ -31,11 +31,13 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
     gives_normals = settings.normals != properties.LEAVE_NORMALS
     domain = normals.domain_of(mesh) if gives_normals else ""
+    obstacle = normals.obstacle(obj) if domain else ""
+    given = normals.kind_of(mesh, "" if obstacle else domain)
     return ObjectFacts(
         enabled=settings.enabled,
         is_linked=obj.library is not None,
         mode="EDIT" if mesh.is_editmode else obj.mode,
-        builtin_is_faster=small_meshes.is_builtin_faster(obj),
+        builtin_is_faster=small_meshes.is_builtin_faster(obj, given),
         has_upstream=upstream_proxy.is_needed(obj),
         upstream_changes_weights=upstream_proxy.changes_weights(obj),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
@@ -50,7 +52,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
         gives_normals=gives_normals,
         skins_normals=settings.normals == properties.SKINNED_NORMALS,
         normals_domain=domain,
-        normals_obstacle=normals.obstacle(obj) if domain else "",
+        normals_obstacle=obstacle,
     )
 
 

@@ -116,9 +116,11 @@ def test_normals_of_every_frame_are_blenders(shading):
         given, left = both(obj)
         np.testing.assert_array_equal(given, of_frame)
         np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
-        # And what Blender computes of the same points by itself.
-        plain = evaluated(obj).copy()
-        np.testing.assert_allclose(given, vectors(plain, "corner_normals"), rtol=0, atol=NEAR)
+        if shading is not custom and has_given(obj):
+            # And what Blender computes of the same points by itself.
+            plain = evaluated(obj).copy()
+            plain.attributes.remove(plain.attributes["custom_normal"])
+            np.testing.assert_allclose(given, vectors(plain, "corner_normals"), rtol=0, atol=NEAR)
     scenes.forget_keys(armature)
     scenes.bend(armature, 50.0)
     bpy.context.view_layer.update()
