@@ -13,6 +13,8 @@ from ..core import parameters
 from .method_items import method_items
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
+# The parameter of each that says whether it does anything: its first.
+_SWITCHES = {stage.name: stage.parameters[0].id for stage in STAGES.values()}
 # Those that can be set to something.
 METHODS = {method.name: method for method in sinew.methods() if method.parameters}
 # The choice beside the methods where a parameter names one: the stage does nothing.
@@ -65,9 +67,9 @@ def is_on(group: bpy.types.PropertyGroup, stage: sinew.Stage) -> bool:
     return getattr(group, stage.parameters[0].id) not in (False, OFF)
 
 
-def names_on(settings: bpy.types.PropertyGroup) -> list[str]:
+def names_on(settings: bpy.types.PropertyGroup, among: Iterable[str] = STAGES) -> list[str]:
     """The stages that are on by an object's settings."""
-    return [name for name, stage in STAGES.items() if is_on(getattr(settings, name), stage)]
+    return [name for name in among if getattr(getattr(settings, name), _SWITCHES[name]) not in (False, OFF)]
 
 
 def values_of(settings: bpy.types.PropertyGroup, name: str) -> dict[str, Any]:

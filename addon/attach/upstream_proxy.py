@@ -89,6 +89,11 @@ def remove(obj: bpy.types.Object) -> None:
         bpy.data.objects.remove(copy)
 
 
+def is_proxy(helper: bpy.types.Object) -> bool:
+    """Whether a helper is a proxy: it follows its object, which point buffers do not."""
+    return len(helper.constraints) > 0
+
+
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
     """The mesh that comes to the Armature modifier; None as long as Blender has not evaluated it."""
     evaluated = properties.of(obj).upstream_proxy.evaluated_get(depsgraph)

@@ -109,7 +109,7 @@ class Binding:
         Raises ValueError where `out` has another shape.
         """
         last = self._last
-        is_packed_anew = self._take_new_data(frame)
+        is_packed_anew = self.vertex_data is not None and self._take_new_data(frame)
         if out is None and last is not None and _same(last, frame) and not is_packed_anew:
             return False
         self._shape(frame, self._points if out is None else out)
@@ -149,10 +149,10 @@ class Binding:
             self._bound.clear()
             self._packed.clear()
         weights = self.mix_weights
-        if weights is None or frame.mix == frame.method:
+        if frame.mix and (weights is None or frame.mix == frame.method):
             frame = replace(frame, mix="")
-        is_linear = {frame.method == LINEAR, frame.mix == LINEAR}
-        if weights is not None and frame.mix and frame.scale_rule != BLENDER_4.name and len(is_linear) == 2:
+        are_of_two_kinds = (frame.method == LINEAR) != (frame.mix == LINEAR)
+        if weights is not None and frame.mix and frame.scale_rule != BLENDER_4.name and are_of_two_kinds:
             # Under these rules linear blending takes other bone matrices than the other methods.
             self._shape_with_one_kind(replace(frame, mix=""), out, MOTION)
             second = np.empty_like(out)

@@ -189,11 +189,16 @@ def after_others_again(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -
     after_others(scene, depsgraph)
 
 
-def _check_unannounced_changes() -> float:
-    """What another add-on's handler changed behind Sinew's, Blender evaluates without telling anybody: in a
-    window it is seen to a moment later."""
+def check_unannounced() -> float:
+    """What Blender evaluates without telling anybody, in a window is seen to a moment later: what another
+    add-on's handler changed behind Sinew's, and a view layer that is shown for the first time."""
     if any(state.evaluation.changed_unannounced for _obj, state in current.pairs):
         session.refresh(bpy.context)
+    if session.needs_first_evaluations():
+        for window in bpy.context.window_manager.windows:
+            if session.identity_of_layer(window.scene, window.view_layer) not in current.view_layers:
+                with bpy.context.temp_override(window=window):
+                    session.refresh(bpy.context)
     return 0.25
 
 
@@ -340,7 +345,7 @@ def register() -> None:
     properties.listeners.mesh_requested = session.requests.mesh_requested
     events.subscribe_all(_HANDLERS)
     if not bpy.app.background:
-        bpy.app.timers.register(_check_unannounced_changes, first_interval=1.0, persistent=True)
+        bpy.app.timers.register(check_unannounced, first_interval=1.0, persistent=True)
 
 
 def adopt_open_file() -> None:
@@ -361,8 +366,8 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(precompute_watch.look):
         bpy.app.timers.unregister(precompute_watch.look)
     session.forget()
-    if bpy.app.timers.is_registered(_check_unannounced_changes):
-        bpy.app.timers.unregister(_check_unannounced_changes)
+    if bpy.app.timers.is_registered(check_unannounced):
+        bpy.app.timers.unregister(check_unannounced)
     for handlers in (_HANDLERS, events.FRAME_HANDLERS, events.GATE_HANDLERS):
         events.unsubscribe_all(handlers)
     for event in ("frame_change_post", "depsgraph_update_post"):

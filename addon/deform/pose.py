@@ -10,7 +10,7 @@ from ..attach import attach, properties, stage_settings
 from ..core import parameters
 from ..core.errors import SinewError
 from ..core.session import SkinStageFrame
-from ..core.stages import STAGES, StageValues
+from ..core.stages import ORDER, StageValues
 from ..io import armature_io
 from .bound import Bound
 from .skinned_object import SkinnedObject
@@ -57,7 +57,8 @@ def read(
             return None
         pose = armature_io.read_pose(armature, stage.binding.bones)
         own = properties.method_of_modifier(method, replaced.method, is_first=not frames)
-        mix = settings.mixed_method if own == method else ""
+        is_mixed = stage.binding.mix_weights is not None and own == method
+        mix = settings.mixed_method if is_mixed else ""
         data = stage.binding.vertex_data
         if data is not None and not data.is_ready(own):
             # As the modifier itself has it, until what the method needs is computed.
@@ -83,11 +84,11 @@ def _parameters(
 
 def lacks_data(bound: Bound, frames: Frames | None) -> bool:
     """Whether one of the methods was asked for numbers of vertices that it does not have."""
-    data = (stage.binding.vertex_data for stage in bound.skin_stack.skin_stages)
-    return any(
-        frame is not None and each is not None and not all(map(each.has, each.missed))
-        for frame, each in zip(frames or (), data, strict=False)
-    )
+    for stage, frame in zip(bound.skin_stack.skin_stages, frames or (), strict=False):
+        data = stage.binding.vertex_data
+        if data is not None and frame is not None and not all(map(data.has, data.missed)):
+            return True
+    return False
 
 
 def stage_values(settings: properties.SinewSettings) -> StageValues:
@@ -96,8 +97,10 @@ def stage_values(settings: properties.SinewSettings) -> StageValues:
     settings  the object's, evaluated
     Raises SinewError where a driver sets a choice that there is not.
     """
-    on = [name for name in stage_settings.names_on(settings) if name in STAGES]
-    values = {name: stage_settings.values_of(settings, name) for name in on}
+    values = {
+        name: stage_settings.values_of(settings, name)
+        for name in stage_settings.names_on(settings, among=ORDER)
+    }
     for name, of_stage in values.items():
         for parameter, value in of_stage.items():
             if value == "":

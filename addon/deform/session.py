@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ..attach import attach, normals, note, overrides, point_store, properties, stack
+from ..attach import attach, normals, note, orphans, overrides, point_store, properties, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
@@ -37,6 +37,7 @@ class Session:
     skinned           what is known of those that are on, by session_uid
     pairs             both
     depsgraph         the address of the one last seen
+    view_layers       those of which an evaluation was seen, as identity_of_layer()
     waiting           the session_uid of those that wait for another evaluation
     missed            changes of evaluations that were not reacted to
     expected          meshes that Blender lists as changed because a setting of Sinew's was
@@ -54,6 +55,7 @@ class Session:
     skinned: dict[int, SkinnedObject] = field(default_factory=dict)
     pairs: Pairs = field(default_factory=list)
     depsgraph: int = 0
+    view_layers: set[tuple[int, str]] = field(default_factory=set)
     waiting: set[int] = field(default_factory=set)
     gate: Gate = field(default_factory=Gate)
     missed: Changes | None = None
@@ -81,6 +83,7 @@ def forget() -> None:
     current.objects = None
     subscribe_to_frames()
     current.depsgraph = 0
+    current.view_layers = set()
     current.waiting = set()
     current.missed = None
     current.seen = None
@@ -267,6 +270,8 @@ def resume_after_save(context: bpy.types.Context) -> None:
 def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     """Brings all objects up to date with an evaluation and what it changed, and tells the subscribers."""
     with updates_suspended():
+        if depsgraph.mode == "VIEWPORT":
+            current.view_layers.add(identity_of_layer(depsgraph.scene, depsgraph.view_layer))
         if current.missed is not None:
             changes.add(current.missed)
             current.missed = None
@@ -287,10 +292,28 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         notify(subscribers.frame_shown)
 
 
+def identity_of_layer(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tuple[int, str]:
+    return scene.session_uid, layer.name
+
+
+def needs_first_evaluations() -> bool:
+    """Whether an object is not deformed within Blender's evaluation alone, but by who is told of it."""
+    with contextlib.suppress(ReferenceError):
+        return any(
+            (state := state_of(obj)) is None or state.plan.after_update
+            for obj in current.objects or ()
+            if properties.of(obj).enabled
+        )
+    # Deleted since the objects were listed: an event comes.
+    return False
+
+
 def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
     """Found out anew where objects may have come or gone."""
     if current.objects is None or changes.structure or len(bpy.data.objects) != current.object_count:
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+        if not is_rendering_in_window():
+            orphans.remove()
         current.object_count = len(bpy.data.objects)
         notify(subscribers.objects_changed, current.objects)
         point_store.unshare(current.objects)

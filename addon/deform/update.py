@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import attach, normals, point_store, pose_driver, properties, stack
+from ..attach import attach, normals, point_store, pose_driver, properties, stack, upstream_proxy
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..io import armature_io
@@ -45,19 +45,19 @@ def update(
         if skinned is None:
             return None
         skinned.needs_apply, inspect = True, False
-    before = None if skinned is None else skinned.plan
+    before, known = (None, None) if skinned is None else (skinned.plan, skinned.bound)
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
+    if plan.uses_builtin and upstream_proxy.is_needed(obj):
+        # In a mode of the modifier. What stands in front is not evaluated apart then.
+        return None
     # First of all, as groups are renamed along with bones.
     bones_changed = skinned is not None and bound.have_bones_changed(
         obj, skinned.bound, depsgraph, None if skinned.plan.state is State.OFF else changes
     )
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
-        # What is hidden, or in another scene, stays as it is.
-        is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
-        return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
-    known = None if skinned is None else skinned.bound
+        return _while_waiting(obj, skinned, depsgraph)
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
     plan = _with_data(obj, skinned, plan, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
@@ -80,6 +80,15 @@ def update(
         skinned.shown.frames = None
     skinned.bound.source.known_key_values = skinned.bound.source.key_values
     return skinned
+
+
+def _while_waiting(
+    obj: bpy.types.Object, skinned: SkinnedObject | None, depsgraph: bpy.types.Depsgraph
+) -> SkinnedObject | None:
+    """What is known of an object whose front is not evaluated yet. One that is hidden, or in another scene,
+    stays as it is."""
+    is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
+    return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
 
 
 def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:

@@ -454,19 +454,6 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
 
 
-def others(obj: bpy.types.Object) -> list[str]:
-    """The methods that the reference checks.
-
-    Moments are of the weights at rest. Where weights depend on where the vertices are, other bones may count
-    than those that they name: such methods are left out there.
-    """
-    state = session.state_of(obj)
-    stages = [] if state is None else state.bound.skin_stack.skin_stages
-    depends = any(stage.binding.weighting.depends_on_points for stage in stages)
-    keeping = {m.name for m in sinew.methods() if m.keeps_moments}
-    return [method for method in OTHERS if not (depends and method in keeping)]
-
-
 def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) -> Outcome:
     """wanted  the routes"""
     obj, armature = make_rig(seed, features)
@@ -488,7 +475,7 @@ def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) 
                 error, outcome.reason = float("inf"), str(why)
             outcome.errors[route, method] = error
         properties.of(obj).sdef.interpolation = str(numbers(seed, "sdef").choice(["nlerp", "slerp"]))
-        for method in others(obj):
+        for method in OTHERS:
             try:
                 error = error_to_reference(obj, armature, method, seed, outcome, route)
             except routes.NotBySinewError as why:
@@ -507,8 +494,7 @@ def check_stages(
 ) -> None:
     """A mix of two random methods, then random stages that follow it; notes the errors."""
     rng = numbers(seed, "stages")
-    checked = {*dict(ORACLES), *others(obj)}
-    known = [m.name for m in sinew.methods() if m.name in checked]
+    known = [m.name for m in sinew.methods()]
     method, second = rng.choice(known, 2, replace=False).tolist()
     mix = properties.of(obj).mix
     mix.method, mix.group = second, PAINTED[0]

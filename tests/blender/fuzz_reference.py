@@ -193,23 +193,17 @@ def _moments(
     rows: np.ndarray, vertices: np.ndarray, space: np.ndarray, influences: Any, points: np.ndarray
 ) -> np.ndarray:
     """[rows, 12]: place in `vertices`, bone, weight, first moment, and xx, yy, zz, yz, xz, xy of the second,
-    in armature space. Those of bones that no vertex uses are left out, and a vertex that has none is its own
-    neighbourhood."""
+    in armature space. A vertex that has none is its own neighbourhood."""
     found = []
-    used = np.unique(influences.bones)
     for place, vertex in enumerate(vertices):
         own = rows[slice(*np.searchsorted(rows[:, 0], (vertex, vertex + 1)))]
-        own = own[np.isin(own[:, 1], used)]
-        total = own[:, 2].sum()
-        if total <= 0.0:
+        if not own[:, 2].sum() > 0.0:
             span = slice(influences.offsets[vertex], influences.offsets[vertex + 1])
             share = influences.weights[span] / influences.weights[span].sum()
             of_point = share[:, None] * np.array([1.0, *points[vertex], *np.zeros(6)])
             found.append(np.column_stack([np.full(len(share), place), influences.bones[span], of_point]))
             continue
-        own = np.column_stack([np.full(len(own), place), own[:, 1:]])
-        own[:, 2:] /= total if total < 1.0 - 1e-6 else 1.0
-        found.append(_moved_moments(space, own))
+        found.append(_moved_moments(space, np.column_stack([np.full(len(own), place), own[:, 1:]])))
     return np.concatenate(found)
 
 

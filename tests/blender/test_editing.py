@@ -290,6 +290,42 @@ def test_deleted_mesh_is_forgotten():
     assert_follows(other)
 
 
+def front_modifier(obj):
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+def shared_mesh(obj):
+    bpy.context.scene.collection.objects.link(obj.copy())
+
+
+@pytest.mark.parametrize("by_script", [True, False])
+@pytest.mark.parametrize("heat", [False, True])
+@pytest.mark.parametrize("set_up", [None, front_modifier, shared_mesh])
+def test_what_sinew_made_for_a_deleted_mesh_goes_with_it(set_up, heat, by_script):
+    """Its mesh, which is the artist's, stays as Blender has it."""
+    obj, _armature = scenes.make_arm()
+    if set_up is not None:
+        set_up(obj)
+    kinds = ("objects", "meshes", "node_groups", "materials")
+
+    def names():
+        return {(kind, item.name) for kind in kinds for item in getattr(bpy.data, kind)}
+
+    before = names()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).heat = heat
+    bpy.context.scene.frame_set(5)
+    assert names() != before, "nothing is tested"
+    if by_script:
+        bpy.data.objects.remove(obj)
+    else:
+        with bpy.context.temp_override(selected_objects=[obj]):
+            bpy.ops.object.delete()
+    bpy.context.view_layer.update()
+    assert names() == before - {("objects", "Arm")}
+
+
 def test_topology_change_rebinds():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj)

@@ -149,6 +149,39 @@ def test_absolute_shape_keys():
     assert_equal_to_modifier(obj, FRAMES)
 
 
+def absolute_keys(obj):
+    obj.shape_key_add(name="Basis")
+    for point in obj.shape_key_add(name="Key").data:
+        point.co.z += 0.2
+    obj.data.shape_keys.use_relative = False
+    obj.data.shape_keys.eval_time = 7.0
+
+
+def subdivided(obj):
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(1, 0)
+
+
+@pytest.mark.parametrize("set_up", [absolute_keys, subdivided])
+def test_weights_are_painted_where_visibility_is_animated(set_up):
+    """In that mode the Armature modifier deforms, and what stands in front is not evaluated apart."""
+    obj, _armature = scenes.make_arm()
+    set_up(obj)
+    modifier = obj.modifiers["Armature"]
+    for frame, is_on in ((1, False), (4, True)):
+        modifier.show_viewport = is_on
+        modifier.keyframe_insert("show_viewport", frame=frame)
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj, "lbs")
+    for mode in ("WEIGHT_PAINT", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.view_layer.update()
+        assert not properties.of(obj).error
+        got = scenes.shapes(obj, FRAMES)
+        assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    assert scenes.states_of(obj)
+
+
 def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
     obj, armature = scenes.make_arm()
     obj.modifiers.clear()

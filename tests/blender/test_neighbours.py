@@ -557,6 +557,23 @@ def test_tools_for_weights_see_them_where_visibility_is_animated(arm):
     assert_equals_modifier(arm)
 
 
+def test_absolute_shape_keys_in_weight_paint_where_visibility_is_animated(arm):
+    """In that mode nothing is read for Sinew, which mixes relative keys alone."""
+    modifier = arm.modifiers["Armature"]
+    modifier.keyframe_insert("show_viewport", frame=1)
+    arm.shape_key_add(name="Basis")
+    arm.shape_key_add(name="moved").data[3].co.x += 0.3
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.mode_set(mode="SCULPT")
+    arm.data.shape_keys.use_relative = False
+    bpy.context.view_layer.update()
+    for mode in ("WEIGHT_PAINT", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.view_layer.update()
+        assert not properties.of(arm).error
+    assert_equals_modifier(arm)
+
+
 @pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])
 def test_modifiers_renamed_at_every_frame(arm, neighbour, event):
     def rename() -> None:

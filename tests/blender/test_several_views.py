@@ -5,7 +5,11 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import pytest
+import routes
 import scenes
+from sinew_addon.attach import properties
+from sinew_addon.deform import handlers
 
 
 def points_in(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
@@ -40,6 +44,68 @@ def test_two_scenes_at_different_frames():
         assert scenes.worst(points_in(obj, second), expected[9]) <= 1e-5
         first.frame_set(3)
         assert scenes.worst(points_in(obj, first), expected[3]) <= 1e-5
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_a_view_layer_is_shown_for_the_first_time(route):
+    """Of its first evaluation Blender tells nobody, nor of what functions behind Sinew's pose or move."""
+    obj, armature = scenes.make_arm()
+    scene, first = bpy.context.scene, bpy.context.view_layer
+
+    def lift(*_args: object) -> None:
+        armature.delta_location.z = 0.5
+
+    routes.force(route)
+    try:
+        scenes.add_sinew(obj, "lbs")
+        scene.frame_set(5)
+        unmoved = scenes.final_points(obj)
+        bpy.app.handlers.frame_change_post.append(lift)
+        scene.frame_set(5)
+        bpy.app.handlers.frame_change_post.remove(lift)
+        bpy.context.window.view_layer = scene.view_layers.new("Second")
+        bpy.context.view_layer.update()
+        handlers.check_unannounced()
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        assert scenes.worst(expected, unmoved) > 0.1, "nothing is tested"
+        assert scenes.worst(shown, expected) <= 1e-5
+    finally:
+        bpy.context.window.view_layer = first
+        routes.release()
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_path, route):
+    obj, armature = scenes.make_arm()
+    obj.modifiers.new("Front", "SUBSURF").levels = 1
+    obj.modifiers.move(1, 0)
+    collection = bpy.data.collections.new("Character")
+    scene = bpy.context.scene
+    scene.collection.children.link(collection)
+    for each in (obj, armature):
+        scene.collection.objects.unlink(each)
+        collection.objects.link(each)
+    bpy.context.view_layer.layer_collection.children["Character"].exclude = True
+    scene.view_layers.new("Second").layer_collection.children["Character"].exclude = False
+    routes.force(route)
+    try:
+        scenes.add_sinew(obj, "lbs")
+        scene.frame_set(9)
+        path = str(tmp_path / "arm.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        obj = bpy.data.objects["Arm"]
+        bpy.context.window.view_layer = bpy.context.scene.view_layers["Second"]
+        bpy.context.view_layer.update()
+        handlers.check_unannounced()
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        assert scenes.worst(shown, expected) <= 1e-5
+    finally:
+        routes.release()
 
 
 def test_an_instanced_collection():

@@ -267,7 +267,7 @@ class Child:
         for name, method in request["copies"]:
             obj = self.bpy.context.view_layer.objects.get(name)
             modifiers = self.sides.armature_modifiers(obj) if obj is not None else []
-            animated = {curve.data_path for curve in self.sides.curves_of(obj)} if obj is not None else set()
+            animated = self.sides.animated_paths(obj) if obj is not None else set()
             if (
                 any(".show_" in path for path in animated)
                 or len(modifiers) != 1
@@ -334,14 +334,14 @@ class Child:
             found["weights"] = zlib.crc32(
                 repr([(g.group, round(g.weight, 6)) for v in obj.data.vertices for g in v.groups]).encode()
             )
-        keyed = {c.data_path for c in self.sides.curves_of(obj)}
+        keyed = self.sides.animated_paths(obj)
         if not side.is_on(obj) and obj.mode == "OBJECT":
             found["armature modifiers"] = [
                 {
                     "name": m.name,
                     # Keyed ones are as Blender has evaluated them last, which it does not while hidden.
                     "on": [
-                        getattr(m, name) if m.path_from_id(name) not in keyed else "keyed"
+                        getattr(m, name) if m.path_from_id(name) not in keyed else "animated"
                         for name in ("show_viewport", "show_render")
                     ],
                     "object": m.object.name_full if m.object is not None else "",

@@ -23,6 +23,7 @@ from walk_sides import (
     STAGES,
     BlenderSide,
     SinewSide,
+    animated_paths,
     armature_modifiers,
     key,
     remove_curves,
@@ -768,6 +769,13 @@ def _vertices(w: Walker, r: random.Random, obj: bpy.types.Object) -> list[int]:
     return sorted(r.sample(range(count), r.randint(1, max(1, count // 2)))) if count else []
 
 
+def _show_weights(obj: bpy.types.Object) -> None:
+    """Weights that change through an object that Blender does not evaluate, it shows in none of the others
+    that have the mesh (seen on 4.2 and 5.2)."""
+    if not obj.visible_get():
+        obj.data.update()
+
+
 @operation(8)
 def weights(w: Walker, r: random.Random) -> str | None:
     obj = w.mesh(r, lambda o: o.data.library is None and o.mode != "EDIT" and o.data.override_library is None)
@@ -777,10 +785,12 @@ def weights(w: Walker, r: random.Random) -> str | None:
     vertices = _vertices(w, r, obj)
     if r.random() < 0.3:
         group.remove(vertices)
+        _show_weights(obj)
         return f"take {len(vertices)} vertices of {obj.name} out of {group.name}"
     group.add(vertices, r.uniform(0.0, 1.0), r.choice(("REPLACE", "ADD", "SUBTRACT")))
     if r.random() < 0.2:
         obj.data.update()
+    _show_weights(obj)
     return f"weigh {len(vertices)} vertices of {obj.name} in {group.name}"
 
 
@@ -818,6 +828,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
     if what == "new" or group is None:
         made = obj.vertex_groups.new(name=w.new_name("group"))
         made.add(_vertices(w, r, obj), r.random(), "REPLACE")
+        _show_weights(obj)
         return f"group {made.name} of {obj.name}"
     if what == "rename":
         group.name = w.new_name("group")
@@ -951,6 +962,54 @@ def join(w: Walker, r: random.Random) -> str | None:
     return f"join {name} into {obj.name}"
 
 
+@operation(0.4)
+def separate(w: Walker, r: random.Random) -> str | None:
+    """A part of a mesh becomes an object of its own, with all that its object has."""
+    obj = w.editable(r)
+    if obj is None or len(w.meshes()) > 6 or w.users(obj.data) > 1 or len(obj.data.vertices) < 20:
+        return None
+    if not w.select(obj):
+        return None
+    before = set(bpy.data.objects)
+    w.edit_mode()
+    mesh = bmesh.from_edit_mesh(obj.data)
+    mesh.select_mode = {"FACE"}
+    for number, face in enumerate(mesh.faces):
+        face.select_set(number < 6)
+    bmesh.update_edit_mesh(obj.data)
+    bpy.ops.mesh.separate(type="SELECTED")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    made = next(o for o in bpy.data.objects if o not in before and not w.side.may_react(o))
+    made.name, made.data.name = w.new_name("object"), w.new_name("mesh")
+    return f"separate six faces of {obj.name} as {made.name}"
+
+
+@operation(0.2)
+def remesh(w: Walker, r: random.Random) -> str | None:
+    """Another mesh without weights."""
+    obj = w.editable(r)
+    is_plain = obj is not None and w.users(obj.data) == 1 and obj.data.shape_keys is None
+    if not is_plain or w.compared or not w.select(obj):
+        return None
+    obj.data.remesh_voxel_size = 0.15
+    bpy.ops.object.voxel_remesh()
+    return f"remesh {obj.name}"
+
+
+@operation(0.3)
+def replace_mesh(w: Walker, r: random.Random) -> str | None:
+    """In all that have it, as scripts do that bring a mesh up to date."""
+    obj = w.editable(r)
+    if obj is None or obj.data.is_editmode or obj.mode != "OBJECT":
+        return None
+    old = obj.data
+    new = old.copy()
+    old.user_remap(new)
+    bpy.data.meshes.remove(old)
+    new.name = w.new_name("mesh")
+    return f"replace the mesh of {obj.name} by {new.name}"
+
+
 @operation(0.5)
 def apply_transform(w: Walker, r: random.Random) -> str | None:
     obj = w.editable(r)
@@ -971,7 +1030,21 @@ def apply_pose(w: Walker, r: random.Random) -> str | None:
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.pose.armature_apply(selected=False)
     bpy.ops.object.mode_set(mode="OBJECT")
+    for child in rig.children:
+        # Blender gives those of bones other transforms, and evaluates these only when something else is
+        # changed (seen on 4.2 and 5.2).
+        child.update_tag()
     return f"apply the pose of {rig.name} as its rest pose"
+
+
+@operation(0.3)
+def replace_armature_data(w: Walker, r: random.Random) -> str | None:
+    rig = w.armature(r)
+    if rig is None or rig.override_library is not None or rig.data.is_editmode:
+        return None
+    rig.data = rig.data.copy()
+    rig.data.name = w.new_name("armature")
+    return f"{rig.name} has bones of its own"
 
 
 # --- Bones
@@ -1038,7 +1111,59 @@ def bone_options(w: Walker, r: random.Random) -> str | None:
 
 # --- Modifiers
 
-KINDS = ("SUBSURF", "CAST", "MIRROR", "SMOOTH", "ARMATURE", "WAVE", "SOLIDIFY", "MASK")
+KINDS = (
+    *("SUBSURF", "CAST", "MIRROR", "SMOOTH", "ARMATURE", "WAVE", "SOLIDIFY", "MASK"),
+    *("TRIANGULATE", "DECIMATE", "VERTEX_WEIGHT_EDIT", "HOOK", "NODES"),
+)
+# Behind, what they make of a shape hangs on its last bit.
+IN_FRONT = ("DECIMATE", "VERTEX_WEIGHT_EDIT")
+
+
+def _make_nodes(name: str) -> bpy.types.NodeTree:
+    """Moves vertices by half of their normals."""
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    kinds = (
+        *("NodeGroupInput", "GeometryNodeSetPosition", "NodeGroupOutput"),
+        *("GeometryNodeInputNormal", "ShaderNodeVectorMath"),
+    )
+    source, move, out, normal, scale = (group.nodes.new(kind) for kind in kinds)
+    scale.operation = "SCALE"
+    scale.inputs["Scale"].default_value = 0.05
+    group.links.new(normal.outputs["Normal"], scale.inputs[0])
+    group.links.new(scale.outputs["Vector"], move.inputs["Offset"])
+    group.links.new(source.outputs["Geometry"], move.inputs["Geometry"])
+    group.links.new(move.outputs["Geometry"], out.inputs["Geometry"])
+    return group
+
+
+def _set_up(
+    modifier: bpy.types.Modifier,
+    w: Walker,
+    r: random.Random,
+    obj: bpy.types.Object,
+    rig: bpy.types.Object | None,
+) -> None:
+    if modifier.type == "SUBSURF":
+        modifier.levels = modifier.render_levels = 1
+    elif modifier.type == "ARMATURE":
+        modifier.object = rig
+        w.side.set_preserve_volume(modifier, r.random() < 0.3)
+    elif modifier.type == "WAVE":
+        modifier.time_offset = -10.0
+    elif modifier.type == "MASK" and obj.vertex_groups:
+        modifier.vertex_group = w.one(r, obj.vertex_groups).name
+        modifier.invert_vertex_group = True
+    elif modifier.type == "DECIMATE":
+        modifier.ratio = 0.7
+    elif modifier.type == "VERTEX_WEIGHT_EDIT" and obj.vertex_groups:
+        modifier.vertex_group, modifier.falloff_type = w.one(r, obj.vertex_groups).name, "SMOOTH"
+    elif modifier.type == "HOOK":
+        modifier.object, modifier.strength = rig, 0.3
+        modifier.vertex_indices_set(_vertices(w, r, obj))
+    elif modifier.type == "NODES":
+        modifier.node_group = _make_nodes(modifier.name)
 
 
 @operation(3)
@@ -1047,21 +1172,16 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     kind, front = r.choice(KINDS), r.random() < 0.4
     if obj is None or len(w.modifiers(obj)) > 5:
         return None
-    if kind in ("SUBSURF", "MIRROR", "SOLIDIFY") and any(m.type == kind for m in obj.modifiers):
+    once = ("SUBSURF", "MIRROR", "SOLIDIFY", *IN_FRONT)
+    if kind in once and any(m.type == kind for m in w.modifiers(obj)):
+        return None
+    front |= kind in IN_FRONT
+    if kind in IN_FRONT and obj.override_library is not None:
         return None
     modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
     if modifier is None:
         return None
-    if kind == "SUBSURF":
-        modifier.levels = modifier.render_levels = 1
-    elif kind == "ARMATURE":
-        modifier.object = rig
-        w.side.set_preserve_volume(modifier, r.random() < 0.3)
-    elif kind == "WAVE":
-        modifier.time_offset = -10.0
-    elif kind == "MASK" and obj.vertex_groups:
-        modifier.vertex_group = w.one(r, obj.vertex_groups).name
-        modifier.invert_vertex_group = True
+    _set_up(modifier, w, r, obj, rig)
     name = modifier.name
     if front and obj.override_library is None:
         obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
@@ -1072,7 +1192,7 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
 def move_modifier(w: Walker, r: random.Random) -> str | None:
     """To just before or behind another of the artist's: Sinew's own is not counted."""
     obj = w.mesh(r, lambda o: len(w.modifiers(o)) > 1 and o.override_library is None)
-    if obj is None:
+    if obj is None or any(m.type in IN_FRONT for m in w.modifiers(obj)):
         return None
     here, there = r.sample(w.modifiers(obj), 2)
     names = [m.name for m in obj.modifiers]
@@ -1182,6 +1302,39 @@ def key_visibility(w: Walker, r: random.Random) -> str | None:
         key(obj, path + where, values)
     w.this_frame()
     return f"key the visibility of {modifier.name} of {obj.name}: {values}"
+
+
+@operation(0.5)
+def drive_visibility(w: Walker, r: random.Random) -> str | None:
+    """By a bone, as a rig's switches are; or no longer."""
+    obj, rig = w.skinned(r), w.armature(r)
+    bone = w.one(r, rig.pose.bones) if rig is not None else None
+    if obj is None or bone is None or obj.override_library is not None:
+        return None
+    modifier = w.one(r, armature_modifiers(obj))
+    paths = [modifier.path_from_id(f"show_{where}") for where in ("viewport", "render")]
+    # What a curve sets, a driver can not.
+    if not animated_paths(obj).isdisjoint(paths):
+        for path in paths:
+            obj.driver_remove(path)
+        modifier.show_viewport = modifier.show_render = True
+        return f"no driver on the visibility of {modifier.name} of {obj.name}"
+    for path in paths:
+        curve = obj.driver_add(path)
+        driver = curve.driver
+        driver.type = "SUM"
+        variable = driver.variables.new()
+        variable.type = "TRANSFORMS"
+        target = variable.targets[0]
+        target.id, target.bone_target = rig, bone.name
+        target.transform_type, target.transform_space = "ROT_X", "LOCAL_SPACE"
+        for each in list(curve.modifiers):
+            curve.modifiers.remove(each)
+        while curve.keyframe_points:
+            curve.keyframe_points.remove(curve.keyframe_points[0])
+        for angle, value in ((-10.0, 0.0), (0.3, 1.0)):
+            curve.keyframe_points.insert(angle, value).interpolation = "CONSTANT"
+    return f"the visibility of {modifier.name} of {obj.name} follows {bone.name} of {rig.name}"
 
 
 @operation(0.5)
@@ -1539,6 +1692,20 @@ def scene(w: Walker, r: random.Random) -> str | None:
     bpy.context.view_layer.update()
     bpy.context.window.scene = other
     return f"scene {other.name}"
+
+
+@operation(0.2)
+def copy_scene(w: Walker, r: random.Random) -> str | None:
+    """As the menu does, with all objects or their copies."""
+    whole = r.random() < 0.5
+    if len(bpy.data.scenes) > 1 or (whole and len(w.objects("MESH")) > 5) or w.compared:
+        return None
+    w.object_mode()
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    bpy.ops.scene.new(type="FULL_COPY" if whole else "LINK_COPY")
+    bpy.context.scene.name = "Second"
+    return f"a copy of the scene, {'with copies of all' if whole else 'linked'}"
 
 
 @operation(0.4)

@@ -132,7 +132,7 @@ def _is_known(
     replaced = [modifiers[place] for place in places]
     return (
         obj.mode == "OBJECT"
-        and not any(".show_" in curve.data_path for curve in walk_sides.curves_of(obj))
+        and not any(".show_" in path for path in walk_sides.animated_paths(obj))
         and obj.parent_type != "ARMATURE"
         and all(not getattr(m, shown) for m in modifiers[places[-1] + 1 :])
         and places == list(range(places[0], places[-1] + 1))

@@ -71,7 +71,7 @@ def shows_own_shape_in_its_mode(obj: bpy.types.Object) -> bool:
     """Whether Sinew leaves the mode that the object is in to the Armature modifiers."""
     if obj.mode != "WEIGHT_PAINT":
         return obj.mode in {"EDIT", "SCULPT"}
-    keyed = {curve.data_path for curve in curves_of(obj)}
+    keyed = animated_paths(obj)
     return any(
         f'modifiers["{modifier.name}"].show_{where}' in keyed
         for modifier in armature_modifiers(obj)
@@ -90,6 +90,13 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     slot = animation.action_slot
     bags = [s.channelbag(slot) for layer in action.layers for s in layer.strips] if slot is not None else []
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+def animated_paths(obj: bpy.types.Object) -> set[str]:
+    """What its curves and drivers set."""
+    animation = obj.animation_data
+    drivers = animation.drivers if animation is not None else ()
+    return {curve.data_path for curve in (*curves_of(obj), *drivers)}
 
 
 def remove_curves(owner: bpy.types.ID, end: str) -> None:
@@ -501,14 +508,16 @@ class SinewSide:
         precomputations.waits = not on
 
     def wait(self) -> None:
-        """Until no object waits for what a thread computes, which a timer of the window sees to."""
-        from sinew_addon.deform import precompute_watch
+        """What timers of the window see to: that no object waits for what a thread computes, and what Blender
+        evaluates without telling anybody."""
+        from sinew_addon.deform import handlers, precompute_watch
 
         until = time.monotonic() + 30.0
         while precompute_watch.look() is not None:
             if time.monotonic() > until:
                 raise RuntimeError("what methods need is still computed after half a minute")
             time.sleep(0.002)
+        handlers.check_unannounced()
 
     def key_method(self, obj: bpy.types.Object, values: list[tuple[int, str]]) -> None:
         numbers = {m.name: m.number for m in self._properties.METHODS.values()}
@@ -565,7 +574,11 @@ class SinewSide:
 
     def apply(self, obj: bpy.types.Object) -> None:
         modifier = self.own_modifier(obj)
-        if self.is_on(obj) and modifier is not None and modifier.show_viewport:
+        # Sinew's is on whatever an animation makes of the Armature modifiers, and shows what that has.
+        paths = animated_paths(obj)
+        keyed = [m for m in armature_modifiers(obj) if m.path_from_id("show_viewport") in paths]
+        is_shown = modifier is not None and modifier.show_viewport and all(m.show_viewport for m in keyed)
+        if self.is_on(obj) and is_shown:
             bpy.ops.object.modifier_apply(modifier=modifier.name)
         else:
             for armature in armature_modifiers(obj):
@@ -609,7 +622,8 @@ class SinewSide:
                 continue
             found += [f"modifier {m.name} of {obj.name}" for m in obj.modifiers if "Sinew" in m.name]
             drivers = obj.animation_data.drivers if obj.animation_data is not None else ()
-            found += [f"driver {d.data_path} of {obj.name}" for d in drivers]
+            own = [d for d in drivers if not d.data_path.endswith((".show_viewport", ".show_render"))]
+            found += [f"driver {d.data_path} of {obj.name}" for d in own]
         for mesh in bpy.data.meshes:
             names = mesh.attributes.keys() if mesh.library is None and mesh in used else ()
             found += [f"attribute {name} of {mesh.name}" for name in names if "sinew" in name.lower()]

@@ -135,7 +135,7 @@ def render_locked(run: Run) -> Steps:
 
 @step("renders")
 def render_unlocked(run: Run) -> Steps:
-    """Without a hand on the panel: safe mode is taken for it."""
+    """Without a hand on the panel."""
     _start_render(run, False, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
     yield from until(lambda: not _is_rendering(), "the end of the render")
     yield from wait()

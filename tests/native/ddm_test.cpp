@@ -4,11 +4,13 @@
 #include "sinew/skinning/ddm.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <tuple>
 
 #include "scene.h"
+#include "sinew/deform/deformer.h"
 #include "sinew/deform/direct_delta_mush.h"
 #include "sinew/deform/simd.h"
 
@@ -150,6 +152,30 @@ TEST_P(DdmKernels, agree_for_more_bones_than_are_prepared) {
 
 TEST_P(DdmKernels, a_far_bone_of_small_weight_costs_no_digits) {
     EXPECT_LT(largest_error(bound_scene(22, 4, 4, false, false, 1e4), variant()), 2e-5);
+}
+
+// As where envelopes or bendy bones give other weights than those that the moments were made of.
+TEST_P(DdmKernels, take_bones_that_the_moments_alone_name) {
+    for (const bool is_mixed : {false, true}) {
+        Bound bound = bound_scene(23, 12, 4, is_mixed, true);
+        std::ranges::fill(bound.scene.bones, 5);
+        EXPECT_LT(largest_error(bound, variant()), 2.0 * kTolerance) << is_mixed;
+    }
+}
+
+TEST(DirectDeltaMush, bones_that_the_moments_alone_name_are_bones_of_the_binding) {
+    Bound bound = bound_scene(24, 12, 4, false, false);
+    std::ranges::fill(bound.scene.bones, 5);
+    BindData data = bound.scene.data();
+    const VertexData rows = bound.data();
+    data.vertex_data = std::span(&rows, 1);
+    EXPECT_EQ(Binding(data).bone_count(), 12);
+    const BoundMesh mesh = Binding(data).unpack();
+    EXPECT_EQ(mesh.rest_bones.size(), 12);
+    ASSERT_EQ(mesh.vertex_data.size(), 1);
+    EXPECT_EQ(mesh.vertex_data.front().values, bound.rows);
+    data.rest_bones = data.rest_bones.first(11);
+    EXPECT_THROW(Binding{data}, std::invalid_argument);
 }
 
 TEST(DirectDeltaMush, of_a_mesh_without_vertices_has_no_rows) {

@@ -13,7 +13,16 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ...attach import attach, corrective_smooth, node_group, point_buffer, properties, stack, upstream_proxy
+from ...attach import (
+    attach,
+    corrective_smooth,
+    node_group,
+    orphans,
+    point_buffer,
+    properties,
+    stack,
+    upstream_proxy,
+)
 from ...attach.updates import updates_suspended
 from ...core import side_by_side
 from ...core.errors import SinewError
@@ -157,17 +166,10 @@ def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection)
 
 def _remove_left_over() -> None:
     """What belonged to copies that were deleted by hand."""
-    helpers = {obj for obj in bpy.data.objects if properties.is_helper(obj) and obj.library is None}
-    # Not by their counts of users, as Blender does not lower those when it deletes what has our settings.
-    for helper in [h for h, users in bpy.data.user_map(subset=helpers).items() if not users]:
-        mesh = helper.data
-        bpy.data.objects.remove(helper)
-        if mesh.users == 0:
-            bpy.data.meshes.remove(mesh)
     for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
         bpy.data.actions.remove(action)
     offset_nodes.remove_unused()
-    node_group.remove_unused()
+    orphans.remove(of_copies=True)
 
 
 def corners(evaluated: bpy.types.Object) -> np.ndarray:

@@ -46,6 +46,12 @@ def _take_off(obj: bpy.types.Object) -> None:
         heat_view.take_off(obj)
 
 
+def _objects_changed(objects: list[bpy.types.Object]) -> None:
+    heat_view.sync(objects)
+    if not is_rendering_in_window():
+        heat_nodes.remove_unused_material()
+
+
 def _colour(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> None:
     heated = [obj for obj in objects if properties.of(obj).heat]
     heat_map.update(session.states_of(heated, depsgraph), depsgraph)
@@ -55,7 +61,7 @@ _SUBSCRIPTIONS = (
     (subscribers.node_group, heat_nodes.group_of),
     (subscribers.before_removal, _take_off),
     (subscribers.after_removal, heat_view.tidy),
-    (subscribers.objects_changed, heat_view.sync),
+    (subscribers.objects_changed, _objects_changed),
     (subscribers.deformed, _colour),
     (subscribers.frame_shown, redraw.request),
 )

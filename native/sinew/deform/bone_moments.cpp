@@ -11,8 +11,6 @@ namespace {
 // vertices have, each has a list of its own.
 constexpr std::size_t kMostShared = 2;
 
-constexpr double kLeastSum = 1.0 - 1e-6;
-
 using Row = std::array<float, kMomentNumbers>;
 
 /// Of one vertex.
@@ -21,7 +19,13 @@ struct BoneRow {
     Row numbers;
 };
 
-/// The rows of each vertex, of bones that are used.
+/// The number of the bone of row `row`, and whether the row says nothing of it.
+std::int32_t bone_of(const float* row) { return static_cast<std::int32_t>(row[1]); }
+bool is_empty(const float* row) {
+    return std::all_of(row + 2, row + kMomentFloats, [](float number) { return number == 0.0f; });
+}
+
+/// The rows of each vertex.
 class RowsByVertex {
 public:
     RowsByVertex(const PackedMesh& mesh, std::span<const float> rows) : mesh_(mesh), rows_(rows) {}
@@ -31,22 +35,14 @@ public:
         found.clear();
         const auto vertex = static_cast<std::size_t>(mesh_.vertices[b].lane[lane]);
         for (std::size_t row = first_of(vertex); row < count() && vertex_of(row) == vertex; ++row) {
-            const auto used =
-                std::ranges::lower_bound(mesh_.used_bones, static_cast<std::int32_t>(at(row)[1]));
-            if (used == mesh_.used_bones.end() || *used != static_cast<std::int32_t>(at(row)[1])) continue;
+            if (is_empty(at(row))) continue;
+            const auto used = std::ranges::lower_bound(mesh_.used_bones, bone_of(at(row)));
             found.push_back({static_cast<std::int32_t>(used - mesh_.used_bones.begin()), {}});
             std::copy_n(at(row) + 2, kMomentNumbers, found.back().numbers.begin());
         }
         double sum = 0.0;
         for (const BoneRow& row : found) sum += static_cast<double>(row.numbers[0]);
         if (!(sum > 0.0)) add_point(b, lane, found);
-        // Of sum 1 but for rounding, unless some were left out.
-        if (sum > 0.0 && sum < kLeastSum) {
-            for (BoneRow& row : found) {
-                for (float& number : row.numbers)
-                    number = static_cast<float>(static_cast<double>(number) / sum);
-            }
-        }
     }
 
 private:
@@ -182,6 +178,14 @@ private:
 };
 
 }  // namespace
+
+std::vector<std::int32_t> bones_of_moments(std::span<const float> rows) {
+    std::vector<std::int32_t> bones;
+    for (std::size_t i = 0; i < rows.size(); i += kMomentFloats) {
+        if (!is_empty(&rows[i])) bones.push_back(bone_of(&rows[i]));
+    }
+    return bones;
+}
 
 BoneMoments pack_moments(const PackedMesh& mesh, std::span<const float> rows) {
     return MomentPacker(mesh, rows).run();

@@ -47,8 +47,11 @@ struct BoneMoments {
     std::vector<std::int32_t> bones;  // indices into PackedMesh::used_bones
 };
 
-/// rows  [any number][kMomentFloats] by rising vertices and bones, each once. Those of bones that no vertex uses are left
-///       out. A vertex without rows has its rest point as its neighbourhood.
+/// The bones of the rows, in any order, any number of times. Those of rows of 0 alone are left out.
+[[nodiscard]] std::vector<std::int32_t> bones_of_moments(std::span<const float> rows);
+
+/// rows  [any number][kMomentFloats] by rising vertices and bones, each once; these bones are used ones of `mesh`. A
+///       vertex without rows has its rest point as its neighbourhood.
 [[nodiscard]] BoneMoments pack_moments(const PackedMesh& mesh, std::span<const float> rows);
 
 /// Undoes pack_moments(), but for rows of 0 alone.

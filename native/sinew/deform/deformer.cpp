@@ -144,13 +144,22 @@ Binding::Packed::Packed(const BindData& data) {
     for (const std::int32_t bone : data.influence_bones) {
         bone_count = std::max(bone_count, static_cast<std::size_t>(bone) + 1);
     }
+    // They may be others than those of the influences, whose weights may depend on where the vertices are.
+    std::vector<std::int32_t> bones_of_vertex_data;
+    for (const VertexData& of_method : data.vertex_data) {
+        if (!kMethods[checked_vertex_data(of_method, vertex_count)].keeps_moments) continue;
+        for (const std::int32_t bone : bones_of_moments(of_method.values)) {
+            bones_of_vertex_data.push_back(bone);
+            bone_count = std::max(bone_count, static_cast<std::size_t>(bone) + 1);
+        }
+    }
     check_rest_bones(data.rest_bones, bone_count);
 
     const NormalisedInfluences normalised = normalised_influences(data);
     influence_count = normalised.influences.size();
-    mesh = pack(data.rest_points, normalised.offsets, normalised.influences);
+    mesh = pack(data.rest_points, normalised.offsets, normalised.influences, bones_of_vertex_data);
     for (const VertexData& of_method : data.vertex_data) {
-        const std::size_t method = checked_vertex_data(of_method, vertex_count);
+        const std::size_t method = index_of(of_method.method);
         if (kMethods[method].keeps_moments) {
             moments[method] = pack_moments(mesh, of_method.values);
         } else {

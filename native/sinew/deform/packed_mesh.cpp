@@ -97,7 +97,7 @@ public:
     Packer(std::span<const std::uint32_t> offsets, std::span<const Influence<float>> influences)
         : offsets_(offsets), influences_(influences) {}
 
-    PackedMesh run(std::span<const Vec3<float>> rest_points) {
+    PackedMesh run(std::span<const Vec3<float>> rest_points, std::span<const std::int32_t> more_bones) {
         std::vector<std::uint32_t> order;
         std::vector<std::uint32_t> starts;
         BoneSets(offsets_, influences_).order(order, starts);
@@ -113,7 +113,7 @@ public:
             add_mixed(std::span(scattered).subspan(i, std::min(kLanes, scattered.size() - i)));
         }
         fill(rest_points);
-        number_used_bones();
+        number_used_bones(more_bones);
         list_bone_pairs();
         mesh_.blocks.shrink_to_fit();
         mesh_.vertices.shrink_to_fit();
@@ -222,11 +222,14 @@ private:
 
     /// Finds the bones that are used, and numbers those of the mesh by their index among them: the memory
     /// of a frame does not grow with the highest number.
-    void number_used_bones() {
-        if (mesh_.bones.empty()) return;
-        const std::int32_t highest = *std::ranges::max_element(mesh_.bones);
-        std::vector<std::int32_t> index_of_bone(static_cast<std::size_t>(highest) + 1);
+    void number_used_bones(std::span<const std::int32_t> more_bones) {
+        std::int32_t highest = -1;
+        for (const auto& bones : {std::span<const std::int32_t>(mesh_.bones), more_bones}) {
+            for (const std::int32_t bone : bones) highest = std::max(highest, bone);
+        }
+        std::vector<std::int32_t> index_of_bone(static_cast<std::size_t>(highest + 1));
         for (const std::int32_t bone : mesh_.bones) index_of_bone[static_cast<std::size_t>(bone)] = 1;
+        for (const std::int32_t bone : more_bones) index_of_bone[static_cast<std::size_t>(bone)] = 1;
         std::int32_t count = 0;
         for (std::int32_t bone = 0; bone <= highest; ++bone) {
             std::int32_t& index = index_of_bone[static_cast<std::size_t>(bone)];
@@ -297,8 +300,8 @@ private:
 }  // namespace
 
 PackedMesh pack(std::span<const Vec3<float>> rest_points, std::span<const std::uint32_t> offsets,
-                std::span<const Influence<float>> influences) {
-    return Packer(offsets, influences).run(rest_points);
+                std::span<const Influence<float>> influences, std::span<const std::int32_t> more_bones) {
+    return Packer(offsets, influences).run(rest_points, more_bones);
 }
 
 void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,

@@ -63,9 +63,11 @@ struct PackedMesh {
 /// rest_points  [vertices]
 /// offsets      [vertices + 1] into `influences`
 /// influences   of each vertex, or none; of positive weights, of sum 1
+/// more_bones   to be among the used bones besides those of the influences, in any order
 [[nodiscard]] PackedMesh pack(std::span<const Vec3<float>> rest_points,
                               std::span<const std::uint32_t> offsets,
-                              std::span<const Influence<float>> influences);
+                              std::span<const Influence<float>> influences,
+                              std::span<const std::int32_t> more_bones = {});
 
 /// Writes other rest points [vertices] to `rows`, which are those of `mesh` or a copy of them.
 void repack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
