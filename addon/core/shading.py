@@ -40,18 +40,22 @@ def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
 
 
 class SurfaceNormals:
-    """Computes the normals of a mesh as Blender defines them."""
+    """Computes the normals of a mesh as Blender defines them; zeros, which say that there are none, of one
+    that is not valid, as faces whose edges are missing."""
 
     def __init__(self, count: int, topology: Topology, shading: Shading) -> None:
-        self._normals = sinew.Normals(
-            count,
-            topology.face_offsets,
-            topology.corner_vertices,
-            topology.edges,
-            sharp_edges=shading.sharp_edges,
-            sharp_faces=shading.sharp_faces,
-            custom_normals=shading.custom,
-        )
+        try:
+            self._normals: sinew.Normals | None = sinew.Normals(
+                count,
+                topology.face_offsets,
+                topology.corner_vertices,
+                topology.edges,
+                sharp_edges=shading.sharp_edges,
+                sharp_faces=shading.sharp_faces,
+                custom_normals=shading.custom,
+            )
+        except ValueError:
+            self._normals = None
 
     def write(self, points: np.ndarray, domain: str, out: np.ndarray) -> None:
         """
@@ -59,4 +63,7 @@ class SurfaceNormals:
         domain  POINT or CORNER: what has a normal of its own
         out     float32 [vertices or corners, 3], C-contiguous
         """
-        self._normals.compute(points, _DOMAINS[domain], out=out)
+        if self._normals is None:
+            out[:] = 0.0
+        else:
+            self._normals.compute(points, _DOMAINS[domain], out=out)

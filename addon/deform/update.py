@@ -140,7 +140,7 @@ def _needs_inspection(
     is_touched = obj.session_uid in changes.objects or uid_in(keys, changes.touched)
     if not (is_touched or changes.armatures):
         return False
-    if normals.domain_of(obj.data) != skinned.normals_domain:
+    if obj.data.session_uid in changes.touched and normals.domain_of(obj.data) != skinned.normals_domain:
         return True
     # To request points touches the object by itself.
     explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)

@@ -12,6 +12,8 @@ import routes
 import scenes
 from sinew_addon.attach import attach, node_group, normals, properties, stack
 from sinew_addon.core import opengl
+from sinew_addon.core.shading import Shading, SurfaceNormals
+from sinew_addon.core.stage_mesh import Topology
 from sinew_addon.deform import session
 
 LEAVE, GIVE = properties.LEAVE_NORMALS, properties.AS_BLENDER
@@ -600,6 +602,15 @@ def test_library_overrides_keep_the_choice(tmp_path):
     bpy.context.scene.frame_set(5)
     given, left = both(own)
     np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+def test_a_mesh_that_is_not_valid_has_none():
+    # Two triangles and no edges.
+    topology = Topology(np.int32([0, 3, 6]), np.int32([0, 1, 2, 2, 1, 3]), np.empty((0, 2), np.int32))
+    normals_of_it = SurfaceNormals(4, topology, Shading(sharp_faces=np.array([True, False])))
+    found = np.ones((6, 3), np.float32)
+    normals_of_it.write(np.eye(4, 3, dtype=np.float32), "CORNER", found)
+    assert not found.any()
 
 
 @needs_support
