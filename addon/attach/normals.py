@@ -108,11 +108,14 @@ def _collections_of(obj: bpy.types.Object) -> set[bpy.types.Collection]:
 
 
 def _reads(user: bpy.types.ID, sources: set[bpy.types.ID]) -> bool:
-    if isinstance(user, bpy.types.GeometryNodeTree | bpy.types.ParticleSettings):
+    # Hair curves name the mesh that they grow on.
+    if isinstance(user, bpy.types.GeometryNodeTree | bpy.types.ParticleSettings | bpy.types.Curves):
         return True
     if not isinstance(user, bpy.types.Object) or properties.is_helper(user):
         return False
-    readers = [each for each in (*user.modifiers, *user.constraints) if each.type in READERS]
+    bones = user.pose.bones if user.pose is not None else ()
+    constraints = [*user.constraints, *(each for bone in bones for each in bone.constraints)]
+    readers = [each for each in (*user.modifiers, *constraints) if each.type in READERS]
     # What inputs Geometry Nodes have, their group decides.
     return any(
         (each.type == "NODES" and not node_group.is_sinew(each))

@@ -248,6 +248,17 @@ def add_shrinkwrap(obj):
     add_other().constraints.new("SHRINKWRAP").target = obj
 
 
+def add_shrinkwrap_of_bone(obj):
+    _other, armature = scenes.make_arm(name="Other")
+    armature.pose.bones[0].constraints.new("SHRINKWRAP").target = obj
+
+
+def add_hair(obj):
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.surface = obj
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Hair", curves))
+
+
 def instance_faces(obj):
     obj.instance_type = "FACES"
 
@@ -265,6 +276,8 @@ OBSTACLES = {
     "boolean": (add_boolean, "another object"),
     "collection": (add_boolean_of_collection, "another object"),
     "shrinkwrap": (add_shrinkwrap, "another object"),
+    "shrinkwrap of a bone": (add_shrinkwrap_of_bone, "another object"),
+    "hair": (add_hair, "another object"),
     "instances": (instance_faces, "instances"),
 }
 
