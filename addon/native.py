@@ -11,8 +11,16 @@ from types import ModuleType
 
 # What the extension uses of the library.
 NAMES = (
-    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Method", "Parameter", "Skeleton", "Stage"),
-    *("affine", "centres_of_rotation", "direct_delta_mush", "dual_quat", "interpolate"),
+    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Method", "Normals", "Parameter", "Skeleton"),
+    *(
+        "SkinnedNormals",
+        "Stage",
+        "affine",
+        "centres_of_rotation",
+        "direct_delta_mush",
+        "dual_quat",
+        "interpolate",
+    ),
     *("keep_thread_state", "methods", "quat_vec", "spline", "stages"),
 )
 

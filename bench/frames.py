@@ -3,7 +3,8 @@
 
 One process and one file, in which Sinew is switched off and on alternately, a few frames each. Two processes
 differ by some percent even without Sinew. A frame is Scene.frame_set() and then reading the evaluated mesh,
-which has Sinew's points.
+which has Sinew's points. One that is drawn is then asked for the normals of all its corners, too, which
+Blender computes where nobody gives them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ RUN, BEFORE = 24, 4
 
 @dataclass(frozen=True)
 class Case:
-    """rig: a file in SINEW_RIGS instead of a tube; normals: also read; subdivision: levels behind."""
+    """rig: a file in SINEW_RIGS instead of a tube; normals: also read; subdivision: levels behind; shading:
+    of a tube, one of SHADINGS."""
 
     vertices: int = 1080
     method: str = "dq"
@@ -40,24 +42,30 @@ class Case:
     normals: bool = False
     subdivision: int = 0
     rig: str = ""
+    shading: str = "smooth"
 
     @property
     def name(self) -> str:
         many = f"{self.characters} x " if self.characters > 1 else ""
         what = self.rig or f"{many}{self.vertices:,} vertices"
-        normals = ", normals" if self.normals else ""
-        return what + (f", subdivision {self.subdivision}" if self.subdivision else "") + normals
+        shading = f", {self.shading}" if self.shading != "smooth" else ""
+        normals = ", drawn" if self.normals else ""
+        return what + (f", subdivision {self.subdivision}" if self.subdivision else "") + shading + normals
 
 
-def cases(quick: bool) -> list[Case]:
-    sizes = [1_080, 5_000, 13_380, 100_000] if quick else [1_080, 5_000, 13_380, 100_000, 1_000_000]
-    scenes = [Case(size) for size in sizes]
+SHADINGS = ("smooth", "sharp", "custom")
+
+
+def cases(million: bool) -> list[Case]:
+    scenes = [Case(size) for size in (1_080, 5_000, 13_380, 100_000)]
+    scenes += [Case(1_000_000)] if million else []
     scenes += [Case(characters=count, bones=50) for count in (10, 50)]
     folder = os.environ.get("SINEW_RIGS")
     for name in ("human.blend", "CesiumMan.glb", "Fox.glb") if folder else ():
         if (Path(folder) / name).exists():
             scenes.append(Case(rig=name))
     found = [replace(scene, normals=normals) for scene in scenes for normals in (False, True)]
+    found += [Case(100_000, normals=True, shading=shading) for shading in SHADINGS[1:]]
     found.append(Case(13_380, subdivision=1))
     return [replace(case, method=method) for case in found for method in ("dq", "lbs")]
 
@@ -94,6 +102,7 @@ def make_tube(case: Case, index: int) -> bpy.types.Object:
     mesh.polygons.foreach_set("loop_start", np.arange(0, corners.size, 4))
     mesh.update(calc_edges=True)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(corners), dtype=bool))
+    shade(mesh, case.shading)
     obj = bpy.data.objects.new(f"Tube {index}", mesh)
     collection.link(obj)
 
@@ -113,6 +122,19 @@ def make_tube(case: Case, index: int) -> bpy.types.Object:
     if case.subdivision:
         obj.modifiers.new("Subdivision", "SUBSURF").levels = case.subdivision
     return obj
+
+
+def shade(mesh: bpy.types.Mesh, shading: str) -> None:
+    """Every fiftieth edge sharp; or custom normals of corners, as imported characters have them."""
+    rng = np.random.default_rng(1)
+    if shading == "sharp":
+        mesh.edges.foreach_set("use_edge_sharp", rng.random(len(mesh.edges)) < 0.02)
+    elif shading == "custom":
+        normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
+        mesh.corner_normals.foreach_get("vector", normals.ravel())
+        normals += rng.normal(0.0, 0.1, normals.shape)
+        mesh.normals_split_custom_set((normals / np.linalg.norm(normals, axis=1, keepdims=True)).tolist())
+    mesh.update()
 
 
 def open_rig(path: Path) -> list[bpy.types.Object]:
@@ -151,6 +173,7 @@ class Scene:
             for modifier in obj.modifiers:
                 if modifier.type == "ARMATURE":
                     modifier.use_deform_preserve_volume = case.method == "dq"
+        self.normals = [np.empty(3 * len(obj.data.loops), dtype=np.float32) for obj in self.meshes]
         bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, FRAMES
         bpy.context.scene.frame_set(1)
         for obj in self.meshes:
@@ -166,10 +189,10 @@ class Scene:
     def frame(self, number: int) -> None:
         bpy.context.scene.frame_set(number)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for obj in self.meshes:
+        for obj, normals in zip(self.meshes, self.normals, strict=True):
             mesh = obj.evaluated_get(depsgraph).data
             if self.case.normals:
-                mesh.vertex_normals[0].vector.length  # noqa: B018 - Blender computes them all for the first
+                mesh.corner_normals.foreach_get("vector", normals)
             else:
                 mesh.vertices[0].co.length  # noqa: B018
 
@@ -300,7 +323,8 @@ def line(name: str, result: dict) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="up to 100,000 vertices")
+    parser.add_argument("--quick", action="store_true", help="two seconds a case, not four")
+    parser.add_argument("--million", action="store_true", help="a million vertices, too")
     parser.add_argument("--name", default="frames", help="of the file in bench/results")
     parser.add_argument(
         "--all-by-sinew",
@@ -317,13 +341,13 @@ def main() -> None:
     print(f"{'':42}{'modifier':>9}{'sinew':>9}{'':10}{'moving':>10}{'staying':>10}{'away':>10}")
     results = {}
     with quiet_blender() as say:
-        for case in cases(arguments.quick):
+        for case in cases(arguments.million):
             if arguments.k not in f"{case.name} {case.method}":
                 continue
             result = measure(case, 2.0 if arguments.quick else 4.0, not arguments.all_by_sinew)
             results[f"{case.name} {case.method}"] = result
             say(line(case.name, result))
-        case = next((c for c in cases(arguments.quick) if c.rig == "human.blend"), Case(13_380))
+        case = next((c for c in cases(arguments.million) if c.rig == "human.blend"), Case(13_380))
         if arguments.k in f"{case.name} methods":
             say(
                 f"\nAll methods and stages in turns, {case.name}: milliseconds, medians and least tenths, and"

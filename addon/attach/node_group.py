@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group "Sinew": moves each vertex to its point in an attribute or in a point buffer."""
+"""The Geometry Nodes group "Sinew": moves each vertex to its point in an attribute or in a point buffer.
+
+One that also gives normals is another group: a mesh whose normals Blender computes has no nodes for them.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,10 @@ import bpy
 # where the group finds the points.
 MARK = "sinew_node_group"
 ATTRIBUTE, POINT_BUFFER = 10, 11
+# Added to it where the group gives normals of this domain.
+_WITH_NORMALS = {"": 0, "POINT": 10, "CORNER": 20}
+# Where the attribute of normals is named.
+NORMALS = "Normals"
 # An input that no node reads; pose_driver has its driver there.
 POSE = "Pose"
 # An input that is off in saved files: without Sinew the group then says what is missing.
@@ -26,10 +33,13 @@ def find(kind: int) -> bpy.types.NodeTree | None:
     return next((g for g in bpy.data.node_groups if g.get(MARK) == kind and g.library is None), None)
 
 
-def get_or_make(kind: int) -> bpy.types.NodeTree:
-    """The group that takes points from an ATTRIBUTE or from a POINT_BUFFER."""
+def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
+    """The group that takes points from an ATTRIBUTE or from a POINT_BUFFER.
+
+    normals  the domain of those that it takes too, POINT or CORNER; empty for none. Blender 4.5 and later
+    """
     make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
-    return find(kind) or make()
+    return find(kind + _WITH_NORMALS[normals]) or make(normals)
 
 
 def is_sinew(modifier: bpy.types.Modifier) -> bool:
@@ -116,12 +126,13 @@ def add_nodes(group: bpy.types.NodeTree, *kinds: str) -> list[bpy.types.Node]:
     return nodes
 
 
-def _make_for_attribute() -> bpy.types.NodeTree:
+def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
     group = new_group(
-        "Sinew",
-        ATTRIBUTE,
+        _name("Sinew", normals),
+        ATTRIBUTE + _WITH_NORMALS[normals],
         {
             "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
+            **({NORMALS: ("NodeSocketString", "Attribute that holds the normals")} if normals else {}),
             POSE: POSE_SOCKET,
             PRESENT: PRESENT_SOCKET,
         },
@@ -143,16 +154,81 @@ def _make_for_attribute() -> bpy.types.NodeTree:
     # Else a subdivision behind would work it out for each of its vertices, and exports would have it.
     group.links.new(source.outputs["Points"], remove.inputs["Name"])
     group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
-    group.links.new(
-        _say_what_is_missing(group, source, remove.outputs["Geometry"]), result.inputs["Geometry"]
-    )
+    moved = remove.outputs["Geometry"]
+    if normals:
+        moved = _take_normals_of_attribute(group, source, moved, normals)
+    group.links.new(_say_what_is_missing(group, source, moved), result.inputs["Geometry"])
     return group
 
 
-def _make_for_carrier() -> bpy.types.NodeTree:
+def _take_normals_of_attribute(
+    group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket, domain: str
+) -> bpy.types.NodeSocket:
+    named, remove = add_nodes(group, "GeometryNodeInputNamedAttribute", "GeometryNodeRemoveAttribute")
+    named.data_type = "FLOAT_VECTOR"
+    link = group.links.new
+    link(source.outputs[NORMALS], named.inputs["Name"])
+    normal = named.outputs["Attribute"]
+    first = _sample(group, geometry, normal, domain)
+    link(source.outputs[NORMALS], remove.inputs["Name"])
+    link(_with_normals(group, geometry, normal, first, domain), remove.inputs["Geometry"])
+    return remove.outputs["Geometry"]
+
+
+def _with_normals(
+    group: bpy.types.NodeTree,
+    geometry: bpy.types.NodeSocket,
+    normal: bpy.types.NodeSocket,
+    first: bpy.types.NodeSocket,
+    domain: str,
+) -> bpy.types.NodeSocket:
+    """The geometry with these normals; as it is where the first of them is 0: then Sinew gave none."""
+    length, is_given, give, choice = add_nodes(
+        group,
+        "ShaderNodeVectorMath",
+        "FunctionNodeCompare",
+        "GeometryNodeSetMeshNormal",
+        "GeometryNodeSwitch",
+    )
+    length.operation, is_given.data_type, is_given.operation = "LENGTH", "FLOAT", "GREATER_THAN"
+    give.mode, give.domain, choice.input_type = "FREE", domain, "GEOMETRY"
+    enabled_socket(is_given.inputs, "B").default_value = 0.5
+    link = group.links.new
+    link(first, length.inputs[0])
+    link(length.outputs["Value"], enabled_socket(is_given.inputs, "A"))
+    link(geometry, give.inputs["Mesh"])
+    link(normal, enabled_socket(give.inputs, "Custom Normal"))
+    link(is_given.outputs["Result"], choice.inputs["Switch"])
+    link(geometry, choice.inputs["False"])
+    link(give.outputs["Mesh"], choice.inputs["True"])
+    return choice.outputs["Output"]
+
+
+def _sample(
+    group: bpy.types.NodeTree,
+    geometry: bpy.types.NodeSocket,
+    value: bpy.types.NodeSocket,
+    domain: str,
+    index: bpy.types.NodeSocket | None = None,
+) -> bpy.types.NodeSocket:
+    """A vector of another or the same geometry, at an index; the first where that is None."""
+    (sample,) = add_nodes(group, "GeometryNodeSampleIndex")
+    sample.data_type, sample.domain = "FLOAT_VECTOR", domain
+    group.links.new(geometry, sample.inputs["Geometry"])
+    group.links.new(value, enabled_socket(sample.inputs, "Value"))
+    if index is not None:
+        group.links.new(index, sample.inputs["Index"])
+    return enabled_socket(sample.outputs, "Value")
+
+
+def _name(name: str, normals: str) -> str:
+    return f"{name} with {normals.title()} Normals" if normals else name
+
+
+def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
     group = new_group(
-        "Sinew Carrier",
-        POINT_BUFFER,
+        _name("Sinew Carrier", normals),
+        POINT_BUFFER + _WITH_NORMALS[normals],
         {
             "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
             "Front": (
@@ -163,34 +239,60 @@ def _make_for_carrier() -> bpy.types.NodeTree:
             PRESENT: PRESENT_SOCKET,
         },
     )
-    source, info, index, position, sample, place, result = add_nodes(
+    source, info, index, position, place, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeObjectInfo",
         "GeometryNodeInputIndex",
         "GeometryNodeInputPosition",
-        "GeometryNodeSampleIndex",
         "GeometryNodeSetPosition",
         "NodeGroupOutput",
     )
-    sample.data_type, sample.domain = "FLOAT_VECTOR", "POINT"
     link = group.links.new
     link(source.outputs["Points"], info.inputs["Object"])
-    link(info.outputs["Geometry"], sample.inputs["Geometry"])
-    link(position.outputs["Position"], enabled_socket(sample.inputs, "Value"))
-    link(index.outputs["Index"], sample.inputs["Index"])
-    link(enabled_socket(sample.outputs, "Value"), place.inputs["Position"])
+    buffer, stored = info.outputs["Geometry"], position.outputs["Position"]
+    link(_sample(group, buffer, stored, "POINT", index.outputs["Index"]), place.inputs["Position"])
     link(source.outputs["Geometry"], place.inputs["Geometry"])
     # Where the numbers of vertices differ, as before the first points are written, the shape stays as it is.
-    link(same_count(group, source.outputs["Geometry"], info.outputs["Geometry"]), place.inputs["Selection"])
+    fits = same_count(group, source.outputs["Geometry"], buffer, normals)
+    link(fits, place.inputs["Selection"])
+    moved = place.outputs["Geometry"]
+    if normals:
+        moved = _take_normals_of_buffer(group, moved, buffer, stored, index.outputs["Index"], fits, normals)
     # Never taken: naming the object in a node is what makes Blender evaluate it.
     upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
     choice.input_type = "GEOMETRY"
     link(source.outputs["Front"], upstream_proxy.inputs["Object"])
-    link(place.outputs["Geometry"], choice.inputs["False"])
+    link(moved, choice.inputs["False"])
     link(upstream_proxy.outputs["Geometry"], choice.inputs["True"])
     link(_say_what_is_missing(group, source, choice.outputs["Output"]), result.inputs["Geometry"])
     return group
+
+
+def _take_normals_of_buffer(
+    group: bpy.types.NodeTree,
+    geometry: bpy.types.NodeSocket,
+    buffer: bpy.types.NodeSocket,
+    stored: bpy.types.NodeSocket,
+    index: bpy.types.NodeSocket,
+    fits: bpy.types.NodeSocket,
+    domain: str,
+) -> bpy.types.NodeSocket:
+    """The buffer's vertices behind the points are the normals."""
+    size, behind, choice = add_nodes(
+        group, "GeometryNodeAttributeDomainSize", "FunctionNodeIntegerMath", "GeometryNodeSwitch"
+    )
+    size.component, choice.input_type = "MESH", "GEOMETRY"
+    link = group.links.new
+    link(geometry, size.inputs["Geometry"])
+    link(index, behind.inputs[0])
+    link(size.outputs["Point Count"], behind.inputs[1])
+    normal = _sample(group, buffer, stored, "POINT", behind.outputs["Value"])
+    first = _sample(group, buffer, stored, "POINT", size.outputs["Point Count"])
+    link(fits, choice.inputs["Switch"])
+    link(geometry, choice.inputs["False"])
+    link(_with_normals(group, geometry, normal, first, domain), choice.inputs["True"])
+    return choice.outputs["Output"]
 
 
 def _say_what_is_missing(
@@ -219,17 +321,28 @@ def _say_what_is_missing(
 
 
 def same_count(
-    group: bpy.types.NodeTree, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket
+    group: bpy.types.NodeTree, mesh: bpy.types.NodeSocket, buffer: bpy.types.NodeSocket, normals: str = ""
 ) -> bpy.types.NodeSocket:
-    """Whether two meshes have the same number of vertices."""
-    first, second, equal = add_nodes(
+    """Whether a buffer has as many vertices as a mesh.
+
+    normals  and as many more as that has elements of this domain
+    """
+    of_mesh, of_buffer, equal = add_nodes(
         group, "GeometryNodeAttributeDomainSize", "GeometryNodeAttributeDomainSize", "FunctionNodeCompare"
     )
     equal.data_type, equal.operation = "INT", "EQUAL"
-    for size, geometry, term in ((first, a, "A"), (second, b, "B")):
+    link = group.links.new
+    for size, geometry in ((of_mesh, mesh), (of_buffer, buffer)):
         size.component = "MESH"
-        group.links.new(geometry, size.inputs["Geometry"])
-        group.links.new(size.outputs["Point Count"], enabled_socket(equal.inputs, term))
+        link(geometry, size.inputs["Geometry"])
+    count = of_mesh.outputs["Point Count"]
+    if normals:
+        (both,) = add_nodes(group, "FunctionNodeIntegerMath")
+        link(count, both.inputs[0])
+        link(of_mesh.outputs["Face Corner Count" if normals == "CORNER" else "Point Count"], both.inputs[1])
+        count = both.outputs["Value"]
+    link(count, enabled_socket(equal.inputs, "A"))
+    link(of_buffer.outputs["Point Count"], enabled_socket(equal.inputs, "B"))
     return equal.outputs["Result"]
 
 

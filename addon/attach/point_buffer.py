@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object in no scene whose vertices are the deformed points of another.
+"""An object in no scene whose vertices are the deformed points of another, then its normals where Sinew gives
+these.
 
 It serves where an attribute of the mesh can not: the mesh is linked from another file, others use it, it has
 other vertices than what is deformed, or the points are written after the update. Within Blender's evaluation

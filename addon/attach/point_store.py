@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the deformed points of an object are stored, for Sinew's modifier to read.
+"""Where the deformed points of an object, and its normals, are stored for Sinew's modifier to read.
 
 In an attribute of the mesh; in a point buffer where the mesh is not the object's own or not what is deformed.
 Within Blender's evaluation they are written to the evaluated attribute or buffer, so that no frame touches a
@@ -15,13 +15,15 @@ from ..io import mesh_io
 from . import node_group, point_buffer, pose_driver, properties, stack, upstream_proxy
 from .subscribers import subscribers
 
-ATTRIBUTE = "sinew_points"
+ATTRIBUTE, NORMALS_ATTRIBUTE = "sinew_points", "sinew_normals"
 # Earlier versions also kept colours in the mesh.
-_OWN_ATTRIBUTES = (ATTRIBUTE, "sinew_colours")
+_OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, "sinew_colours")
 
 
-def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
+def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "") -> None:
     """Makes the attribute or the point buffer for an object's points, and has Sinew's modifier read it.
+
+    normals  the domain of the normals that are stored with them, POINT or CORNER; empty for none
 
     Raises SinewError where what stands in front can not be evaluated apart.
     """
@@ -30,15 +32,18 @@ def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
         made = upstream_proxy.ensure(obj)
         if settings.attribute:
             remove_attributes(obj)
-            settings.attribute = ""
+            _forget_names(settings)
         kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Front": made}
     else:
         upstream_proxy.remove(obj)
         point_buffer.remove(obj)
         _ensure_attribute(obj)
+        _ensure_normals_attribute(obj, normals)
         kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
+        if normals:
+            inputs[node_group.NORMALS] = settings.normals_attribute
     made_by_features = (make(obj) for make in subscribers.node_group)
-    group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind)
+    group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind, normals)
     if nodes.node_group != group:
         # It can be on an input that another group does not have.
         pose_driver.remove(obj)
@@ -50,7 +55,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool) -> None:
 def _ensure_attribute(obj: bpy.types.Object) -> None:
     settings, mesh = properties.of(obj), obj.data
     if not settings.attribute:
-        settings.attribute = _free_attribute_name(mesh)
+        settings.attribute = _free_attribute_name(mesh, ATTRIBUTE)
     attribute = mesh.attributes.get(settings.attribute)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
         # What an evaluation shows to which Sinew gave no points.
@@ -58,18 +63,42 @@ def _ensure_attribute(obj: bpy.types.Object) -> None:
         mesh_io.write_vectors(mesh, settings.attribute, _marked(rest, rest))
 
 
-def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray) -> None:
+def _ensure_normals_attribute(obj: bpy.types.Object, domain: str) -> None:
+    """Of zeros, which say that Sinew gave none to an evaluation."""
+    settings, mesh = properties.of(obj), obj.data
+    if not domain:
+        if settings.normals_attribute:
+            mesh_io.remove_attribute(mesh, settings.normals_attribute)
+            settings.normals_attribute = ""
+        return
+    if not settings.normals_attribute:
+        settings.normals_attribute = _free_attribute_name(mesh, NORMALS_ATTRIBUTE)
+    if not mesh_io.has_vectors(mesh, settings.normals_attribute, domain):
+        none = np.zeros((mesh_io.domain_size(mesh, domain), 3), dtype=np.float32)
+        mesh_io.write_vectors(mesh, settings.normals_attribute, none, domain)
+
+
+def write(
+    obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: np.ndarray | None = None
+) -> None:
     """Stores float32 [vertices, 3], object space, in the point buffer, and has Blender evaluate it.
 
-    rest  the points as the mesh comes with them
+    rest     the points as the mesh comes with them
+    normals  float32 [vertices or corners, 3], stored behind them; None for none
     """
-    point_buffer.write(properties.of(obj).point_buffer, _marked(points, rest))
+    stored = _marked(points, rest)
+    if normals is not None:
+        stored = np.concatenate((stored, normals))
+    point_buffer.write(properties.of(obj).point_buffer, stored)
 
 
-def set_rest_points(obj: bpy.types.Object, rest: np.ndarray, anew: bool) -> None:
-    """Gives the point buffer the rest points, which an evaluation moves: if their number differs, or anew."""
-    if anew or not are_written(obj, len(rest)):
-        write(obj, rest, rest)
+def set_rest_points(obj: bpy.types.Object, rest: np.ndarray, normals: int, anew: bool) -> None:
+    """Gives the point buffer the rest points, which an evaluation moves: if their number differs, or anew.
+
+    normals  how many are to follow, here zeros, which say that Sinew gave none
+    """
+    if anew or not are_written(obj, len(rest) + normals):
+        write(obj, rest, rest, np.zeros((normals, 3), dtype=np.float32))
 
 
 def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
@@ -79,7 +108,7 @@ def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
 
 
 def are_written(obj: bpy.types.Object, count: int) -> bool:
-    """Whether the point buffer holds points of as many vertices."""
+    """Whether the point buffer holds as many points and normals."""
     point_buffer = properties.of(obj).point_buffer
     return point_buffer is not None and len(point_buffer.data.vertices) == count
 
@@ -117,8 +146,13 @@ def remove_point_attributes(obj: bpy.types.Object) -> None:
     and exports would have them."""
     if not obj.data.is_editmode:
         remove_attributes(obj)
-        if properties.of(obj).attribute:
-            properties.of(obj).attribute = ""
+        _forget_names(properties.of(obj))
+
+
+def _forget_names(settings: properties.SinewSettings) -> None:
+    for name in ("attribute", "normals_attribute"):
+        if getattr(settings, name):
+            setattr(settings, name, "")
 
 
 def remove(obj: bpy.types.Object) -> None:
@@ -145,11 +179,11 @@ def unshare(objects: list[bpy.types.Object]) -> None:
         taken |= used
 
 
-def _free_attribute_name(mesh: bpy.types.Mesh) -> str:
-    name, number = ATTRIBUTE, 0
+def _free_attribute_name(mesh: bpy.types.Mesh, start: str) -> str:
+    name, number = start, 0
     while name in mesh.attributes:
         number += 1
-        name = f"{ATTRIBUTE}.{number:03d}"
+        name = f"{start}.{number:03d}"
     return name
 
 

@@ -67,6 +67,8 @@ def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
 # On a library override, only what is marked so is kept with the file.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 SAME_METHOD = "SAME"
+# Who computes normals.
+AS_BLENDER, SKINNED_NORMALS, LEAVE_NORMALS = "AS_BLENDER", "SKINNED", "LEAVE"
 
 
 def method_of_modifier(method: str, own: str, is_first: bool) -> str:
@@ -167,6 +169,24 @@ class SinewSettings(bpy.types.PropertyGroup):
         options=set(),
         override=OVERRIDABLE,
     )
+    normals: bpy.props.EnumProperty(
+        name="Normals",
+        description="Who computes the normals that the mesh is drawn with (Blender 4.5 and later)",
+        items=[
+            (AS_BLENDER, "As Blender", "Sinew computes them with the points: the same, in less time", 0),
+            (
+                SKINNED_NORMALS,
+                "Skinned",
+                "Those of the rest pose move with the skin, as in game engines; imported ones are kept",
+                2,
+            ),
+            (LEAVE_NORMALS, "Leave to Blender", "Blender computes them whenever they are read", 1),
+        ],
+        default=AS_BLENDER,
+        options=set(),
+        update=_method_changed,
+        override=OVERRIDABLE,
+    )
     heat: bpy.props.BoolProperty(
         name="Heat Map",
         description="Show a measure of the deformation as colours of the mesh",
@@ -207,6 +227,11 @@ class SinewSettings(bpy.types.PropertyGroup):
     )
     attribute: bpy.props.StringProperty(
         description="Attribute that holds the points; empty where the point buffer does",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    normals_attribute: bpy.props.StringProperty(
+        description="Attribute that holds the normals; empty where none does",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )

@@ -8,7 +8,7 @@ import bpy
 from . import properties
 
 # Of properties.SinewSettings; all stages and parameters of methods are, too.
-SHARED = ("method", "scale_rule", "leave_small")
+SHARED = ("method", "scale_rule", "normals", "leave_small")
 GROUPS = {**properties.STAGE_GROUPS, **properties.METHOD_GROUPS}
 
 

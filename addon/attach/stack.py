@@ -16,7 +16,7 @@ def is_on(modifier: bpy.types.Modifier) -> bool:
     return modifier.show_viewport or modifier.show_render
 
 
-def _can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+def can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
     """Whether it is on, or an animation may switch it on."""
     return is_on(modifier) or is_visibility_animated(obj, modifier)
 
@@ -51,7 +51,7 @@ def _start(obj: bpy.types.Object) -> int:
     modifiers = list(obj.modifiers)
     if not properties.has_sinew(obj):
         candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
-        return _index(obj, min(candidates, key=lambda m: not _can_be_on(obj, m), default=None))
+        return _index(obj, min(candidates, key=lambda m: not can_be_on(obj, m), default=None))
     behind_own = _index(obj, sinew_modifier(obj)) + 1
     found = [modifier_of(obj, replaced) for replaced in properties.of(obj).replaced_modifiers]
     known = sorted(_index(obj, modifier) for modifier in found if modifier is not None)
@@ -102,7 +102,7 @@ def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Those ahead that are on and change positions, topology or weights."""
-    return [m for m in upstream(obj) if _can_be_on(obj, m) and m.type not in HARMLESS_UPSTREAM]
+    return [m for m in upstream(obj) if can_be_on(obj, m) and m.type not in HARMLESS_UPSTREAM]
 
 
 def parent_deforms(obj: bpy.types.Object) -> bool:

@@ -20,6 +20,8 @@ from .stages import StagesAfter, StageValues
 from .vertex_data import VertexData
 
 LINEAR = "lbs"
+# The purpose of the deformer that gives a mesh its shape, where it is one alone.
+MOTION = "motion"
 NO_STAGES: StageValues = MappingProxyType({})
 
 
@@ -67,6 +69,8 @@ class Binding:
         # each purpose. Each with the rest points that it has.
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
+        # Normals that move with the skin, with the deformer and the normals that they were made for.
+        self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
         self._last: Frame | None = None
         # That of the vertex data which the packed meshes have.
         self._data_version = 0
@@ -112,6 +116,34 @@ class Binding:
         self._last, self._points_outdated = frame, out is not None
         return True
 
+    def skinned_normals(self, rest_normals: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
+        """float32 [n, 3]: normals moved by the blends of their vertices in the last frame; None where the
+        shape is not of one blend.
+
+        rest_normals  float32 [n, 3], object space
+        vertices      int32 [n], the vertex of each; None: one normal a vertex
+        """
+        frame = self._last
+        if frame is None or frame.scale_rule != BLENDER_4.name:
+            return None
+        deformer, _points = self._bound[MOTION]
+        if self._skinned is None or not (self._skinned[1] is deformer and self._skinned[2] is rest_normals):
+            packed, _points = self._packed[MOTION, frozenset(self._vertex_data_of(frame))]
+            mixed = deformer.mixed_method
+            mix = (mixed, self.mix_weights) if mixed and self.mix_weights is not None else None
+            made = sinew.SkinnedNormals(
+                packed, rest_normals, vertices=vertices, method=deformer.method, mix=mix
+            )
+            self._skinned = (made, deformer, rest_normals)
+        same_space = is_same_space(frame.bones_from_model)
+        _points, normals, _tangents = self._skinned[0].deform(
+            frame.pose,
+            bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
+            rest_inverses=self._rest_from_armature,
+            parameters=frame.parameters or None,
+        )
+        return normals
+
     def _shape(self, frame: Frame, out: np.ndarray) -> None:
         if self._weights_changed(frame):
             self._bound.clear()
@@ -122,12 +154,12 @@ class Binding:
         are_of_two_kinds = (frame.method == LINEAR) != (frame.mix == LINEAR)
         if weights is not None and frame.mix and frame.scale_rule != BLENDER_4.name and are_of_two_kinds:
             # Under these rules linear blending takes other bone matrices than the other methods.
-            self._shape_with_one_kind(replace(frame, mix=""), out, "motion")
+            self._shape_with_one_kind(replace(frame, mix=""), out, MOTION)
             second = np.empty_like(out)
             self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
             out += weights[:, None] * (second - out)
         else:
-            self._shape_with_one_kind(frame, out, "motion")
+            self._shape_with_one_kind(frame, out, MOTION)
 
     def _shape_with_one_kind(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
         """Writes the shape by methods that take the same kind of bone matrices."""
@@ -325,6 +357,13 @@ class SkinStack:
         if values and out is not None:
             self._apply_stages(out)
         return changed
+
+    def skinned_normals(self, rest_normals: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
+        """As Binding.skinned_normals(); None also where several links, a mask or stages made the shape."""
+        is_one = self._end is not None and sum(frame is not None for frame in self._frames) == 1
+        if self._values or self._end is None or not is_one:
+            return None
+        return self._end.skinned_normals(rest_normals, vertices)
 
     def _apply_stages(self, points: np.ndarray) -> None:
         assert self.stages_after is not None

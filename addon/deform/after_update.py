@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 
 import bpy
+import numpy as np
 
 from ..attach import point_store, properties
 from . import bound, pose, source
@@ -24,22 +25,33 @@ def deform(
     """Writes the points of this evaluation for the next one, where they differ from those that are there.
 
     is_inspected  the object itself may have changed, and with it what holds its points
-    is_first      the object was not deformed after the update before: what holds its points has others
+    is_first      the object was not deformed after the update before, or what it is deformed from is another:
+                  what holds its points has others, or other normals
     """
     # Binding is not part of a frame's time: it happens once.
     started, before = time.perf_counter(), skinned.shown.rest_points
     differs = shape(obj, skinned, depsgraph)
     if differs is None:
         return
-    shown, stack = skinned.shown, skinned.bound.skin_stack
+    shown, source = skinned.shown, skinned.bound.source
     if changes.frame:
         is_reshaped = before is not None and shown.rest_points is not before
         skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
+    count = source.normal_count(skinned.plan.normals.domain)
+    is_stored = not is_inspected or point_store.are_written(obj, len(shown.rest_points) + count)
+    if differs or is_first or not is_stored:
+        _store(obj, skinned)
     if differs or is_first:
-        point_store.write(obj, stack.points, skinned.bound.source.points)
         shown.milliseconds = 1000.0 * (time.perf_counter() - started)
-    elif is_inspected and not point_store.are_written(obj, len(shown.rest_points)):
-        point_store.write(obj, stack.points, skinned.bound.source.points)
+
+
+def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
+    points, source, given = skinned.bound.skin_stack.points, skinned.bound.source, skinned.plan.normals
+    normals = None
+    if given.domain:
+        normals = np.empty((source.normal_count(given.domain), 3), dtype=np.float32)
+        skinned.bound.write_normals(points, skinned.shown.rest_points, given, normals)
+    point_store.write(obj, points, source.points, normals)
 
 
 def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool | None:

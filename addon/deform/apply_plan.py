@@ -8,7 +8,7 @@ import logging
 import bpy
 import numpy as np
 
-from ..attach import attach, node_group, point_store, properties, stack, upstream_proxy
+from ..attach import attach, node_group, normals, point_store, properties, stack, upstream_proxy
 from ..core.errors import SinewError
 from . import safe_mode, small_meshes
 from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
@@ -29,11 +29,15 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
     # While Sinew is off, the modifiers have the flags that it would keep.
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
+    gives_normals = settings.normals != properties.LEAVE_NORMALS
+    domain = normals.domain_of(mesh) if gives_normals else ""
+    obstacle = normals.obstacle(obj) if domain else ""
+    given = normals.kind_of(mesh, "" if obstacle else domain)
     return ObjectFacts(
         enabled=settings.enabled,
         is_linked=obj.library is not None,
         mode="EDIT" if mesh.is_editmode else obj.mode,
-        builtin_is_faster=small_meshes.is_builtin_faster(obj),
+        builtin_is_faster=small_meshes.is_builtin_faster(obj, given),
         has_upstream=upstream_proxy.is_needed(obj),
         upstream_changes_weights=upstream_proxy.changes_weights(obj),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
@@ -45,6 +49,10 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
         safe_mode=safe_mode.is_on(),
         failure=failure,
         waits_for=waits_for,
+        gives_normals=gives_normals,
+        skins_normals=settings.normals == properties.SKINNED_NORMALS,
+        normals_domain=domain,
+        normals_obstacle=obstacle,
     )
 
 
@@ -59,7 +67,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
         elif obj.mode not in MODES_OF_THE_MODIFIER:
             point_store.remove(obj)
         return
-    point_store.ensure(obj, wanted.in_buffer)
+    point_store.ensure(obj, wanted.in_buffer, wanted.normals.domain)
     attach.switch(obj, on=True)
     attach.restore_pointers(obj)
 
@@ -118,10 +126,8 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         log.error("%s", error)
         return True
     settings = properties.of(obj)
-    settings.scale_rule, settings.leave_small = (
-        properties.of(origin).scale_rule,
-        properties.of(origin).leave_small,
-    )
+    for name in ("scale_rule", "leave_small", "normals"):
+        setattr(settings, name, getattr(properties.of(origin), name))
     groups = (*properties.STAGE_GROUPS, *properties.METHOD_GROUPS, "replaced_smooth")
     properties.copy_groups(properties.of(origin), settings, groups)
     for replaced in list(settings.replaced_modifiers)[1:]:

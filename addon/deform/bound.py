@@ -22,6 +22,7 @@ from ..core.vertex_data import VertexData
 from ..io import armature_io
 from . import method_needs, source, survey
 from .changes import Changes
+from .plan import Normals
 from .source import Source
 
 
@@ -68,6 +69,24 @@ class Bound:
             ),
         ]
 
+    def write_normals(
+        self, points: np.ndarray, rest_points: np.ndarray, given: Normals, out: np.ndarray
+    ) -> None:
+        """
+        points       float32 [vertices, 3], the shape of the last frame
+        rest_points  float32 [vertices, 3], what it was deformed from
+        out          float32 [vertices or corners, 3], C-contiguous
+        """
+        source = self.source
+        if given.are_skinned:
+            vertices = None if given.domain == "POINT" else source.topology.corner_vertices
+            rest_normals = source.rest_normals(rest_points, given.domain)
+            moved = self.skin_stack.skinned_normals(rest_normals, vertices)
+            if moved is not None:
+                out[:] = moved
+                return
+        source.normals.write(points, given.domain, out)
+
     @property
     def binding(self) -> Binding:
         """Of the first Armature modifier."""
@@ -83,6 +102,8 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
     pairs = attach.replaced_modifiers(obj)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     groups = stage_settings.vertex_groups(properties.of(obj))
+    if old is not None:
+        read_now.keep_normals_of(old.source)
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones):
         if not read_now.has_same_surface(old.source):
             for stage in old.skin_stack.skin_stages:
@@ -127,6 +148,7 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
     Requires that the mesh is the one that was read, and source.is_ready().
     """
     read_now = source.with_surface(obj, depsgraph, old.source)
+    read_now.keep_normals_of(old.source)
     for stage in old.skin_stack.skin_stages:
         stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
     return replace(old, source=read_now)

@@ -22,6 +22,8 @@ from . import pose, source
 from .plan import State
 from .skinned_object import SkinnedObject
 
+_NO_NORMALS = np.empty((0, 3), dtype=np.float32)
+
 
 class _Thread(threading.local):
     """What is kept for each of Blender's threads: the object that was named last.
@@ -88,9 +90,11 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mode, or the users of its mesh, changed"
     if [armature is None for armature in armatures] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
-    out = _points_to_write(settings, mesh, skinned)
-    if out is None or len(out) != len(bound.source.points):
+    given = skinned.plan.normals
+    memory = _memory_to_write(settings, mesh, skinned, given.domain)
+    if memory is None:
         return "its mesh changed"
+    out, normals = memory
     _note_unannounced_change(out, skinned)
     frames = pose.read(evaluated, settings, armatures, skinned, "VIEWPORT")
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
@@ -106,6 +110,8 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         bound.skin_stack.deform(rest_points, frames, out, values)
         shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
         shown.number += 1
+    if len(normals):
+        bound.write_normals(out, rest_points, given, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
     shown.first_point = out[0].tobytes()
@@ -125,14 +131,27 @@ def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
         skinned.needs_recheck |= evaluation.changed_unannounced
 
 
-def _points_to_write(
-    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject
-) -> np.ndarray | None:
-    """The memory of the evaluated mesh, or of the evaluated point buffer; None where it is not there."""
+def _memory_to_write(
+    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject, domain: str
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Of the points and of the normals, none where Blender computes these: in the evaluated mesh, or in the
+    evaluated point buffer. None where it is not there, or not for as many.
+
+    domain  of the normals; empty where Blender computes them
+    """
+    source = skinned.bound.source
+    points, count = len(source.points), source.normal_count(domain)
     if not skinned.plan.in_buffer:
-        return mesh_io.points_in(mesh, skinned.attribute)
+        to_points = mesh_io.vectors_in(mesh, skinned.attribute)
+        to_normals = mesh_io.vectors_in(mesh, skinned.normals_attribute, domain) if count else _NO_NORMALS
+        if to_points is None or to_normals is None:
+            return None
+        return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None
     buffer = settings.point_buffer
     # What an evaluated object has as its data, Blender does not always mark as evaluated.
     if buffer is None or not buffer.is_evaluated:
         return None
-    return mesh_io.points_in(buffer.data, mesh_io.POSITION)
+    stored = mesh_io.vectors_in(buffer.data, mesh_io.POSITION)
+    if stored is None or len(stored) != points + count:
+        return None
+    return stored[:points], stored[points:]

@@ -23,16 +23,32 @@ class State(Enum):
 
 
 @dataclass(frozen=True)
+class Normals:
+    """Those that Sinew gives with the points.
+
+    domain       POINT or CORNER: what has a normal of its own; empty for none: Blender computes them
+    are_skinned  they move with the skin, instead of being those of the deformed surface
+    """
+
+    domain: str = ""
+    are_skinned: bool = False
+
+
+@dataclass(frozen=True)
 class Plan:
     """reason        one clause for the panel; empty for the rule and for what the user chose
     in_buffer     an object of their own stores the points (point_buffer.py), not an attribute of the mesh
     after_update  where Sinew deforms: not within Blender's evaluation
+    normals       those that it gives with the points
+    normals_reason  why Blender does, though Sinew was to; a clause for the panel
     """
 
     state: State
     reason: str = ""
     in_buffer: bool = False
     after_update: bool = False
+    normals: Normals = Normals()
+    normals_reason: str = ""
 
     @property
     def uses_builtin(self) -> bool:
@@ -60,6 +76,10 @@ class ObjectFacts:
     safe_mode            nothing of Sinew may run within Blender's evaluation
     failure              what failed there; empty where nothing did
     waits_for            what its method needs and is not computed yet, as a clause; empty where nothing is
+    gives_normals        the user chose that Sinew computes normals
+    skins_normals        and that they move with the skin
+    normals_domain       POINT or CORNER: which draw the mesh; empty where Blender computes them in any case
+    normals_obstacle     why Blender has to, as a clause; empty where it need not
     """
 
     enabled: bool = True
@@ -77,6 +97,10 @@ class ObjectFacts:
     safe_mode: bool = False
     failure: str = ""
     waits_for: str = ""
+    gives_normals: bool = False
+    skins_normals: bool = False
+    normals_domain: str = ""
+    normals_obstacle: str = ""
 
 
 def plan(facts: ObjectFacts) -> Plan:
@@ -99,11 +123,33 @@ def plan(facts: ObjectFacts) -> Plan:
     reason = _why_not_in_depsgraph(facts)
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
+    normals, normals_reason = _normals(facts)
     # The route stays while it waits: when that ends, its method is all that changes.
-    if facts.waits_for:
-        return Plan(State.WAITING, facts.waits_for, in_buffer, after_update=bool(reason))
     state = State.AFTER_UPDATE if reason else State.IN_DEPSGRAPH
-    return Plan(state, reason, in_buffer, after_update=bool(reason))
+    if facts.waits_for:
+        state = State.WAITING
+    return Plan(
+        state,
+        facts.waits_for or reason,
+        in_buffer,
+        bool(reason),
+        normals=normals,
+        normals_reason=normals_reason,
+    )
+
+
+def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
+    """Plan.normals and Plan.normals_reason."""
+    if not (facts.gives_normals and facts.normals_domain):
+        return Normals(), ""
+    reasons = (
+        (bool(facts.normals_obstacle), facts.normals_obstacle),
+        (facts.has_upstream, "modifiers in front change the mesh"),
+        (facts.has_heat_map, "it shows a heat map"),
+    )
+    obstacle = next((reason for holds, reason in reasons if holds), "")
+    given = Normals() if obstacle else Normals(facts.normals_domain, facts.skins_normals)
+    return given, obstacle
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

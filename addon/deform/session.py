@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ..attach import attach, note, orphans, overrides, point_store, properties, stack
+from ..attach import attach, normals, note, orphans, overrides, point_store, properties, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
@@ -277,6 +277,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
             current.missed = None
         read_later = _drop_expected(changes)
         _adopt_copied_modifiers(changes)
+        _note_readers(changes)
         for obj in objects_with_sinew(changes):
             _update_or_switch_off(obj, depsgraph, changes)
             state = state_of(obj)
@@ -418,6 +419,8 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
     # The last shape is computed only here: not at each pose.
     rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
     apply_plan.follow_removal(obj, rest, shown)
+    if state is not None:
+        state.take_off_normals(obj.data)
     current.skinned.pop(obj.session_uid, None)
     current.objects = None
     return True
@@ -451,6 +454,14 @@ def _adopt_copied_modifiers(changes: Changes) -> None:
             is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
             if is_plain and not properties.has_sinew(obj) and not properties.is_copy(obj):
                 changes.structure |= apply_plan.adopt_copied_modifier(obj)
+
+
+def _note_readers(changes: Changes) -> None:
+    """An object that was edited may read others' meshes from now on: that decides who computes normals."""
+    with contextlib.suppress(ReferenceError):
+        if any(normals.may_read_meshes(obj) for obj in changes.edited):
+            for state in current.skinned.values():
+                state.needs_apply |= bool(state.plan.normals.domain or state.plan.normals_reason)
 
 
 def _expect_mesh_update(obj: bpy.types.Object) -> None:

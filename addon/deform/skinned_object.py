@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ..attach import attach, properties, stack, upstream_proxy
+from ..attach import attach, normals, properties, stack, upstream_proxy
 from ..attach.modifier_options import ModifierOptions
 from ..core.errors import SinewError
 from ..core.session import NO_STAGES, SkinStageFrame
 from ..core.stages import StageValues
+from ..io import mesh_io
 from ..io.animation_paths import animated_paths, is_visibility_animated
 from . import small_meshes
 from .bound import Bound, uid
@@ -92,6 +93,8 @@ class SkinnedObject:
     name, mode           the object's own, as they were then
     modifier             the name of Sinew's modifier, by which it is found again
     attribute            of the mesh, that has the points; empty where the point buffer has them
+    normals_attribute    that has the normals; empty where none has
+    normals_domain       which normals drew the mesh, as normals.domain_of()
     mesh_users           how many the mesh had; others could read while it is written
     is_only_user         it has as many now
     visibility_keyed     for each Armature modifier, whether an animation decides when it is on
@@ -115,6 +118,8 @@ class SkinnedObject:
     needs_apply: bool = True
     modifier: str = ""
     attribute: str = ""
+    normals_attribute: str = ""
+    normals_domain: str = ""
     mesh_users: int = 0
     is_only_user: bool = True
     visibility_keyed: list[bool] = field(default_factory=list)
@@ -146,6 +151,7 @@ class SkinnedObject:
         self.evaluation.was_tagged = True
         self.builtin_fingerprint = small_meshes.fingerprint(obj) if plan.state is State.BUILT_IN else []
         self.visibility_keyed = [is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj)]
+        self.normals_domain = normals.domain_of(obj.data)
         self.modifier, self.object_state = stack.sinew_modifier(obj).name, object_state_of(obj)
         proxy = properties.of(obj).upstream_proxy
         own = {obj.session_uid, obj.data.session_uid, uid(obj.data.shape_keys), uid(proxy)}
@@ -161,6 +167,12 @@ class SkinnedObject:
         """The shape of the last frame, float32 [vertices, 3], object space; the stack's own."""
         with self.lock:
             return self.bound.skin_stack.points
+
+    def take_off_normals(self, mesh: bpy.types.Mesh) -> None:
+        """Gives a mesh that was made of the object's evaluated one the custom normals that this would have
+        without those that Sinew gave."""
+        if self.plan.normals.domain:
+            mesh_io.restore_custom_normals(mesh, self.bound.source.shading.custom)
 
     def is_untouched_by(self, changes: Changes) -> bool:
         """Whether nothing that the shape depends on is among the changes."""
@@ -209,6 +221,7 @@ def object_state_of(obj: bpy.types.Object) -> list:
         mesh.session_uid,
         mesh.users,
         obj.show_only_shape_key,
+        obj.instance_type,
         keys is None or keys.use_relative,
     ]
     if settings.upstream_proxy is not None:

@@ -10,22 +10,33 @@ from __future__ import annotations
 import bpy
 
 from ..attach import attach, pose_driver, properties, stage_settings, upstream_proxy
+from ..attach.normals import Kind
 from ..core.scale_rule import BLENDER_4
 from ..io.animation_paths import animated_paths
 
 # Below as many vertices an Armature modifier is the faster one (bench/README.md), by method.
 VERTICES = {"lbs": 10_000, "dq": 6_000}
+# The same where Sinew gives the normals that draw the mesh, by normals.Kind: these take Blender more time.
+VERTICES_WITH_NORMALS = {
+    Kind.VERTEX: {"lbs": 5_000, "dq": 4_000},
+    Kind.CORNER: {"lbs": 3_000, "dq": 2_500},
+    Kind.CUSTOM: {"lbs": 1_500, "dq": 1_500},
+}
 # Commands compare Sinew with the modifier, and save files in which Sinew is at work.
 is_used = True
 
 
-def is_builtin_faster(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifiers of a skinned object, as they are set, have its shape in less time."""
+def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
+    """Whether the Armature modifiers of a skinned object, as they are set, have its shape in less time.
+
+    given  the normals that Sinew would give with it; None where Blender computes them
+    """
     settings = properties.of(obj)
+    limits = VERTICES if given is None else VERTICES_WITH_NORMALS[given]
     return (
         is_used
         and settings.leave_small
-        and len(obj.data.vertices) < VERTICES.get(settings.method, 0)
+        and len(obj.data.vertices) < limits.get(settings.method, 0)
         and settings.scale_rule == BLENDER_4.name
         and not stage_settings.names_on(settings)
         # Its colours need the points.

@@ -5,12 +5,14 @@ or from what the modifiers in front make of it."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
 
 from ..attach import properties, stored_vertex_data, upstream_proxy
 from ..core.influences import GroupWeights
+from ..core.shading import Shading, SurfaceNormals
 from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
 from ..io import mesh_io
@@ -26,6 +28,7 @@ class Source:
                       takes long
     stored            what the file has of numbers that methods keep of vertices, by its key; read with these
     topology          faces and edges
+    shading           what else decides its normals
     mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, whatever stands in front
     sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
@@ -41,11 +44,13 @@ class Source:
     mesh_points: np.ndarray
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
+    shading: Shading = field(default_factory=Shading)
     from_front: bool = False
     stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
     known_key_values: np.ndarray | None = None
     mixed_points: np.ndarray | None = None
+    _rest_normals: tuple[np.ndarray, str, np.ndarray] | None = None
 
     @property
     def own_points(self) -> np.ndarray | None:
@@ -65,7 +70,45 @@ class Source:
         if (keys is None) != (known is None) or not self.equals_but_for_points(other):
             return False
         has_same_keys = keys is None or keys.equals(known)
-        return has_same_keys and self.has_same_surface(other) and np.array_equal(self.points, other.points)
+        return (
+            has_same_keys
+            and self.has_same_surface(other)
+            and self.has_same_shading(other)
+            and np.array_equal(self.points, other.points)
+        )
+
+    def has_same_shading(self, other: Source) -> bool:
+        """Whether the same points have the same normals."""
+        return self.shading.equals(other.shading) and self.topology.equals(other.topology)
+
+    def make_normals(self) -> None:
+        """Where they are not made yet: else the first frame would, which takes as long as some others."""
+        assert self.normals is not None
+
+    @cached_property
+    def normals(self) -> SurfaceNormals:
+        return SurfaceNormals(len(self.points), self.topology, self.shading)
+
+    def rest_normals(self, rest_points: np.ndarray, domain: str) -> np.ndarray:
+        """float32 [vertices or corners, 3], those of the rest points; the same array for the same points."""
+        known = self._rest_normals
+        if known is None or known[0] is not rest_points or known[1] != domain:
+            found = np.empty((self.normal_count(domain), 3), dtype=np.float32)
+            self.normals.write(rest_points, domain, found)
+            known = self._rest_normals = (rest_points, domain, found)
+        return known[2]
+
+    def normal_count(self, domain: str) -> int:
+        """domain  POINT or CORNER; empty for no normals"""
+        if not domain:
+            return 0
+        return len(self.points if domain == "POINT" else self.topology.corner_vertices)
+
+    def keep_normals_of(self, other: Source) -> None:
+        """Takes over those that are made already, where they are the same."""
+        made = other.__dict__.get("normals")
+        if made is not None and self.has_same_shading(other) and len(self.points) == len(other.points):
+            self.__dict__["normals"] = made
 
     def equals_but_for_points(self, other: Source) -> bool:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
@@ -103,7 +146,8 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     if len(mesh_points) != len(points):
         sdef_keys = None
     topology = mesh_io.read_topology(mesh)
-    source = Source(names, weights, points, None, topology, mesh_points, keys, sdef_keys, from_front)
+    shading = mesh_io.read_shading(mesh)
+    source = Source(names, weights, points, None, topology, mesh_points, keys, sdef_keys, shading, from_front)
     return _with_surface(obj, mesh, source) if with_surface else source
 
 

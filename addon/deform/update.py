@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import attach, point_store, pose_driver, properties, stack, upstream_proxy
+from ..attach import attach, normals, point_store, pose_driver, properties, stack, upstream_proxy
 from ..attach.updates import is_rendering_in_window
 from ..core.errors import SinewError
 from ..io import armature_io
@@ -74,7 +74,7 @@ def update(
     elif plan.after_update:
         is_first = before is None or not before.after_update
         with skinned.lock:
-            after_update.deform(obj, skinned, depsgraph, changes, inspect, is_first)
+            after_update.deform(obj, skinned, depsgraph, changes, inspect, is_first or not is_same)
     else:
         skinned.shown.frames = None
     skinned.bound.source.known_key_values = skinned.bound.source.key_values
@@ -139,6 +139,8 @@ def _needs_inspection(
     is_touched = obj.session_uid in changes.objects or uid_in(keys, changes.touched)
     if not (is_touched or changes.armatures):
         return False
+    if obj.data.session_uid in changes.touched and normals.domain_of(obj.data) != skinned.normals_domain:
+        return True
     # To request points touches the object by itself.
     explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)
     return not explains_touch or object_state_of(obj) != skinned.object_state
@@ -181,6 +183,9 @@ def _with_data(
     that does not."""
     if plan.uses_builtin:
         return plan
+    if plan.normals.domain:
+        # Not within Blender's evaluation: it takes as long as some frames.
+        skinned.bound.source.make_normals()
     precomputing.request(obj, skinned, depsgraph)
     waits_for = precomputing.waits_for(obj, skinned)
     if waits_for == (plan.reason if plan.state is State.WAITING else ""):
@@ -254,7 +259,9 @@ def _request_points(
     """Has Blender evaluate the object once more, and so request its points, where they may differ."""
     skinned.dirtied_by_frames = False
     if skinned.plan.in_buffer:
-        point_store.set_rest_points(obj, skinned.bound.source.points, anew=is_new_plan)
+        source = skinned.bound.source
+        count = source.normal_count(skinned.plan.normals.domain)
+        point_store.set_rest_points(obj, source.points, count, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
         # The object is copied anew then, and what the change of frame has set is set again: of what is
@@ -266,7 +273,8 @@ def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
     """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where it
     can."""
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
-    skinned.attribute, skinned.mesh_users, skinned.is_only_user = settings.attribute, mesh.users, True
+    skinned.attribute, skinned.normals_attribute = settings.attribute, settings.normals_attribute
+    skinned.mesh_users, skinned.is_only_user = mesh.users, True
     poses = [
         (replaced.armature, path)
         for (_modifier, replaced), stage in zip(pairs, skinned.bound.skin_stack.skin_stages, strict=False)

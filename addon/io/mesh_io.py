@@ -15,6 +15,7 @@ import numpy as np
 from ..core import sdef
 from ..core.errors import SinewError
 from ..core.influences import GroupWeights
+from ..core.shading import Shading
 from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
 from ..core.surface import Surface, coincident_vertices
@@ -22,6 +23,7 @@ from ..core.surface import Surface, coincident_vertices
 # The attribute that holds a mesh's vertices: read and written as a whole, where "co" of the vertices takes a
 # hundred times as long.
 POSITION = "position"
+SHARP_EDGES, SHARP_FACES, CUSTOM_NORMALS = "sharp_edge", "sharp_face", "custom_normal"
 _VECTOR_BYTES = 3 * np.dtype(np.float32).itemsize
 
 
@@ -88,6 +90,68 @@ def read_topology(mesh: bpy.types.Mesh) -> Topology:
         mesh.loops.foreach_get("vertex_index", corners)
         mesh.edges.foreach_get("vertices", edges.ravel())
     return Topology(offsets, corners, edges)
+
+
+def read_shading(mesh: bpy.types.Mesh) -> Shading:
+    """What decides the mesh's normals beside its points."""
+    return Shading(
+        _read_flags(mesh, SHARP_EDGES, mesh.edges, "use_edge_sharp", shown_as=True),
+        _read_flags(mesh, SHARP_FACES, mesh.polygons, "use_smooth", shown_as=False),
+        _read_custom_normals(mesh),
+    )
+
+
+def _read_flags(
+    mesh: bpy.types.Mesh,
+    name: str,
+    elements: bpy.types.bpy_prop_collection,
+    property_name: str,
+    shown_as: bool,
+) -> np.ndarray | None:
+    """bool [elements]; None where none is set.
+
+    shown_as  what the elements' property says where the flag is set, read where the mesh has no attributes
+    """
+    if mesh.is_editmode:
+        flags = np.empty(len(elements), dtype=bool)
+        elements.foreach_get(property_name, flags)
+        flags = flags == shown_as
+    else:
+        attribute = mesh.attributes.get(name)
+        if attribute is None or attribute.data_type != "BOOLEAN":
+            return None
+        flags = np.empty(len(attribute.data), dtype=bool)
+        attribute.data.foreach_get("value", flags)
+    return flags if flags.any() and len(flags) == len(elements) else None
+
+
+def _read_custom_normals(mesh: bpy.types.Mesh) -> np.ndarray | None:
+    """int16 [corners, 2], as Blender stores them in relation to the computed ones; None where there are none.
+    Blender 4.5 and later."""
+    attribute = None if mesh.is_editmode else mesh.attributes.get(CUSTOM_NORMALS)
+    if attribute is None or attribute.data_type != "INT16_2D" or attribute.domain != "CORNER":
+        return None
+    numbers = np.empty((len(attribute.data), 2), dtype=np.int32)
+    attribute.data.foreach_get("value", numbers.ravel())
+    return numbers.astype(np.int16)
+
+
+def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> None:
+    """Takes normals that Sinew gave off a mesh that was made of an evaluated one; it has again what the mesh
+    had that this was evaluated from.
+
+    custom  int16 [corners, 2], as Shading.custom
+    """
+    attribute = mesh.attributes.get(CUSTOM_NORMALS)
+    if attribute is None or attribute.data_type != "FLOAT_VECTOR":
+        return
+    remove_attribute(mesh, CUSTOM_NORMALS)
+    if custom is not None and len(custom) == len(mesh.loops):
+        active = mesh.attributes.active_index
+        made = mesh.attributes.new(CUSTOM_NORMALS, "INT16_2D", "CORNER")
+        mesh.attributes.active_index = active
+        made.data.foreach_set("value", custom.astype(np.int32).ravel())
+    mesh.update()
 
 
 def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
@@ -199,32 +263,45 @@ def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
     return _read_key_points(keys.reference_key if block.mute else block)
 
 
-def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
-    """Stores float32 [vertices, 3] in the point attribute `name`, made where it is missing."""
+def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: str = "POINT") -> None:
+    """Stores float32 [vertices or corners, 3] in the attribute `name`, made where it is missing."""
     attribute = mesh.attributes.get(name)
-    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+    if not _is_of_vectors(attribute, domain):
         if attribute is not None:
             mesh.attributes.remove(attribute)
         # A new attribute becomes the active one, which is the artist's choice.
         active = mesh.attributes.active_index
-        attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+        attribute = mesh.attributes.new(name, "FLOAT_VECTOR", domain)
         mesh.attributes.active_index = active
     attribute.data.foreach_set("vector", vectors.ravel())
 
 
-def points_in(evaluated_mesh: bpy.types.Mesh, name: str) -> np.ndarray | None:
-    """The memory of the evaluated mesh's point attribute `name`, float32 [vertices, 3], which Blender then
-    does not share with another mesh. Valid until the mesh is evaluated again or changed.
+def has_vectors(mesh: bpy.types.Mesh, name: str, domain: str) -> bool:
+    return _is_of_vectors(mesh.attributes.get(name), domain)
+
+
+def _is_of_vectors(attribute: bpy.types.Attribute | None, domain: str) -> bool:
+    return attribute is not None and attribute.domain == domain and attribute.data_type == "FLOAT_VECTOR"
+
+
+def domain_size(mesh: bpy.types.Mesh, domain: str) -> int:
+    """Vertices or corners."""
+    return len(mesh.vertices if domain == "POINT" else mesh.loops)
+
+
+def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT") -> np.ndarray | None:
+    """The memory of the evaluated mesh's attribute `name` of the domain, float32 [vertices or corners, 3],
+    which Blender then does not share with another mesh. Valid until the mesh is evaluated again or changed.
 
     None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not in
     one piece.
     """
     attribute = evaluated_mesh.attributes.get(name)
-    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+    if not _is_of_vectors(attribute, domain):
         return None
     values = attribute.data
     count = len(values)
-    if count == 0 or count != len(evaluated_mesh.vertices):
+    if count == 0 or count != domain_size(evaluated_mesh, domain):
         return None
     first, last = values[0].as_pointer(), values[count - 1].as_pointer()
     if last - first != (count - 1) * _VECTOR_BYTES:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import sinew
 
-from ..attach import corrective_smooth, properties, stage_settings
+from ..attach import corrective_smooth, normals, properties, stage_settings
 from ..deform import method_needs, small_meshes
 from . import operators
 from .sidebar import draw_text
@@ -30,7 +30,7 @@ def draw_stages(
     obj: bpy.types.Object,
     only: str = "",
 ) -> None:
-    """What follows the method, and what bones' scale does.
+    """What follows the method, what bones' scale does, and who computes normals.
 
     only  the name of the mesh that buttons act on; empty for the character
     """
@@ -40,6 +40,8 @@ def draw_stages(
             _draw_stage(layout, settings, obj, stage, only)
     _draw_take_over(layout, context, obj, only)
     layout.prop(settings, "scale_rule")
+    if normals.ARE_SUPPORTED:
+        layout.prop(settings, "normals")
     if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
         layout.prop(settings, "leave_small")
 

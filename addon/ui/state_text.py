@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import properties
+from ..attach import hooks, properties
 from ..deform import session
 from ..deform.plan import ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
@@ -63,7 +63,9 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
             f"{state.evaluation.failures} times not deformed within Blender's evaluation; last: "
             f"{state.evaluation.failure}"
         )
-    return [*found, *state.bound.facts.warnings]
+    found += state.bound.facts.warnings
+    # A Hook may have come since.
+    return [*found, *(sentence for sentence in hooks.misled(obj) if sentence not in found)]
 
 
 def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
@@ -72,6 +74,9 @@ def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
         draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
     elif reason_of(obj):
         draw_text(layout, context, reason_of(obj), icon="INFO")
+    state = session.state_of(obj)
+    if state is not None and state.plan.normals_reason:
+        draw_text(layout, context, f"Blender computes normals: {state.plan.normals_reason}", icon="INFO")
     for sentence in problems_of(obj):
         draw_text(layout, context, sentence, icon="ERROR")
 

@@ -352,12 +352,12 @@ def test_the_memory_of_an_attribute_is_its_meshs_alone():
     ):
         mesh.attributes.new(name, kind, domain)
     copy = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    points = mesh_io.points_in(copy, "Points")
+    points = mesh_io.vectors_in(copy, "Points")
     points[:] = np.arange(points.size).reshape(-1, 3)
     assert np.array_equal(vectors_of(copy.attributes["Points"]), points)
     assert not vectors_of(mesh.attributes["Points"]).any()
     for name in ("Numbers", "Corners", "none of that name"):
-        assert mesh_io.points_in(copy, name) is None
+        assert mesh_io.vectors_in(copy, name) is None
 
 
 def test_a_frame_writes_into_the_evaluated_mesh_alone():

@@ -9,7 +9,7 @@ import pytest
 import scenes
 import whole_file
 from program import run_sinew
-from sinew_addon.attach import attach, properties, stack
+from sinew_addon.attach import attach, normals, properties, stack
 from sinew_addon.core.scale_rule import IGNORED
 from sinew_addon.deform import events, handlers, session, small_meshes
 from sinew_addon.features.heat import live
@@ -339,3 +339,29 @@ def test_commands_save_sinew_at_work(arm, tmp_path):
     assert properties.of(bpy.data.objects["Arm"]).enabled
     bpy.context.view_layer.update()
     assert deformer(bpy.data.objects["Arm"]) == "blender"
+
+
+@pytest.mark.skipif(not normals.ARE_SUPPORTED, reason="Blender takes no normals that are given")
+@pytest.mark.parametrize("kind", normals.Kind)
+def test_fewer_are_left_where_sinew_gives_normals(kind, monkeypatch):
+    obj, _armature = scenes.make_arm()
+    count = len(obj.data.vertices)
+    monkeypatch.setitem(small_meshes.VERTICES_WITH_NORMALS, kind, {"lbs": count})
+    scenes.add_sinew(obj, "lbs")
+    assert deformer(obj) == "blender"
+    obj.data.shade_smooth()
+    if kind is not normals.Kind.VERTEX:
+        obj.data.edges[7].use_edge_sharp = True
+    if kind is normals.Kind.CUSTOM:
+        obj.data.normals_split_custom_set([(0.0, 0.0, 1.0)] * len(obj.data.loops))
+    obj.data.update()
+    bpy.context.view_layer.update()
+    assert deformer(obj) == "sinew"
+    monkeypatch.setitem(small_meshes.VERTICES_WITH_NORMALS, kind, {"lbs": count + 1})
+    session.refresh(bpy.context)
+    assert deformer(obj) == "blender"
+    monkeypatch.setitem(small_meshes.VERTICES_WITH_NORMALS, kind, {"lbs": count})
+    session.refresh(bpy.context)
+    assert deformer(obj) == "sinew"
+    properties.of(obj).normals = properties.LEAVE_NORMALS
+    assert deformer(obj) == "blender"

@@ -195,6 +195,11 @@ class Child:
                 continue
             evaluated = obj.evaluated_get(depsgraph)
             found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
+            if self.side.is_sinew:
+                import walk_normals
+
+                points = found[obj.name_full][0]
+                self.side.records.errors += walk_normals.faults(obj, evaluated.data, points)
         # Renders show what is hidden here, and other view layers.
         for obj in self.walker.objects("MESH"):
             in_its_mode = obj.data.is_editmode or self.sides.shows_own_shape_in_its_mode(obj)

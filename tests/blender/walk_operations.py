@@ -452,6 +452,33 @@ def leave_small(w: Walker, r: random.Random) -> str | None:
     return f"{obj.name}: {'left to Blender where faster' if on else 'never left to Blender'}"
 
 
+@operation(1.5)
+def give_normals(w: Walker, r: random.Random) -> str | None:
+    obj, who = w.with_sinew(r), r.choice(("AS_BLENDER", "AS_BLENDER", "SKINNED", "LEAVE"))
+    if obj is None:
+        return None
+    w.side.set_option(obj, "normals", who)
+    return f"{obj.name}: normals {who}"
+
+
+@operation(3)
+def shade(w: Walker, r: random.Random) -> str | None:
+    obj = w.mesh(r, lambda o: o.data.library is None and not o.data.is_editmode)
+    if obj is None:
+        return None
+    mesh, what = obj.data, r.choice(("smooth", "smooth", "flat", "edges", "faces", "custom"))
+    if what in ("smooth", "flat"):
+        mesh.polygons.foreach_set("use_smooth", [what == "smooth"] * len(mesh.polygons))
+    elif what == "custom":
+        mesh.normals_split_custom_set([(r.random(), r.random(), 0.5 + r.random()) for _corner in mesh.loops])
+    else:
+        for each in mesh.edges if what == "edges" else mesh.polygons:
+            if r.random() < 0.2:
+                setattr(each, "use_edge_sharp" if what == "edges" else "use_smooth", r.random() < 0.5)
+    mesh.update()
+    return f"shade {mesh.name}: {what}"
+
+
 @operation(2)
 def heat(w: Walker, r: random.Random) -> str | None:
     obj, on, quantity = w.with_sinew(r), r.random() < 0.5, r.choice(("stretch", "distance", "bulge"))

@@ -76,7 +76,35 @@ def test_who_waits_keeps_its_route(route):
     assert not waiting.uses_builtin
 
 
+SMOOTH = {"gives_normals": True, "normals_domain": "POINT"}
+NORMALS = [
+    ({}, "", ""),
+    (SMOOTH, "POINT", ""),
+    ({**SMOOTH, "normals_domain": "CORNER"}, "CORNER", ""),
+    ({**SMOOTH, "normals_domain": ""}, "", ""),
+    ({**SMOOTH, "gives_normals": False}, "", ""),
+    ({**SMOOTH, "normals_obstacle": "Cast follows"}, "", "Cast follows"),
+    ({**SMOOTH, "has_upstream": True}, "", "in front"),
+    ({**SMOOTH, "has_heat_map": True}, "", "heat map"),
+    ({**SMOOTH, "safe_mode": True}, "POINT", ""),
+    ({**SMOOTH, "mesh_is_shared": True}, "POINT", ""),
+    ({**SMOOTH, "waits_for": "until found"}, "POINT", ""),
+    ({**SMOOTH, "skins_normals": True}, "POINT", ""),
+    ({**SMOOTH, "mode": "EDIT"}, "", ""),
+    ({**SMOOTH, "enabled": False}, "", ""),
+]
+
+
+@pytest.mark.parametrize(("facts", "domain", "reason"), NORMALS)
+def test_who_computes_normals(facts, domain, reason):
+    found = plan(ObjectFacts(**facts))
+    assert found.normals.domain == domain
+    assert found.normals.are_skinned == facts.get("skins_normals", False)
+    assert reason in found.normals_reason
+    assert bool(found.normals_reason) == bool(reason)
+
+
 def test_every_fact_matters():
     """One that no row changes would not have to be gathered."""
-    named = {name for facts, _state, _reason in TABLE for name in facts}
+    named = {name for facts, *_ in (*TABLE, *NORMALS) for name in facts}
     assert named == {field.name for field in fields(ObjectFacts)}

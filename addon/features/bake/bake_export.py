@@ -19,7 +19,7 @@ from ...core import bake as core
 from ...core.errors import SinewError
 from ...core.output import remove, writing
 from ...core.spaces import transformed
-from ...deform import evaluate
+from ...deform import evaluate, session
 from ...io import files
 from . import shape_animation, usd_textures
 
@@ -215,6 +215,10 @@ class MorphExport(_Export):
         for obj in self.samples:
             evaluated = obj.evaluated_get(depsgraph)
             mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
+            # The exporter has to compute those of each shape.
+            state = session.state_of(obj)
+            if state is not None:
+                state.take_off_normals(mesh)
             mesh.name = f"{obj.data.name} baked"
             made = bpy.data.objects.new(f"{obj.name} baked", mesh)
             made.matrix_world = self.spaces[obj]

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether Sinew can give an object its normals with the points, and which: changes nothing.
+
+Blender then has them as free custom normals of the evaluated mesh and computes none. They draw it as
+Blender's own do. But modifiers behind would move points and keep the normals, and what takes over the mesh
+with its attributes would have them too. And some of Blender's are means of the given ones then (seen on 4.5
+and 5.2): the normal of a face, and that of a vertex where the corners have their own.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import bpy
+
+from ..io import mesh_io
+from . import node_group, properties, stack
+
+# Set Mesh Normal has free normals.
+ARE_SUPPORTED = bpy.app.version >= (4, 5)
+# In front of Sinew's modifier and behind it these neither read nor change normals, points and faces.
+HARMLESS = {
+    "UV_PROJECT",
+    "UV_WARP",
+    "VERTEX_WEIGHT_EDIT",
+    "VERTEX_WEIGHT_MIX",
+    "VERTEX_WEIGHT_PROXIMITY",
+}
+# Modifiers and constraints that read another object's normals or take over its attributes; how they name it.
+READERS = {"BOOLEAN", "DATA_TRANSFER", "NODES", "SHRINKWRAP"}
+_POINTERS = ("object", "collection", "target", "auxiliary_target")
+
+
+class Kind(Enum):
+    """Of the normals of a mesh, by what they take to compute."""
+
+    VERTEX = "vertex"
+    CORNER = "corner"  # some edges or faces are sharp
+    CUSTOM = "custom"  # of corners, in relation to the computed ones
+
+
+def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
+    """domain  as domain_of()"""
+    if domain and mesh_io.CUSTOM_NORMALS in mesh.attributes:
+        return Kind.CUSTOM
+    return {"POINT": Kind.VERTEX, "CORNER": Kind.CORNER}.get(domain)
+
+
+def domain_of(mesh: bpy.types.Mesh) -> str:
+    """Which normals draw the mesh, POINT or CORNER; empty where Blender is to compute them: of flat meshes,
+    for which it takes little time, and where custom normals are free already, which it keeps as they are."""
+    if not ARE_SUPPORTED or mesh.is_editmode:
+        return ""
+    attribute = mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
+    if attribute is not None and (attribute.data_type, attribute.domain) != ("INT16_2D", "CORNER"):
+        return ""
+    domain = mesh.normals_domain
+    return domain if domain in ("POINT", "CORNER") else ""
+
+
+def obstacle(obj: bpy.types.Object) -> str:
+    """Why Blender has to compute the normals of a skinned object, as a clause; empty where it need not."""
+    for modifier in stack.upstream(obj):
+        if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
+            return f"{modifier.name} is in front"
+    for modifier in downstream(obj):
+        if modifier.type not in HARMLESS:
+            return f"{modifier.name} follows"
+    if obj.instance_type != "NONE":
+        return "it has instances on its vertices or faces"
+    if is_read_by_others(obj):
+        return "another object reads its mesh"
+    return ""
+
+
+def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The modifiers behind Sinew's and those that it replaces, that are on or may be switched on by an
+    animation."""
+    own, run = stack.sinew_modifier(obj), stack.armature_modifiers(obj)
+    modifiers = list(obj.modifiers)
+    ours = [modifiers.index(each) for each in (own, *run) if each is not None]
+    behind = modifiers[max(ours) + 1 :] if ours else []
+    return [modifier for modifier in behind if stack.can_be_on(obj, modifier)]
+
+
+def may_read_meshes(obj: bpy.types.Object) -> bool:
+    """Whether one of its modifiers or constraints can read another object's normals or attributes."""
+    return any(
+        each.type in READERS and not (each.type == "NODES" and node_group.is_sinew(each))
+        for each in (*obj.modifiers, *obj.constraints)
+    )
+
+
+def is_read_by_others(obj: bpy.types.Object) -> bool:
+    """Whether another object reads, or may read, its evaluated mesh, itself or as one of a collection."""
+    sources = {obj, *_collections_of(obj)}
+    users = {user for found in bpy.data.user_map(subset=sources).values() for user in found} - {obj}
+    return any(_reads(user, sources) for user in users)
+
+
+def _collections_of(obj: bpy.types.Object) -> set[bpy.types.Collection]:
+    """Those that it is in, and those that these are in."""
+    found, known = set(obj.users_collection), set()
+    while found:
+        known |= found
+        found = {c for c in bpy.data.collections if any(child in found for child in c.children)} - known
+    return known
+
+
+def _reads(user: bpy.types.ID, sources: set[bpy.types.ID]) -> bool:
+    # Hair curves name the mesh that they grow on.
+    if isinstance(user, bpy.types.GeometryNodeTree | bpy.types.ParticleSettings | bpy.types.Curves):
+        return True
+    if not isinstance(user, bpy.types.Object) or properties.is_helper(user):
+        return False
+    bones = user.pose.bones if user.pose is not None else ()
+    constraints = [*user.constraints, *(each for bone in bones for each in bone.constraints)]
+    readers = [each for each in (*user.modifiers, *constraints) if each.type in READERS]
+    # What inputs Geometry Nodes have, their group decides.
+    return any(
+        (each.type == "NODES" and not node_group.is_sinew(each))
+        or any(getattr(each, name, None) in sources for name in _POINTERS)
+        for each in readers
+    )

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a mesh is shaded, and its normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sinew
+
+from .stage_mesh import Topology
+
+# The library's names of domains by Blender's.
+_DOMAINS = {"POINT": "vertex", "CORNER": "corner"}
+
+
+@dataclass(frozen=True)
+class Shading:
+    """What decides the normals of a mesh beside its points and faces; None where there is none of it.
+
+    sharp_edges  bool [edges]
+    sharp_faces  bool [faces], which are flat
+    custom       int16 [corners, 2], custom normals in relation to those that are computed
+    """
+
+    sharp_edges: np.ndarray | None = None
+    sharp_faces: np.ndarray | None = None
+    custom: np.ndarray | None = None
+
+    def equals(self, other: Shading) -> bool:
+        return (
+            _equal(self.sharp_edges, other.sharp_edges)
+            and _equal(self.sharp_faces, other.sharp_faces)
+            and _equal(self.custom, other.custom)
+        )
+
+
+def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
+    return a is b if a is None or b is None else np.array_equal(a, b)
+
+
+class SurfaceNormals:
+    """Computes the normals of a mesh as Blender defines them; zeros, which say that there are none, of one
+    that is not valid, as faces whose edges are missing."""
+
+    def __init__(self, count: int, topology: Topology, shading: Shading) -> None:
+        try:
+            self._normals: sinew.Normals | None = sinew.Normals(
+                count,
+                topology.face_offsets,
+                topology.corner_vertices,
+                topology.edges,
+                sharp_edges=shading.sharp_edges,
+                sharp_faces=shading.sharp_faces,
+                custom_normals=shading.custom,
+            )
+        except ValueError:
+            self._normals = None
+
+    def write(self, points: np.ndarray, domain: str, out: np.ndarray) -> None:
+        """
+        points  float32 [vertices, 3]
+        domain  POINT or CORNER: what has a normal of its own
+        out     float32 [vertices or corners, 3], C-contiguous
+        """
+        if self._normals is None:
+            out[:] = 0.0
+        else:
+            self._normals.compute(points, _DOMAINS[domain], out=out)

@@ -1,0 +1,714 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Normals that Sinew gives with the points: what is drawn, written and read is as with "Leave to Blender"."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+import numpy as np
+import pytest
+import routes
+import scenes
+from sinew_addon.attach import attach, node_group, normals, properties, stack
+from sinew_addon.core import opengl
+from sinew_addon.core.shading import Shading, SurfaceNormals
+from sinew_addon.core.stage_mesh import Topology
+from sinew_addon.deform import session
+
+LEAVE, GIVE = properties.LEAVE_NORMALS, properties.AS_BLENDER
+NEAR = 1e-6
+COLLECTIONS = ("vertex_normals", "corner_normals")
+needs_support = pytest.mark.skipif(
+    not normals.ARE_SUPPORTED, reason="Blender takes no normals that are given"
+)
+
+
+@pytest.fixture(params=routes.ROUTES, autouse=True)
+def route(request):
+    routes.force(request.param)
+    yield request.param
+    routes.release()
+
+
+def smooth(obj):
+    obj.data.shade_smooth()
+
+
+def sharp(obj):
+    smooth(obj)
+    obj.data.edges.foreach_set("use_edge_sharp", np.random.default_rng(1).random(len(obj.data.edges)) < 0.1)
+    obj.data.update()
+
+
+def partly_flat(obj):
+    flags = np.random.default_rng(1).random(len(obj.data.polygons)) < 0.7
+    obj.data.polygons.foreach_set("use_smooth", flags)
+    obj.data.update()
+
+
+def flat(obj):
+    obj.data.shade_flat()
+
+
+def custom(obj):
+    sharp(obj)
+    tilted = vectors(obj.data, "corner_normals")
+    tilted = tilted + 0.3 * np.random.default_rng(2).normal(size=tilted.shape)
+    obj.data.normals_split_custom_set((tilted / np.linalg.norm(tilted, axis=1, keepdims=True)).tolist())
+    obj.data.update()
+
+
+SHADINGS = (smooth, sharp, partly_flat, flat, custom)
+DOMAINS = {smooth: "POINT", sharp: "CORNER", partly_flat: "CORNER", flat: "", custom: "CORNER"}
+
+
+def vectors(mesh, name):
+    found = np.empty((len(getattr(mesh, name)), 3), dtype=np.float32)
+    getattr(mesh, name).foreach_get("vector", found.ravel())
+    return found
+
+
+def evaluated(obj):
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def corners(obj):
+    return vectors(evaluated(obj), "corner_normals")
+
+
+def has_given(obj):
+    """Whether the evaluated mesh has normals that Sinew gave."""
+    attribute = evaluated(obj).attributes.get("custom_normal")
+    return attribute is not None and attribute.data_type == "FLOAT_VECTOR"
+
+
+def choose(obj, who):
+    properties.of(obj).normals = who
+    bpy.context.view_layer.update()
+
+
+def both(obj, read=corners):
+    """What is read with Sinew's normals, and with Blender's. Given ones are there unless they can not be."""
+    choose(obj, GIVE)
+    given = read(obj)
+    choose(obj, LEAVE)
+    left = read(obj)
+    assert not has_given(obj)
+    choose(obj, GIVE)
+    return given, left
+
+
+def make(shading=smooth, frame=7):
+    obj, armature = scenes.make_arm()
+    shading(obj)
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(frame)
+    return obj, armature
+
+
+@pytest.mark.parametrize("shading", SHADINGS, ids=lambda each: each.__name__)
+def test_normals_of_every_frame_are_blenders(shading):
+    obj, armature = make(shading)
+    assert evaluated(obj).normals_domain == (DOMAINS[shading] or "FACE")
+    for frame in (1, 4, 7.5, 11):
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
+        assert has_given(obj) == (normals.ARE_SUPPORTED and bool(DOMAINS[shading]))
+        of_frame = corners(obj)
+        given, left = both(obj)
+        np.testing.assert_array_equal(given, of_frame)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        if shading is not custom and has_given(obj):
+            # And what Blender computes of the same points by itself.
+            plain = evaluated(obj).copy()
+            plain.attributes.remove(plain.attributes["custom_normal"])
+            np.testing.assert_allclose(given, vectors(plain, "corner_normals"), rtol=0, atol=NEAR)
+    scenes.forget_keys(armature)
+    scenes.bend(armature, 50.0)
+    bpy.context.view_layer.update()
+    given, left = both(obj)
+    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+def test_smooth_meshes_have_the_normals_of_vertices_too():
+    obj, _armature = make(smooth)
+    given, left = both(obj, lambda obj: vectors(evaluated(obj), "vertex_normals"))
+    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+def test_they_are_near_those_of_the_armature_modifier():
+    obj, _armature = make(smooth)
+    given = corners(obj)
+    properties.of(obj).enabled = False
+    bpy.context.scene.frame_set(7)
+    obj.modifiers["Armature"].use_deform_preserve_volume = True
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=1e-4)
+
+
+@needs_support
+def test_edges_that_are_marked_between_frames_are_followed_at_once():
+    obj, _armature = make(smooth)
+    assert evaluated(obj).normals_domain == "POINT"
+    for shading in (sharp, custom, partly_flat, smooth, flat, sharp):
+        if "custom_normal" in obj.data.attributes:
+            obj.data.attributes.remove(obj.data.attributes["custom_normal"])
+        if "sharp_edge" in obj.data.attributes:
+            obj.data.attributes.remove(obj.data.attributes["sharp_edge"])
+        shading(obj)
+        bpy.context.view_layer.update()
+        assert has_given(obj) == bool(DOMAINS[shading]), shading.__name__
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+    # The same domain, other edges.
+    obj.data.edges[40].use_edge_sharp = not obj.data.edges[40].use_edge_sharp
+    obj.data.update()
+    bpy.context.view_layer.update()
+    given = corners(obj)
+    choose(obj, LEAVE)
+    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_shading_operators_are_followed():
+    obj, _armature = make(flat)
+    for operator, domain in (
+        (bpy.ops.object.shade_smooth, "POINT"),
+        (bpy.ops.object.shade_flat, ""),
+        (bpy.ops.object.shade_smooth_by_angle, "CORNER"),
+    ):
+        operator()
+        bpy.context.view_layer.update()
+        assert has_given(obj) == bool(domain)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_shape_keys_and_scaled_or_mirrored_objects():
+    obj, armature = make(custom)
+    scenes.key_shape(obj)
+    for scale in ((1, 1, 1), (1, 2, 0.5), (-1, 1, 1)):
+        obj.scale = scale
+        armature.scale = (1, 1, -1) if scale[0] < 0 else (1, 1, 1)
+        for frame in (3, 11):
+            bpy.context.scene.frame_set(frame)
+            assert has_given(obj)
+            given, left = both(obj)
+            np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_meshes_without_faces_or_vertices():
+    obj, _armature = scenes.make_arm()
+    obj.data.clear_geometry()
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(3)
+    obj.data.vertices.add(3)
+    obj.data.vertices.foreach_set("co", [1, 0, 0, 0, 2, 0, 0, 0, 3])
+    obj.data.update()
+    for frame in (5, 7):
+        bpy.context.scene.frame_set(frame)
+        given, left = both(obj, lambda obj: vectors(evaluated(obj), "vertex_normals"))
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+def add_nodes_that_read(obj):
+    """Another object whose Geometry Nodes read this one."""
+    group = bpy.data.node_groups.new("Reader", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    info, out = group.nodes.new("GeometryNodeObjectInfo"), group.nodes.new("NodeGroupOutput")
+    info.inputs["Object"].default_value = obj
+    group.links.new(info.outputs["Geometry"], out.inputs[0])
+    other = add_other()
+    other.modifiers.new("Reader", "NODES").node_group = group
+
+
+def add_other():
+    other = bpy.data.objects.new("Other", bpy.data.meshes.new("Other"))
+    other.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(other)
+    return other
+
+
+def add_boolean(obj):
+    add_other().modifiers.new("Boolean", "BOOLEAN").object = obj
+
+
+def add_boolean_of_collection(obj):
+    collection, outer = bpy.data.collections.new("Own"), bpy.data.collections.new("Outer")
+    bpy.context.scene.collection.children.link(outer)
+    outer.children.link(collection)
+    collection.objects.link(obj)
+    modifier = add_other().modifiers.new("Boolean", "BOOLEAN")
+    modifier.operand_type, modifier.collection = "COLLECTION", outer
+
+
+def add_shrinkwrap(obj):
+    add_other().constraints.new("SHRINKWRAP").target = obj
+
+
+def add_shrinkwrap_of_bone(obj):
+    _other, armature = scenes.make_arm(name="Other")
+    armature.pose.bones[0].constraints.new("SHRINKWRAP").target = obj
+
+
+def add_hair(obj):
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.surface = obj
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Hair", curves))
+
+
+def instance_faces(obj):
+    obj.instance_type = "FACES"
+
+
+def weigh_normals(obj):
+    modifier = obj.modifiers.new("Weighted", "WEIGHTED_NORMAL")
+    obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
+
+
+OBSTACLES = {
+    "weighted": (weigh_normals, "Weighted is in front"),
+    "subdivision": (lambda obj: obj.modifiers.new("Subdivision", "SUBSURF"), "Subdivision follows"),
+    "cast": (lambda obj: obj.modifiers.new("Cast", "CAST"), "Cast follows"),
+    "nodes": (add_nodes_that_read, "another object"),
+    "boolean": (add_boolean, "another object"),
+    "collection": (add_boolean_of_collection, "another object"),
+    "shrinkwrap": (add_shrinkwrap, "another object"),
+    "shrinkwrap of a bone": (add_shrinkwrap_of_bone, "another object"),
+    "hair": (add_hair, "another object"),
+    "instances": (instance_faces, "instances"),
+}
+
+
+@needs_support
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_blender_computes_them_where_others_would_find_other_ones(name):
+    obj, _armature = make(sharp)
+    assert has_given(obj)
+    make_obstacle, reason = OBSTACLES[name]
+    make_obstacle(obj)
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(5)
+    assert not has_given(obj)
+    assert reason in session.state_of(obj).plan.normals_reason
+    given, left = both(obj)
+    np.testing.assert_array_equal(given, left)
+
+
+@needs_support
+def test_a_modifier_behind_that_is_switched_off_or_deleted_is_no_obstacle():
+    obj, _armature = make(smooth)
+    modifier = obj.modifiers.new("Cast", "CAST")
+    modifier.show_viewport = modifier.show_render = False
+    obj.modifiers.new("UV", "UV_WARP")
+    bpy.context.scene.frame_set(4)
+    assert has_given(obj)
+    modifier.show_viewport = True
+    bpy.context.scene.frame_set(5)
+    assert not has_given(obj)
+    obj.modifiers.remove(modifier)
+    bpy.context.scene.frame_set(6)
+    assert has_given(obj)
+
+
+@needs_support
+def test_free_normals_of_the_mesh_stay():
+    obj, _armature = scenes.make_arm()
+    smooth(obj)
+    attribute = obj.data.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", np.tile(np.float32([0, 0, 1]), len(obj.data.vertices)))
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(7)
+    assert session.state_of(obj).plan.normals.domain == ""
+    assert (corners(obj) == (0, 0, 1)).all()
+
+
+@pytest.mark.parametrize("shading", SHADINGS, ids=lambda each: each.__name__)
+@pytest.mark.parametrize("how", ["apply", "convert"])
+def test_an_applied_mesh_has_no_normals_that_it_did_not_have(how, shading):
+    found = []
+    for who in (LEAVE, GIVE):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        obj, _armature = make(shading)
+        choose(obj, who)
+        bpy.context.view_layer.objects.active = obj
+        if how == "apply":
+            bpy.ops.object.modifier_apply(modifier=stack.sinew_modifier(obj).name)
+        else:
+            bpy.ops.object.convert(target="MESH")
+        bpy.context.view_layer.update()
+        assert not properties.has_sinew(obj)
+        mesh = obj.data
+        kinds = {each.name: (each.data_type, each.domain) for each in mesh.attributes}
+        found.append((kinds, *(vectors(mesh, each) for each in (*COLLECTIONS, "polygon_normals"))))
+    assert found[0][0] == found[1][0]
+    for left, given in zip(found[0][1:], found[1][1:], strict=True):
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_removal_leaves_no_trace():
+    obj, _armature = scenes.make_arm()
+    sharp(obj)
+    before = {each.name for each in obj.data.attributes}
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(7)
+    assert has_given(obj)
+    attach.remove(obj)
+    bpy.context.view_layer.update()
+    assert {each.name for each in obj.data.attributes} == before
+    assert not any(group.get(node_group.MARK) for group in bpy.data.node_groups)
+
+
+@needs_support
+def test_files_keep_the_choice_and_the_normals(tmp_path):
+    obj, _armature = make(custom, frame=7)
+    expected = corners(obj)
+    other, _armature = scenes.make_arm(name="Other")
+    smooth(other)
+    scenes.add_sinew(other, "dq")
+    choose(other, LEAVE)
+    bpy.context.scene.frame_set(7)
+    path = str(tmp_path / "kept.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    np.testing.assert_array_equal(corners(obj), expected)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj, other = bpy.data.objects["Arm"], bpy.data.objects["Other"]
+    assert (properties.of(obj).normals, properties.of(other).normals) == (GIVE, LEAVE)
+    assert has_given(obj)
+    assert not has_given(other)
+    np.testing.assert_allclose(corners(obj), expected, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_copied_modifiers_bring_the_choice():
+    obj, _armature = make(smooth)
+    choose(obj, LEAVE)
+    other, _armature = scenes.make_arm(name="Other")
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    other.select_set(True)
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    bpy.context.view_layer.update()
+    assert properties.of(other).normals == LEAVE
+
+
+def light_scene(obj):
+    """A camera and a lamp that see the arm, whose material has a tangent-space map of normals over seams."""
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (1.0, -5.0, 1.0), (1.4, 0.0, 0.0)
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
+    lamp.rotation_euler, lamp.data.energy = (0.8, 0.3, 0.0), 3.0
+    for each in (camera, lamp):
+        scene.collection.objects.link(each)
+    scene.camera = camera
+    uv = obj.data.uv_layers.new(name="UVMap")
+    uv.data.foreach_set("uv", np.random.default_rng(3).random(2 * len(uv.data), dtype=np.float32))
+    material = bpy.data.materials.new("Skin")
+    material.use_nodes = True
+    nodes, link = material.node_tree.nodes, material.node_tree.links.new
+    bumps, shader = nodes.new("ShaderNodeNormalMap"), nodes["Principled BSDF"]
+    bumps.inputs["Color"].default_value = (0.65, 0.4, 0.9, 1.0)
+    link(bumps.outputs["Normal"], shader.inputs["Normal"])
+    shader.inputs["Roughness"].default_value = 0.2
+    obj.data.materials.append(material)
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 160, 120, 100
+    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 4, False, "CPU"
+
+
+def pixels(path):
+    bpy.context.scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    found = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(found)
+    bpy.data.images.remove(image)
+    return found
+
+
+def assert_same_pictures(obj, tmp_path, is_custom):
+    given, left = both(obj, lambda _obj: pixels(tmp_path / "picture.exr"))
+    if is_custom:
+        # Their roundings differ. That is no more than one of a pixel, but where a ray just hits or misses.
+        assert (np.abs(given - left) > 1e-4).mean() < 1e-4
+    else:
+        np.testing.assert_array_equal(given, left)
+    # Other normals would have been seen.
+    properties.of(obj).enabled = False
+    (flat if evaluated(obj).normals_domain != "FACE" else smooth)(obj)
+    bpy.context.view_layer.update()
+    assert (np.abs(pixels(tmp_path / "picture.exr") - left) > 1e-3).mean() > 0.01
+
+
+@needs_support
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+@pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
+def test_pictures_are_the_same(shading, engine, tmp_path):
+    if engine != "CYCLES" and not opengl.has_opengl():
+        pytest.skip("Workbench can not draw here")
+    obj, _armature = make(shading)
+    light_scene(obj)
+    bpy.context.scene.render.engine = engine
+    obj.scale = (1.0, -1.2, 0.9)
+    bpy.context.view_layer.update()
+    assert has_given(obj)
+    assert_same_pictures(obj, tmp_path, shading is custom)
+
+
+@needs_support
+@pytest.mark.parametrize("shading", [smooth, custom], ids=lambda each: each.__name__)
+def test_blurred_pictures_are_the_same(shading, tmp_path):
+    obj, _armature = make(shading)
+    light_scene(obj)
+    scene = bpy.context.scene
+    scene.render.engine, scene.render.use_motion_blur = "CYCLES", True
+    scene.render.motion_blur_shutter = 1.5
+    assert_same_pictures(obj, tmp_path, shading is custom)
+
+
+@needs_support
+def test_what_is_on_in_renders_alone_is_an_obstacle(tmp_path):
+    obj, _armature = make(smooth)
+    light_scene(obj)
+    bpy.context.scene.render.engine = "CYCLES"
+    modifier = obj.modifiers.new("Cast", "CAST")
+    modifier.factor = 0.8
+    modifier.show_viewport = modifier.show_render = False
+    bpy.context.view_layer.update()
+    assert has_given(obj)
+    modifier.show_render = True
+    given = pixels(tmp_path / "picture.exr")
+    choose(obj, LEAVE)
+    np.testing.assert_allclose(given, pixels(tmp_path / "picture.exr"), rtol=0, atol=1e-5)
+
+
+EXPORTERS = {
+    "obj": lambda path: bpy.ops.wm.obj_export(filepath=path, export_materials=False),
+    "stl": lambda path: bpy.ops.wm.stl_export(filepath=path),
+    "usda": lambda path: bpy.ops.wm.usd_export(filepath=path, export_animation=True),
+    "abc": lambda path: bpy.ops.wm.alembic_export(filepath=path, start=3, end=4, as_background_job=False),
+    "glb": lambda path: bpy.ops.export_scene.gltf(filepath=path),
+}
+
+
+@needs_support
+@pytest.mark.parametrize("kind", EXPORTERS)
+@pytest.mark.parametrize("shading", SHADINGS, ids=lambda each: each.__name__)
+def test_exported_files_are_the_same(shading, kind, tmp_path):
+    if kind == "abc" and not bpy.app.build_options.alembic:
+        pytest.skip("this Blender writes no Alembic")
+    obj, _armature = make(shading)
+    bpy.context.scene.frame_end = 4
+
+    def written(_obj):
+        path = tmp_path / f"file.{kind}"
+        EXPORTERS[kind](str(path))
+        return path.read_bytes()
+
+    given, left = both(obj, written)
+    if kind == "abc":
+        (given, kinds), (left, others) = (imported_alembic(data, tmp_path) for data in (given, left))
+        assert kinds == others
+        # As near as a mesh stores them.
+        np.testing.assert_allclose(given, left, rtol=0, atol=1e-4)
+    elif kind in ("obj", "usda"):
+        assert_same_numbers(given, left)
+    else:
+        assert given == left
+
+
+def assert_same_numbers(a, b):
+    """Of two texts, whose objects are in any order."""
+    a, b = (b"\n".join(sorted(text.split(b"\n"))) for text in (a, b))
+    split = re.compile(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
+    assert split.sub(b"#", a) == split.sub(b"#", b)
+    numbers = [np.array(split.findall(text), dtype=np.float64) for text in (a, b)]
+    np.testing.assert_allclose(*numbers, rtol=0, atol=1e-6)
+
+
+def imported_alembic(data, tmp_path):
+    """What Blender reads of a file, which holds the time when it was written."""
+    path = tmp_path / "again.abc"
+    path.write_bytes(data)
+    before = set(bpy.data.objects)
+    bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
+    made = set(bpy.data.objects) - before
+    (obj,) = (each for each in made if each.type == "MESH")
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    found = (
+        vectors(mesh, "corner_normals"),
+        sorted((each.name, each.data_type, each.domain) for each in mesh.attributes),
+    )
+    for each in made:
+        bpy.data.objects.remove(each)
+    return found
+
+
+@pytest.mark.skipif(normals.ARE_SUPPORTED, reason="of Blender before 4.5")
+def test_before_4_5_blender_computes_them():
+    obj, _armature = make(sharp)
+    assert properties.of(obj).normals == GIVE
+    assert not has_given(obj)
+    assert session.state_of(obj).plan.normals.domain == ""
+    assert not any("normals" in each.name for each in obj.data.attributes)
+
+
+@needs_support
+def test_objects_with_one_mesh_and_painted_ones():
+    obj, _armature = make(custom)
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    for frame in (4, 9):
+        bpy.context.scene.frame_set(frame)
+        for each in (obj, other):
+            assert session.state_of(each).plan.in_buffer
+            assert has_given(each)
+            given, left = both(each)
+            np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+    bpy.data.objects.remove(other)
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = obj
+    for mode in ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.scene.frame_set(6)
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for mode in ("EDIT", "SCULPT"):
+        bpy.ops.object.mode_set(mode=mode)
+        bpy.context.scene.frame_set(8)
+        assert session.state_of(obj) is None
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_library_overrides_keep_the_choice(tmp_path):
+    obj, _armature = make(sharp)
+    name = obj.name
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (source, target):
+        target.collections, target.objects = source.collections, source.objects
+    linked = next(each for each in target.objects if each.name == name)
+    bpy.context.scene.collection.objects.link(linked)
+    override = linked.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    assert override is not None
+    own = next(each for each in bpy.data.objects if each.name == name and each.library is None)
+    choose(own, LEAVE)
+    bpy.context.scene.frame_set(5)
+    assert not has_given(own)
+    user = str(tmp_path / "user.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=user)
+    bpy.ops.wm.open_mainfile(filepath=user)
+    own = next(each for each in bpy.data.objects if each.name == name and each.library is None)
+    assert properties.of(own).normals == LEAVE
+    bpy.context.scene.frame_set(5)
+    given, left = both(own)
+    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+def test_a_mesh_that_is_not_valid_has_none():
+    # Two triangles and no edges.
+    topology = Topology(np.int32([0, 3, 6]), np.int32([0, 1, 2, 2, 1, 3]), np.empty((0, 2), np.int32))
+    normals_of_it = SurfaceNormals(4, topology, Shading(sharp_faces=np.array([True, False])))
+    found = np.ones((6, 3), np.float32)
+    normals_of_it.write(np.eye(4, 3, dtype=np.float32), "CORNER", found)
+    assert not found.any()
+
+
+@needs_support
+def test_undo_brings_the_choice_back():
+    obj, _armature = make(smooth)
+    bpy.ops.ed.undo_push(message="as Blender")
+    properties.of(obj).normals = LEAVE
+    bpy.ops.ed.undo_push(message="left")
+    assert not has_given(obj)
+    bpy.ops.ed.undo()
+    obj = bpy.data.objects["Arm"]
+    bpy.context.view_layer.update()
+    assert properties.of(obj).normals == GIVE
+    assert has_given(obj)
+
+
+def bone_motions(obj, armature):
+    """float64 [bones, 4, 4]: from the rest pose to this frame's, in the object's space."""
+    evaluated_armature = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    place = np.linalg.inv(np.array(obj.matrix_world)) @ np.array(armature.matrix_world)
+    return [
+        place @ np.array(bone.matrix) @ np.linalg.inv(np.array(bone.bone.matrix_local)) @ np.linalg.inv(place)
+        for bone in evaluated_armature.pose.bones
+    ]
+
+
+@needs_support
+@pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
+def test_skinned_normals_move_by_the_inverse_transpose_of_the_blend(shading):
+    obj, armature = make(shading)
+    properties.of(obj).method = "lbs"
+    armature.location = (0.3, 0.2, -0.1)
+    armature.rotation_euler = (0.2, 0.1, 0.4)
+    for bone in armature.pose.bones:
+        bone.scale = (1.0, 1.4, 0.7)
+    properties.of(obj).normals = properties.SKINNED_NORMALS
+    rest = vectors(obj.data, "corner_normals").astype(np.float64)
+    corner_vertices = np.array([loop.vertex_index for loop in obj.data.loops])
+    offsets, bones, weights = scenes.weights_of(obj)
+    for frame in (5, 11):
+        bpy.context.scene.frame_set(frame)
+        assert session.state_of(obj).plan.normals.are_skinned
+        assert has_given(obj)
+        motions = bone_motions(obj, armature)
+        blends = np.zeros((len(obj.data.vertices), 3, 3))
+        for vertex in range(len(blends)):
+            own = slice(offsets[vertex], offsets[vertex + 1])
+            total = weights[own].astype(np.float64).sum()
+            for bone, weight in zip(bones[own], weights[own], strict=True):
+                blends[vertex] += weight / total * motions[bone][:3, :3]
+        expected = np.einsum("nji,nj->ni", np.linalg.inv(blends)[corner_vertices], rest)
+        expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+        np.testing.assert_allclose(corners(obj), expected, rtol=0, atol=2e-5)
+    # Shape keys change the rest normals.
+    scenes.key_shape(obj)
+    for point in obj.data.shape_keys.key_blocks["Key"].data:
+        point.co.y *= 0.4
+    bpy.context.scene.frame_set(9)
+    before = corners(obj)
+    obj.data.shape_keys.key_blocks["Key"].mute = True
+    bpy.context.view_layer.update()
+    assert np.abs(before - corners(obj)).max() > 0.01
+
+
+@needs_support
+def test_skinned_normals_of_what_is_not_one_blend_are_blenders():
+    obj, _armature = make(smooth)
+    settings = properties.of(obj)
+    settings.normals = properties.SKINNED_NORMALS
+    settings.delta_mush.enabled = True
+    bpy.context.scene.frame_set(9)
+    given = corners(obj)
+    choose(obj, LEAVE)
+    np.testing.assert_allclose(given, corners(obj), rtol=0, atol=NEAR)
+
+
+@needs_support
+@pytest.mark.parametrize("method", [each for each in properties.METHODS if each != "ddm"])
+def test_every_method_and_stage(method):
+    obj, _armature = make(custom)
+    settings = properties.of(obj)
+    settings.method = method
+    settings.delta_mush.enabled = True
+    for frame in (4, 9):
+        bpy.context.scene.frame_set(frame)
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)

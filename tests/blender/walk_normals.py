@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether normals that Sinew gave to an evaluated mesh are those of its points, edges and faces as they are.
+
+The library is the oracle: test_normals.py compares it with Blender. It is told here what the mesh has now, so
+it finds normals of an earlier frame, of other sharp edges, or that modifiers behind took along.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from sinew_addon.attach import properties
+from sinew_addon.core.shading import Shading, SurfaceNormals
+from sinew_addon.io import mesh_io
+
+# In each component.
+NEAR = 1e-4
+
+
+def faults(obj: bpy.types.Object, mesh: bpy.types.Mesh, points: np.ndarray) -> list[str]:
+    """A sentence where they are not.
+
+    mesh    evaluated
+    points  float32 [vertices, 3], its own
+    """
+    given = None if mesh.is_editmode else mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
+    if given is None or given.data_type != "FLOAT_VECTOR" or _has_free(obj.data):
+        return []
+    if not obj.is_property_set("sinew"):
+        return [f"{obj.name}: it has normals that nobody gave"]
+    if properties.of(obj).normals == properties.SKINNED_NORMALS:
+        return []
+    shown, own = mesh_io.read_shading(mesh), mesh_io.read_shading(obj.data)
+    shading = Shading(shown.sharp_edges, shown.sharp_faces, own.custom)
+    expected = np.empty((mesh_io.domain_size(mesh, given.domain), 3), dtype=np.float32)
+    normals = SurfaceNormals(len(points), mesh_io.read_topology(mesh), shading)
+    normals.write(points, given.domain, expected)
+    found = np.empty_like(expected)
+    given.data.foreach_get("vector", found.ravel())
+    worst = float(np.abs(found - expected).max(initial=0.0))
+    if worst <= NEAR:
+        return []
+    return [f"{obj.name}: a normal of Sinew's is {worst} from that of the surface"]
+
+
+def _has_free(mesh: bpy.types.Mesh) -> bool:
+    attribute = None if mesh.is_editmode else mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
+    return attribute is not None and attribute.data_type == "FLOAT_VECTOR"
