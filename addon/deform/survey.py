@@ -36,7 +36,23 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    return facts.with_warnings([*differences(obj), *_missing_groups(obj), *_other_sdef(obj)])
+    return facts.with_warnings(
+        [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *_hooks_of_vertices(obj)]
+    )
+
+
+def _hooks_of_vertices(obj: bpy.types.Object) -> list[str]:
+    """A sentence for each Hook behind that has a list of vertices. Behind Geometry Nodes, as behind all that
+    do more than deform, Blender takes as many of the first vertices instead (seen on 4.2 to 5.2)."""
+    run, modifiers = stack.armature_modifiers(obj), list(obj.modifiers)
+    behind = modifiers[modifiers.index(run[-1]) + 1 :] if run else []
+    return [
+        f"{modifier.name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this "
+        "Hook; give it a vertex group"
+        for modifier in behind
+        if modifier.type == "HOOK" and stack.is_on(modifier)
+        if len(modifier.vertex_indices) and not modifier.vertex_group
+    ]
 
 
 def _other_sdef(obj: bpy.types.Object) -> list[str]:
