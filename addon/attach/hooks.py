@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hooks that stand behind Sinew's modifier and are given vertices."""
+"""Hooks behind Sinew's modifier that have a list of vertices."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from . import stack
 
 
 def misled(obj: bpy.types.Object) -> list[str]:
-    """A sentence for each Hook that moves other vertices than it was given: behind a modifier that can change
-    the mesh, which Sinew's is, Blender (4.2 to 5.2) takes as many vertices from the first on."""
-    nodes = stack.sinew_modifier(obj)
-    if nodes is None:
-        return []
-    modifiers = list(obj.modifiers)
+    """A sentence for each Hook behind that has a list of vertices. Behind Geometry Nodes, as behind all that do
+    more than deform, Blender takes as many of the first vertices instead (seen on 4.2 to 5.2)."""
+    run, modifiers = stack.armature_modifiers(obj), list(obj.modifiers)
+    behind = modifiers[modifiers.index(run[-1]) + 1 :] if run else []
     return [
-        f"{hook.name}: behind Sinew's modifier Blender hooks other vertices than those assigned; give it a "
-        "vertex group"
-        for hook in modifiers[modifiers.index(nodes) + 1 :]
-        if hook.type == "HOOK" and stack.is_on(hook) and not hook.vertex_group and len(hook.vertex_indices)
+        f"{hook.name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this Hook; "
+        "give it a vertex group"
+        for hook in behind
+        if hook.type == "HOOK" and stack.is_on(hook)
+        if len(hook.vertex_indices) and not hook.vertex_group
     ]

@@ -478,6 +478,27 @@ def test_what_is_missing_in_the_rig_is_warned_of():
     assert "2 of 252 vertices" in " ".join(session.state_of(obj).bound.facts.warnings)
 
 
+@pytest.mark.parametrize("has_group", [True, False])
+def test_hooks_behind_take_a_vertex_group(has_group):
+    obj, _armature = scenes.make_arm()
+    hook, vertices = obj.modifiers.new("Hook", "HOOK"), [1, 3, 6, 30]
+    hook.object = bpy.data.objects.new("Hand", None)
+    bpy.context.scene.collection.objects.link(hook.object)
+    if has_group:
+        obj.vertex_groups.new(name="hooked").add(vertices, 1.0, "REPLACE")
+        hook.vertex_group = "hooked"
+    else:
+        hook.vertex_indices_set(vertices)
+    hook.object.location.z = 3.0
+    bpy.context.scene.frame_set(6)
+    expected = scenes.final_points(obj)
+    scenes.add_sinew(obj)
+    warnings = " ".join(session.state_of(obj).bound.facts.warnings)
+    is_equal = scenes.worst(scenes.final_points(obj), expected) <= 1e-5
+    assert is_equal == has_group
+    assert ("this Hook" in warnings) != has_group
+
+
 def test_remove_while_off_keeps_what_the_artist_switched():
     obj, _armature = scenes.make_arm()
     scenes.add_sinew(obj, "dq")

@@ -1187,9 +1187,9 @@ def _set_up(
     elif modifier.type == "VERTEX_WEIGHT_EDIT" and obj.vertex_groups:
         modifier.vertex_group, modifier.falloff_type = w.one(r, obj.vertex_groups).name, "SMOOTH"
     elif modifier.type == "HOOK":
+        # Behind Geometry Nodes, Blender takes the first vertices for those of a list.
         modifier.object, modifier.strength = rig, 0.3
-        # Assigned vertices are others behind Sinew's modifier (docs/parity.md).
-        modifier.vertex_group = w.one(r, obj.vertex_groups).name
+        modifier.vertex_group = w.one(r, obj.vertex_groups).name if obj.vertex_groups else ""
     elif modifier.type == "NODES":
         modifier.node_group = _make_nodes(modifier.name)
 
