@@ -29,16 +29,33 @@ def register() -> None:
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
     from .features.suggest import feature as suggest
-    from .ui import main_panel, operators, precomputing, preferences
+    from .ui import (
+        character,
+        character_operators,
+        main_panel,
+        manual,
+        menus,
+        meshes_panel,
+        modifier_panel,
+        operators,
+        precomputing,
+        preferences,
+        presets,
+    )
 
     # Panels appear in this order.
     for owner in (
-        *(preferences, properties, stored_vertex_data, operators, precomputing, main_panel),
+        *(preferences, properties, stored_vertex_data, character, operators, precomputing),
+        *(character_operators, presets, menus, main_panel, meshes_panel),
         *(suggest, inbetween, bake, compare, heat, diagnose),
     ):
         _register_classes(owner.CLASSES)
     properties.register()
     stored_vertex_data.register()
+    character.register()
+    menus.register()
+    manual.register()
+    modifier_panel.register()
     precomputing.register()
     # Its handlers come first: poses before what they deform.
     inbetween.register()
@@ -61,7 +78,7 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
-        from .ui import precomputing
+        from .ui import character, manual, menus, modifier_panel, precomputing
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
@@ -71,7 +88,11 @@ def unregister() -> None:
         exporters.unregister()
         handlers.unregister()
         inbetween.unregister()
+        modifier_panel.unregister()
+        manual.unregister()
+        menus.unregister()
         precomputing.unregister()
+        character.unregister()
         stored_vertex_data.unregister()
         properties.unregister()
     while _registered:

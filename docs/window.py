@@ -63,6 +63,35 @@ def choose_tab() -> None:
         bpy.context.region.active_panel_category = "Sinew"
 
 
+def move(place: tuple[int, int]) -> None:
+    """The mouse, to a place of the window's picture: from its left and its top. These need
+    --enable-event-simulate."""
+    main = bpy.context.window_manager.windows[0]
+    main.event_simulate(type="MOUSEMOVE", value="NOTHING", x=place[0], y=main.height - place[1])
+
+
+def press(key: str, place: tuple[int, int], text: str = "", **held: bool) -> None:
+    """A key or a button of the mouse there.
+
+    text  what the key types
+    """
+    move(place)
+    main = bpy.context.window_manager.windows[0]
+    at = {"x": place[0], "y": main.height - place[1]}
+    typed = {"unicode": text} if text else {}
+    main.event_simulate(type=key, value="PRESS", **at, **typed, **held)
+    main.event_simulate(type=key, value="RELEASE", **at, **held)
+
+
+def click(place: tuple[int, int], **held: bool) -> Iterator[None]:
+    """Blender notices the mouse over a button before it is pressed."""
+    move(place)
+    yield
+    press("LEFTMOUSE", place, **held)
+    yield
+    yield
+
+
 def photograph(picture: Path) -> None:
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
     subprocess.run(f"xwd -root -silent | xwdtopnm | pnmtopng > '{picture}'", shell=True, check=True)

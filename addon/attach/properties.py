@@ -163,6 +163,12 @@ class SinewSettings(bpy.types.PropertyGroup):
         update=_enabled_changed,
         override=OVERRIDABLE,
     )
+    is_own: bpy.props.BoolProperty(
+        name="Own Settings",
+        description="This mesh keeps settings of its own: what is set for the character does not change it",
+        options=set(),
+        override=OVERRIDABLE,
+    )
     normals: bpy.props.EnumProperty(
         name="Normals",
         description="Who computes the normals that the mesh is drawn with (Blender 4.5 and later)",
@@ -316,7 +322,7 @@ class SinewSettings(bpy.types.PropertyGroup):
 # One group of settings for each stage, and for each method that has parameters, by its name.
 SinewSettings.__annotations__.update(
     {
-        name: bpy.props.PointerProperty(type=group, override=OVERRIDABLE)
+        name: bpy.props.PointerProperty(type=group, description=group.__doc__, override=OVERRIDABLE)
         for name, group in (*STAGE_GROUPS.items(), *METHOD_GROUPS.items())
     }
 )

@@ -100,7 +100,9 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
         choices = [(OFF, "Off", "Without this stage", 0), *method_items(1)]
         return bpy.props.EnumProperty(items=choices, default=OFF, **facts)
     if parameter.kind == "enum":
-        items = [(choice, choice.replace("_", " ").title(), "") for choice in parameter.choices]
+        items = [
+            (choice, choice.replace("_", " ").title(), parameter.description) for choice in parameter.choices
+        ]
         return bpy.props.EnumProperty(items=items, default=parameter.default, **facts)
     if parameter.kind == "vertex_group":
         return bpy.props.StringProperty(**facts)

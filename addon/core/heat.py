@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heat map colours: the range of values, a perceptually uniform colour map, the legend's numbers."""
+"""Heat map colours: the range of values, perceptually uniform colour maps, the legend's numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -34,13 +34,46 @@ def viridis(shares: np.ndarray) -> np.ndarray:
     return stops.take(first, axis=0) + (positions - first)[..., None] * steps.take(first, axis=0)
 
 
+# Of the two sides of the diverging map: lightness and chroma in Oklab at the ends and in the middle. Blue and
+# orange differ to all dichromats, and the neutral middle is nearly white.
+_MIDDLE_LIGHTNESS, _END_LIGHTNESS, _END_CHROMA = 0.95, 0.47, 0.135
+_BELOW, _ABOVE = np.radians(252.0), np.radians(50.0)
+# From Oklab to linear sRGB (B. Ottosson, 2020, "A perceptual color space for image processing").
+_LMS_FROM_OKLAB = np.array(
+    [
+        [1.0, 0.3963377774, 0.2158037573],
+        [1.0, -0.1055613458, -0.0638541728],
+        [1.0, -0.0894841775, -1.2914855480],
+    ]
+)
+_RGB_FROM_LMS = np.array(
+    [
+        [4.0767416621, -3.3077115913, 0.2309699292],
+        [-1.2684380046, 2.6097574011, -0.3413193965],
+        [-0.0041960863, -0.7034186147, 1.7076147010],
+    ]
+)
+
+
+def diverging(shares: np.ndarray) -> np.ndarray:
+    """float64 [n, 3], sRGB in 0..1: blue at 0, nearly white at 0.5, orange brown at 1; clipped outside."""
+    away = 2.0 * np.clip(np.asarray(shares, dtype=np.float64), 0.0, 1.0) - 1.0
+    hue, far = np.where(away < 0.0, _BELOW, _ABOVE), np.abs(away)
+    lightness = _MIDDLE_LIGHTNESS + far * (_END_LIGHTNESS - _MIDDLE_LIGHTNESS)
+    # Pale colours have less chroma than a straight line would give: it would leave sRGB.
+    chroma = _END_CHROMA * np.sin(0.5 * np.pi * far)
+    oklab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=-1)
+    rgb = np.clip((oklab @ _LMS_FROM_OKLAB.T) ** 3 @ _RGB_FROM_LMS.T, 0.0, 1.0)
+    return np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * rgb ** (1.0 / 2.4) - 0.055)
+
+
 # Finer than the steps of 8-bit colours.
 _STEPS = 1024
 
 
 @cache
-def _linear_viridis() -> np.ndarray:
-    return linear(viridis(np.linspace(0.0, 1.0, _STEPS))).astype(np.float32)
+def _linear_table(colour_map: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    return linear(colour_map(np.linspace(0.0, 1.0, _STEPS))).astype(np.float32)
 
 
 def linear(colours: np.ndarray) -> np.ndarray:
@@ -106,7 +139,13 @@ class HeatScale:
 
     def colours(self, values: np.ndarray) -> np.ndarray:
         """float64 [n, 3], sRGB in 0..1."""
-        return viridis(self._shares(values))
+        return self.ramp(self._shares(values))
+
+    @property
+    def ramp(self) -> Callable[[np.ndarray], np.ndarray]:
+        """The colours from `low` to `high` by shares: of values about a neutral one, as rest is for a ratio,
+        diverging from it; of magnitudes, viridis."""
+        return viridis if self.metric.scale == "linear" else diverging
 
     def linear_colours(self, values: np.ndarray) -> np.ndarray:
         """float32 [n, 3], scene-linear, to 0.002: from a table, as it is needed for every frame."""
@@ -114,7 +153,7 @@ class HeatScale:
         shares *= _STEPS - 1
         shares += 0.5
         indices = np.clip(shares, 0, _STEPS - 1, out=shares).astype(np.intp)
-        return _linear_viridis().take(indices, axis=0)
+        return _linear_table(self.ramp).take(indices, axis=0)
 
     def _shares(self, values: np.ndarray) -> np.ndarray:
         """Where values lie on the scale: 0 at `low`, 1 at `high`."""

@@ -34,38 +34,59 @@ class Method(NamedTuple):
     number: int
 
 
-# The numbers are stored in files.
+# The one to recommend first, as menus have them. The numbers are stored in files.
 METHODS = {
     method.name: method
     for method in (
         Method(
-            "matrix_linear",
-            "Matrix, linear",
-            "Matrices component by component: bones grow thin between keys rotated far from each other",
-            1,
-        ),
-        Method("matrix_polar", "Matrix, made rigid", "The same, brought back to the nearest rotation", 2),
-        Method(
-            "matrix_log",
-            "Matrix, logarithm",
-            "Logarithms of matrices: not the shortest way, and dependent on the rest pose",
-            3,
+            "qv_slerp",
+            "Straight rotation, even pace (recommended)",
+            "The shortest rotation at an even pace, rigid; location goes straight. QV with slerp",
+            5,
         ),
         Method(
             "qv_nlerp",
-            "QV, nlerp",
-            "The shortest rotation, at a slightly uneven pace; location goes straight",
+            "Straight rotation, smooth on splines",
+            "The shortest rotation at a slightly uneven pace, rigid; location goes straight. QV with nlerp",
             4,
         ),
-        Method("qv_slerp", "QV, slerp", "The shortest rotation, at an even pace; location goes straight", 5),
-        Method("dlb", "DLB", "Dual quaternions, linear: nearly a screw, at a slightly uneven pace", 6),
         Method(
             "sclerp",
-            "ScLERP",
-            "The screw from key to key: a bone that rotates and moves swings along an arc, at an even pace",
+            "Screw, even pace",
+            "The screw from key to key: a bone that rotates and moves swings along an arc. ScLERP of dual "
+            "quaternions",
             7,
         ),
-        Method("dib", "DIB", "ScLERP between two keys; on a spline, all keys blended iteratively", 8),
+        Method(
+            "dlb",
+            "Nearly a screw, smooth on splines",
+            "Dual quaternions blended linearly, at a slightly uneven pace. DLB",
+            6,
+        ),
+        Method(
+            "dib",
+            "Screw, keys blended iteratively",
+            "The screw between two keys; on a spline, all keys blended iteratively. DIB of dual quaternions",
+            8,
+        ),
+        Method(
+            "matrix_polar",
+            "Straight matrix, made rigid",
+            "Matrices component by component, brought back to the nearest rotation. Polar decomposition",
+            2,
+        ),
+        Method(
+            "matrix_log",
+            "Logarithms, not the shortest way",
+            "Logarithms of matrices: dependent on the rest pose. Log-matrix blending",
+            3,
+        ),
+        Method(
+            "matrix_linear",
+            "Straight matrix, not rigid",
+            "Matrices component by component: bones grow thin between keys rotated far from each other",
+            1,
+        ),
     )
 }
 
@@ -73,7 +94,8 @@ METHODS = {
 # Warnings for bones whose in-betweens the method does not define uniquely.
 TOO_FAR = {
     STRAIGHT: "rotates by 180 degrees or more from key to key, and takes the shorter way: key in between",
-    SPLINE: "rotates too far for this spline, and may jump: key in between, or choose DLB or QV, nlerp",
+    SPLINE: "rotates too far for this spline, and may jump: key in between, or choose one that is smooth on "
+    "splines",
 }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from .comparison import Comparison
 from .diagnostics import Finding
 from .errors import SinewError
-from .heat import HeatScale, viridis
+from .heat import HeatScale
 from .plots import colour_of, line_plot
 from .suggestion import CRITERIA, Suggestion
 
@@ -211,7 +211,7 @@ def _sheet(sheet: Sheet, comparison: Comparison) -> str:
 def _legend(scale: HeatScale, unit: str) -> str:
     stops = ", ".join(
         f"rgb({round(255 * r)},{round(255 * g)},{round(255 * b)})"
-        for r, g, b in viridis(np.linspace(0.0, 1.0, 17))
+        for r, g, b in scale.ramp(np.linspace(0.0, 1.0, 17))
     )
     texts = legend_texts(scale, unit)
     ticks = []

@@ -127,7 +127,16 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     # What handlers change Blender evaluates without telling of it. Once for each: what is in another scene
     # goes on waiting.
     if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph:
+        _keep_evaluated_shapes(changes)
         session.refresh(bpy.context)
+
+
+def _keep_evaluated_shapes(changes: Changes) -> None:
+    """Before another evaluation within the handlers of one: where it copies an object anew whose shape is
+    from this one, Blender goes on with the mesh without modifiers and shape keys (seen on 4.2 to 5.2)."""
+    for obj in bpy.data.objects:
+        if obj.session_uid in changes.objects:
+            obj.update_tag(refresh={"DATA"})
 
 
 # --- Functions of other add-ons that Blender calls behind Sinew's

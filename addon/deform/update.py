@@ -33,7 +33,7 @@ def update(
         return None
     if skinned is not None and _is_as_it_was(obj, skinned, changes):
         return skinned
-    if obj.mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
+    if _is_in_mode_of_modifier(obj):
         apply_plan.apply(obj, apply_plan.plan_of(obj))
         return None
     inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
@@ -48,16 +48,15 @@ def update(
     before, known = (None, None) if skinned is None else (skinned.plan, skinned.bound)
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
-    if plan.uses_builtin and upstream_proxy.is_needed(obj):
-        # In a mode of the modifier. What stands in front is not evaluated apart then.
-        return None
     # First of all, as groups are renamed along with bones.
     bones_changed = skinned is not None and bound.have_bones_changed(
         obj, skinned.bound, depsgraph, None if skinned.plan.state is State.OFF else changes
     )
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
-        return _while_waiting(obj, skinned, depsgraph)
+        # What is hidden, or in another scene, stays as it is.
+        is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
+        return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
     plan = _with_data(obj, skinned, plan, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
@@ -82,13 +81,13 @@ def update(
     return skinned
 
 
-def _while_waiting(
-    obj: bpy.types.Object, skinned: SkinnedObject | None, depsgraph: bpy.types.Depsgraph
-) -> SkinnedObject | None:
-    """What is known of an object whose front is not evaluated yet. One that is hidden, or in another scene,
-    stays as it is."""
-    is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
-    return None if is_shown and obj.evaluated_get(depsgraph).is_evaluated else skinned
+def _is_in_mode_of_modifier(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifier deforms it for the mode that it is in, and nothing is to be known of it:
+    in weight paint, where what stands in front is not evaluated apart then."""
+    if obj.mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
+        return True
+    is_painted = obj.mode == "WEIGHT_PAINT" and stack.visibility_is_animated(obj)
+    return is_painted and upstream_proxy.is_needed(obj)
 
 
 def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping
 from itertools import chain
 from operator import itemgetter
 
@@ -185,6 +186,33 @@ def _read_groups_of(vertices: bpy.types.bpy_prop_collection) -> GroupWeights:
     counts = np.fromiter(map(len, of_each), np.int32, len(of_each))
     entries = np.array([entry for entries in of_each for entry in entries], dtype=np.float64).reshape(-1, 2)
     return GroupWeights(counts, entries[:, 0].astype(np.int32), entries[:, 1].astype(np.float32))
+
+
+def write_group_weights(obj: bpy.types.Object, rows: Mapping[int, Mapping[int, float]]) -> None:
+    """Gives vertices other weights, also in edit mode: those that stay keep their place in the stored order.
+
+    rows  the weight in each group, by its index, of each vertex that changes, by its own
+    """
+    if obj.mode == "EDIT":
+        edited = bmesh.from_edit_mesh(obj.data)
+        layer = edited.verts.layers.deform.verify()
+        edited.verts.ensure_lookup_table()
+        for vertex, row in rows.items():
+            own = edited.verts[vertex][layer]
+            for group in [group for group in own.keys() if group not in row]:  # noqa: SIM118, no dict
+                del own[group]
+            for group, weight in row.items():
+                own[group] = weight
+        bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+        return
+    groups = list(obj.vertex_groups)
+    for vertex, row in rows.items():
+        for group in [each.group for each in obj.data.vertices[vertex].groups]:
+            if group not in row and group < len(groups):
+                groups[group].remove([vertex])
+        for group, weight in row.items():
+            groups[group].add([vertex], weight, "REPLACE")
+    obj.data.update_tag()
 
 
 def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys | None:

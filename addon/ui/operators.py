@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
 
 import bpy
 
-from ..attach import attach, corrective_smooth, properties, stage_settings
-from ..attach.updates import is_rendering_in_window
+from ..attach import attach, corrective_smooth, properties, shared_settings, stack, stage_settings
+from ..attach.method_items import method_items
+from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..core.errors import SinewError
 from ..deform import session
 
@@ -22,27 +23,64 @@ def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
     return chosen
 
 
+def _armature_meant(obj: bpy.types.Object) -> bpy.types.Object | None:
+    """The armature that an object is, that deforms it, or that it hangs on."""
+    if obj.type == "ARMATURE":
+        return obj
+    found, parent = attach.armature_of(obj), obj.parent
+    while found is None and parent is not None:
+        found, parent = (parent if parent.type == "ARMATURE" else None), parent.parent
+    return found
+
+
 def armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The armatures meant: those selected or active, and those of such meshes; the active one first."""
-    found = {o if o.type == "ARMATURE" else attach.armature_of(o) for o in _chosen(context)} - {None}
+    found = {_armature_meant(obj) for obj in _chosen(context)} - {None}
     return sorted(found, key=lambda o: (o != context.active_object, o.name))
 
 
+def _each_target(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+    """The meshes of targets(), those that are selected first: most who ask need only one."""
+    chosen, meant = _chosen(context), set(armatures(context))
+    yield from attach.deformed_meshes([obj for obj in chosen if obj.name in context.scene.objects])
+    if not meant:
+        return
+    for obj in context.scene.objects:
+        if obj.type == "MESH" and obj not in chosen and _is_of(obj, meant):
+            yield obj
+
+
+def _is_of(obj: bpy.types.Object, meant: Collection[bpy.types.Object]) -> bool:
+    """Whether one of the armatures deforms a mesh; of most meshes of a scene that is seen at once."""
+    has_modifier = any(modifier.type == "ARMATURE" for modifier in obj.modifiers)
+    if not (has_modifier or stack.parent_deforms(obj) or properties.has_sinew(obj)):
+        return False
+    return attach.armature_of(obj) in meant and bool(attach.deformed_meshes([obj]))
+
+
 def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The meshes meant: those active or selected, and all that a selected or active armature deforms."""
-    chosen, active = _chosen(context), context.active_object
-    armatures = {o for o in chosen if o.type == "ARMATURE"}
-    meshes = [
-        o
-        for o in attach.deformed_meshes(list(context.scene.objects))
-        if o in chosen or attach.armature_of(o) in armatures
-    ]
-    # The active one first: the panel shows its details.
-    return sorted(meshes, key=lambda o: o != active)
+    """The meshes meant: all that the armatures meant deform, as clothes, hair and eyes belong to the body
+    that is selected; the active one first."""
+    active, found = context.active_object, list(_each_target(context))
+    order = {name: place for place, name in enumerate(context.scene.objects.keys())} if found else {}
+    return sorted(found, key=lambda obj: (obj != active, order[obj.name]))
+
+
+def has_targets(context: bpy.types.Context) -> bool:
+    return next(_each_target(context), None) is not None
 
 
 def sinew_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [obj for obj in targets(context) if properties.has_sinew(obj)]
+
+
+def has_sinew_targets(context: bpy.types.Context) -> bool:
+    return any(properties.has_sinew(obj) for obj in _each_target(context))
+
+
+def are_any_on(context: bpy.types.Context) -> bool:
+    """Whether Sinew is on for any mesh: else panels are grey whose numbers are its own."""
+    return any(properties.of(obj).enabled for obj in _each_target(context) if properties.has_sinew(obj))
 
 
 def waits_for_render() -> str:
@@ -58,36 +96,79 @@ def can_change(operator: type[bpy.types.Operator]) -> bool:
     return not reason
 
 
+def can_take_over(obj: bpy.types.Object) -> bool:
+    """Whether the mesh has a Corrective Smooth in whose place Delta Mush could smooth."""
+    modifier = corrective_smooth.candidate(obj)
+    return (
+        modifier is not None and properties.of(obj).enabled and not corrective_smooth.why_not(obj, modifier)
+    )
+
+
 def _for_each(
     operator: bpy.types.Operator,
     objects: list[bpy.types.Object],
     action: Callable[[bpy.types.Object], None],
     done: str,
 ) -> set[str]:
-    count = 0
+    problems = []
     for obj in objects:
         try:
             action(obj)
-            count += 1
         except SinewError as error:
-            operator.report({"ERROR"}, str(error))
+            problems.append(str(error))
+    count = len(objects) - len(problems)
+    for problem in problems:
+        operator.report({"WARNING" if count else "ERROR"}, problem)
     if count == 0:
         return {"CANCELLED"}
     operator.report({"INFO"}, f"{done} {count} mesh{'es' if count > 1 else ''}")
     return {"FINISHED"}
 
 
-class SINEW_OT_add(bpy.types.Operator):
+class _OfOneMesh:
+    """Acts on all meshes of a character, or on the one that is named."""
+
+    name: bpy.props.StringProperty(
+        name="Mesh",
+        description="The only mesh to act on; empty: all of the character",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    def meant(self, objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+        return [obj for obj in objects if self.name in ("", obj.name)]
+
+
+AS_BEFORE = "AS_BEFORE"
+
+
+class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
     bl_idname = "sinew.add"
     bl_label = "Add Sinew"
     bl_description = (
-        "Deform with Sinew in the place of the Armature modifier, which stays in the stack, switched off"
+        "Deform all meshes of the armature with Sinew, in the place of their Armature modifiers. Those stay "
+        "in the stack, switched off"
     )
     bl_options = {"REGISTER", "UNDO"}
 
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="What to start with",
+        items=[
+            (
+                AS_BEFORE,
+                "As the Armature modifier is set",
+                "Each mesh keeps its shape; one that joins others has their settings",
+                0,
+            ),
+            *method_items(1),
+        ],
+        default=AS_BEFORE,
+        options={"SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(not properties.has_sinew(obj) for obj in targets(context)):
+        if any(not properties.has_sinew(obj) for obj in _each_target(context)):
             return can_change(cls)
         others = attach.not_meshes(context.selected_objects)
         if others:
@@ -97,8 +178,18 @@ class SINEW_OT_add(bpy.types.Operator):
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = [obj for obj in targets(context) if not properties.has_sinew(obj)]
-        result = _for_each(self, objects, attach.add, "Sinew deforms")
+        method = None if self.method == AS_BEFORE else self.method
+        objects = self.meant([obj for obj in targets(context) if not properties.has_sinew(obj)])
+        followers = [obj for obj in sinew_targets(context) if not properties.of(obj).is_own]
+
+        def add(obj: bpy.types.Object) -> None:
+            attach.add(obj, method)
+            same = [o for o in followers if attach.armature_of(o) == attach.armature_of(obj)]
+            if method is None and same:
+                shared_settings.share(same[0], obj)
+
+        with updates_suspended():
+            result = _for_each(self, objects, add, "Sinew deforms")
         session.forget()
         session.refresh(context)
         return result
@@ -107,20 +198,20 @@ class SINEW_OT_add(bpy.types.Operator):
 class OnSinewObjects:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if sinew_targets(context):
+        if has_sinew_targets(context):
             return can_change(cls)
         cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
         return False
 
 
-class SINEW_OT_rebind(OnSinewObjects, bpy.types.Operator):
+class SINEW_OT_rebind(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
     bl_idname = "sinew.rebind"
     bl_label = "Rebind"
-    bl_description = "Read mesh, weights and bones anew, and switch on again after an error"
+    bl_description = "Read meshes, weights and bones anew, and switch on again after an error"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = sinew_targets(context)
+        objects = self.meant(sinew_targets(context))
         result = _for_each(self, objects, lambda obj: session.rebind(obj, context), "Rebound")
         failed = [properties.of(obj).error for obj in objects if properties.of(obj).error]
         if failed:
@@ -129,20 +220,22 @@ class SINEW_OT_rebind(OnSinewObjects, bpy.types.Operator):
         return result
 
 
-class SINEW_OT_remove(OnSinewObjects, bpy.types.Operator):
+class SINEW_OT_remove(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
     bl_idname = "sinew.remove"
     bl_label = "Remove"
-    bl_description = "Take Sinew off and give the Armature modifier back as it was"
+    bl_description = (
+        "Take Sinew off all meshes of the character and give their Armature modifiers back as they were"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = sinew_targets(context)
+        objects = self.meant(sinew_targets(context))
         result = _for_each(self, objects, attach.remove, "Removed Sinew from")
         session.forget()
         return result
 
 
-class SINEW_OT_take_over_smooth(OnSinewObjects, bpy.types.Operator):
+class SINEW_OT_take_over_smooth(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
     bl_idname = "sinew.take_over_smooth"
     bl_label = "Take Over Corrective Smooth"
     bl_description = (
@@ -151,17 +244,15 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
-    name: bpy.props.StringProperty(
-        options={"HIDDEN", "SKIP_SAVE"}, description="Of the object; empty for all"
-    )
-
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = [obj for obj in sinew_targets(context) if self.name in ("", obj.name)]
+        objects = self.meant(sinew_targets(context))
+        if not self.name:
+            objects = [obj for obj in objects if can_take_over(obj)] or objects
         with session.changing(context):
             return _for_each(self, objects, corrective_smooth.take_over, "Took over Corrective Smooth of")
 
 
-class SINEW_OT_make_group(OnSinewObjects, bpy.types.Operator):
+class SINEW_OT_make_group(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
     bl_idname = "sinew.make_group"
     bl_label = "Make Vertex Group"
     bl_description = (
@@ -170,14 +261,15 @@ class SINEW_OT_make_group(OnSinewObjects, bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
-    name: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Of the object")
     stage: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Name of the stage")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.stage not in stage_settings.STAGES:
             self.report({"ERROR"}, f"There is no stage {self.stage!r}")
             return {"CANCELLED"}
-        objects = [obj for obj in sinew_targets(context) if self.name in ("", obj.name)]
+        objects = self.meant(sinew_targets(context))
+        if not self.name:
+            objects = [obj for obj in objects if not properties.of(obj).is_own] or objects
         with session.changing(context):
             return _for_each(self, objects, self._make, "Made the vertex group of")
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ..attach.subscribers import subscribers
@@ -67,15 +69,21 @@ class SINEW_OT_precompute(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def draw(layout: bpy.types.UILayout, obj: bpy.types.Object, skinned: SkinnedObject | None) -> None:
-    """Of one object: progress and a button that stops it, or one that starts it again."""
-    if skinned is None:
-        return
-    for what, run in precomputing.running(obj, skinned).items():
+def draw(layout: bpy.types.UILayout, pairs: Sequence[tuple[bpy.types.Object, SkinnedObject | None]]) -> None:
+    """Of a character's meshes together: progress and a button that stops it, or one that starts it again."""
+    known = [(obj, skinned) for obj, skinned in pairs if skinned is not None]
+    runs: dict[str, list[float]] = {}
+    for obj, skinned in known:
+        for what, run in precomputing.running(obj, skinned).items():
+            runs.setdefault(what, []).append(run.progress)
+    for what, shares in runs.items():
+        share = sum(shares) / len(shares)
+        meshes = f" of {len(shares)} meshes" if len(shares) > 1 else ""
         row = layout.row(align=True)
-        row.progress(factor=run.progress, text=f"Finding {what}: {run.progress:.0%}")
+        row.progress(factor=share, text=f"Finding {what}{meshes}: {share:.0%}")
         row.operator("sinew.stop_precomputation", text="", icon="X")
-    for what in precomputing.stopped(obj, skinned):
+    stopped = (what for obj, skinned in known for what in precomputing.stopped(obj, skinned))
+    for what in dict.fromkeys(stopped):
         layout.operator("sinew.precompute", text=f"Find {what}", icon="PLAY")
 
 

@@ -8,6 +8,7 @@ import os
 import bpy
 
 from ..deform import safe_mode, session
+from . import menus
 from .sidebar import draw_text
 
 
@@ -32,6 +33,7 @@ class SinewPreferences(bpy.types.AddonPreferences):
             value = os.environ[safe_mode.VARIABLE]
             text = f"The environment variable {safe_mode.VARIABLE} decides: it is {value!r}"
             draw_text(self.layout, context, text, icon="INFO")
+        menus.draw_shortcuts(self.layout, context)
 
 
 CLASSES = (SinewPreferences,)

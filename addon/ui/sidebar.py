@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 
 import bpy
 
@@ -11,6 +12,8 @@ from .. import native
 
 # Characters of the interface font that fit a pixel of sidebar at scale 1; a label is not wrapped by Blender.
 CHARACTERS_PER_PIXEL = 0.14
+# Of a name among others.
+NAME_LENGTH = 24
 
 
 class Sidebar:
@@ -26,6 +29,26 @@ class SINEW_PT_unavailable(Sidebar, bpy.types.Panel):
         draw_text(self.layout, context, native.load_error() or "Restart Blender to use Sinew", icon="ERROR")
 
 
+def characters(context: bpy.types.Context) -> int:
+    """How many fit the region's width."""
+    return int(context.region.width / context.preferences.system.ui_scale * CHARACTERS_PER_PIXEL)
+
+
+def shortened(name: str, most: int = NAME_LENGTH) -> str:
+    """A long name without its middle, as both ends tell names apart: "Character_…_low.003"."""
+    if len(name) <= most:
+        return name
+    ahead = most // 2
+    return f"{name[:ahead]}…{name[len(name) - (most - ahead - 1) :]}"
+
+
+def names_text(names: Sequence[str], most: int = 3) -> str:
+    """Some names as one text, the others by their number."""
+    text = ", ".join(shortened(name) for name in names[:most])
+    more = len(names) - most
+    return f"{text} and {more} more" if more > 0 else text
+
+
 def draw_text(
     layout: bpy.types.UILayout,
     context: bpy.types.Context,
@@ -34,10 +57,11 @@ def draw_text(
     alert: bool = False,
 ) -> None:
     """Text broken into as many labels as the sidebar's width needs."""
-    scale = context.preferences.system.ui_scale
-    width = max(20, int(context.region.width / scale * CHARACTERS_PER_PIXEL) - (4 if icon != "NONE" else 0))
+    width = max(20, characters(context) - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, width)):
+    # A name may be longer than a line; broken, it would be two.
+    text = " ".join(shortened(word, width) for word in text.split())
+    for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False)):
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")

@@ -19,6 +19,8 @@ OVER = [
     ("SCENE", "Scene's Frames", "The scene's frame range, or its preview range where that is on"),
     ("ACTION", "Action's Frames", "From the first to the last key of the armature's action"),
 ]
+# Of the property that chooses one of them.
+OVER_WHICH = {"name": "Over", "description": "The frames to go through", "items": OVER}
 
 
 class Stepped:

@@ -159,7 +159,7 @@ def absolute_keys(obj):
 
 def subdivided(obj):
     obj.modifiers.new("Front", "SUBSURF").levels = 1
-    obj.modifiers.move(1, 0)
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
 
 
 @pytest.mark.parametrize("set_up", [absolute_keys, subdivided])
@@ -271,6 +271,33 @@ def test_one_update_is_enough(event):
     assert shown.shape == expected.shape
     assert scenes.worst(shown, expected) <= 1e-5
     assert not properties.of(obj).error
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+@pytest.mark.parametrize("at_a_frame", [False, True])
+def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
+    """What waits for modifiers in front is evaluated again before Blender has ended its evaluation, which
+    must not take away what it has made of others."""
+    obj, _armature = scenes.make_arm()
+    other, rig = scenes.make_arm(name="Other")
+    routes.force(route)
+    try:
+        scenes.add_sinew(obj)
+        rig.hide_viewport = True
+        bpy.context.scene.frame_set(8)
+        subdivided(obj)
+        rig.hide_viewport = other.hide_viewport = False
+        if at_a_frame:
+            bpy.context.scene.frame_set(9)
+        else:
+            bpy.context.view_layer.update()
+        shown = scenes.final_points(other)
+        other.data.update_tag()
+        bpy.context.view_layer.update()
+        assert scenes.worst(shown, scenes.final_points(other)) <= 1e-6
+        assert scenes.worst(shown, scenes.rest_points(other)) > 0.1, "nothing is tested"
+    finally:
+        routes.release()
 
 
 def test_removing_leaves_the_file_as_it_was():

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Iterator
 
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 import scenes
 from conftest import KeepingEngine
-from sinew_addon.attach import attach, properties, stack
+from mathutils import Matrix
+from sinew_addon.attach import attach, hooks, properties, stack
 from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
 from sinew_addon.deform import in_depsgraph, safe_mode, session
@@ -572,6 +574,25 @@ def test_absolute_shape_keys_in_weight_paint_where_visibility_is_animated(arm):
         bpy.context.view_layer.update()
         assert not properties.of(arm).error
     assert_equals_modifier(arm)
+
+
+@pytest.mark.parametrize("by_group", [False, True])
+def test_a_hook_behind(arm, by_group):
+    """By assigned vertices Blender hooks others, which is said; by a vertex group the same."""
+    hook = arm.modifiers.new("Hook", "HOOK")
+    arm.modifiers.move(list(arm.modifiers).index(hook), len(arm.modifiers) - 1)
+    hook.object, hook.strength = arm.modifiers["Armature"].object or arm.sinew.armature, 0.3
+    hook.matrix_inverse = Matrix.Translation((0.0, 0.0, 1.0))
+    hooked = list(range(0, 250, 2))
+    if by_group:
+        arm.vertex_groups.new(name="hooked").add(hooked, 1.0, "REPLACE")
+        hook.vertex_group = "hooked"
+    else:
+        hook.vertex_indices_set(hooked)
+    bpy.context.view_layer.update()
+    assert bool(hooks.misled(arm)) != by_group
+    with contextlib.nullcontext() if by_group else pytest.raises(AssertionError):
+        assert_equals_modifier(arm)
 
 
 @pytest.mark.parametrize("event", ["frame_change_pre", "frame_change_post"])

@@ -1188,7 +1188,8 @@ def _set_up(
         modifier.vertex_group, modifier.falloff_type = w.one(r, obj.vertex_groups).name, "SMOOTH"
     elif modifier.type == "HOOK":
         modifier.object, modifier.strength = rig, 0.3
-        modifier.vertex_indices_set(_vertices(w, r, obj))
+        # Assigned vertices are others behind Sinew's modifier (docs/parity.md).
+        modifier.vertex_group = w.one(r, obj.vertex_groups).name
     elif modifier.type == "NODES":
         modifier.node_group = _make_nodes(modifier.name)
 
@@ -1203,7 +1204,7 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     if kind in once and any(m.type == kind for m in w.modifiers(obj)):
         return None
     front |= kind in IN_FRONT
-    if kind in IN_FRONT and obj.override_library is not None:
+    if kind in ("HOOK", *IN_FRONT) and (obj.override_library is not None or not obj.vertex_groups):
         return None
     modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
     if modifier is None:
@@ -1212,6 +1213,9 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
     name = modifier.name
     if front and obj.override_library is None:
         obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
+    elif kind == "HOOK":
+        # Blender puts it behind those that only deform, which Sinew's own does not (docs/parity.md).
+        obj.modifiers.move(list(obj.modifiers).index(modifier), len(obj.modifiers) - 1)
     return f"{name} {'in front' if front else 'behind'} on {obj.name}"
 
 
@@ -1333,10 +1337,10 @@ def key_visibility(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.5)
 def drive_visibility(w: Walker, r: random.Random) -> str | None:
-    """By a bone, as a rig's switches are; or no longer."""
+    """By where an armature stands, or no longer. Not by a bone: what follows one that was in edit mode,
+    Blender leaves as it was there, until something else is changed."""
     obj, rig = w.skinned(r), w.armature(r)
-    bone = w.one(r, rig.pose.bones) if rig is not None else None
-    if obj is None or bone is None or obj.override_library is not None:
+    if obj is None or rig is None or obj.override_library is not None:
         return None
     modifier = w.one(r, armature_modifiers(obj))
     paths = [modifier.path_from_id(f"show_{where}") for where in ("viewport", "render")]
@@ -1353,15 +1357,14 @@ def drive_visibility(w: Walker, r: random.Random) -> str | None:
         variable = driver.variables.new()
         variable.type = "TRANSFORMS"
         target = variable.targets[0]
-        target.id, target.bone_target = rig, bone.name
-        target.transform_type, target.transform_space = "ROT_X", "LOCAL_SPACE"
+        target.id, target.transform_type = rig, "LOC_X"
         for each in list(curve.modifiers):
             curve.modifiers.remove(each)
         while curve.keyframe_points:
             curve.keyframe_points.remove(curve.keyframe_points[0])
-        for angle, value in ((-10.0, 0.0), (0.3, 1.0)):
-            curve.keyframe_points.insert(angle, value).interpolation = "CONSTANT"
-    return f"the visibility of {modifier.name} of {obj.name} follows {bone.name} of {rig.name}"
+        for x, value in ((-10.0, 0.0), (-0.3, 1.0)):
+            curve.keyframe_points.insert(x, value).interpolation = "CONSTANT"
+    return f"the visibility of {modifier.name} of {obj.name} follows {rig.name}"
 
 
 @operation(0.5)

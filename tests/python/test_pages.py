@@ -11,7 +11,7 @@ import pytest
 from sinew_addon.core import golden
 from sinew_addon.core.comparison import Comparison, RestFacts
 from sinew_addon.core.errors import SinewError
-from sinew_addon.core.heat import HeatScale, viridis
+from sinew_addon.core.heat import HeatScale, diverging, linear, viridis
 from sinew_addon.core.metrics import METRICS, Summary
 from sinew_addon.core.page import legend_texts, page
 from sinew_addon.core.plots import line_plot
@@ -36,6 +36,81 @@ def test_colours_grow_evenly_lighter():
     np.testing.assert_array_equal(viridis([-1.0, 2.0]), viridis([0.0, 1.0]))
 
 
+# What dichromats see of linear sRGB (G. Machado, M. Oliveira, L. Fernandes, 2009, severity 1).
+SIGHT = {
+    "usual": np.eye(3),
+    "protanopia": np.array(
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ]
+    ),
+    "deuteranopia": np.array(
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ]
+    ),
+    "tritanopia": np.array(
+        [
+            [1.255528, -0.076749, -0.178779],
+            [-0.078411, 0.930809, 0.147602],
+            [0.004733, 0.691367, 0.303900],
+        ]
+    ),
+}
+
+
+def cielab(colours, sight):
+    """[n, 3] of sRGB colours under D65, as they look to this sight."""
+    seen = np.clip(linear(np.asarray(colours)) @ SIGHT[sight].T, 0.0, 1.0)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    ratios = seen @ to_xyz.T / to_xyz.sum(axis=1)
+    f = np.where(ratios > 216 / 24389, np.cbrt(ratios), (24389 / 27 * ratios + 16) / 116)
+    return np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], axis=1)
+
+
+@pytest.mark.parametrize("sight", list(SIGHT))
+def test_both_sides_of_neutral_look_different_to_all(sight):
+    shares = np.linspace(0.0, 1.0, 101)
+    lab = cielab(diverging(shares), sight)
+    # Darker away from the middle, evenly, so that how far a value is off is seen without any hue.
+    steps = np.diff(lab[:, 0])
+    assert (steps[:50] > 0.2).all()
+    assert (steps[50:] < -0.2).all()
+    assert abs(lab[0, 0] - lab[-1, 0]) < 12.0, "the ends look unequally far"
+    # A difference of 2.3 is just noticed.
+    apart = np.linalg.norm(lab - lab[::-1], axis=1)
+    assert apart[:40].min() > 10.0
+    assert apart[:25].min() > 25.0
+
+
+@pytest.mark.parametrize("sight", list(SIGHT))
+def test_magnitudes_grow_lighter_to_all(sight):
+    lab = cielab(viridis(np.linspace(0.0, 1.0, 101)), sight)
+    assert (np.diff(lab[:, 0]) > 0.1).all()
+
+
+def test_the_neutral_colour_has_no_hue():
+    (_light, a, b) = cielab(diverging([0.5]), "usual")[0]
+    assert np.hypot(a, b) < 2.0
+    assert lightness(diverging([0.5]))[0] > 90.0
+    np.testing.assert_array_equal(diverging([-1.0, 2.0]), diverging([0.0, 1.0]))
+
+
+def test_each_measure_has_its_colours():
+    ramps = {name: HeatScale.fixed(metric, 2.0, 1.0, 1.0).ramp for name, metric in METRICS.items()}
+    assert ramps == {
+        "distance": viridis,
+        "bulge": diverging,
+        "stretch": diverging,
+        "area": diverging,
+        "flips": viridis,
+    }
+
+
 def summary(**values):
     return Summary(**{field: values.get(field, 0) for field in Summary.__dataclass_fields__})
 
@@ -47,7 +122,7 @@ def test_ranges_hold_all_frames():
     distance = HeatScale.over(METRICS["distance"], [frames], 1.0)
     assert (distance.low, distance.high) == (0.0, 0.7)
     assert distance.ticks(3) == pytest.approx([0.0, 0.35, 0.7])
-    np.testing.assert_allclose(bulge.colours(np.array([0.0])), viridis([0.5]))
+    np.testing.assert_allclose(bulge.colours(np.array([0.0])), diverging([0.5]))
 
 
 @pytest.mark.parametrize(
@@ -56,7 +131,7 @@ def test_ranges_hold_all_frames():
 def test_ratios_are_shown_around_one(least, most, high):
     scale = HeatScale.over(METRICS["stretch"], [[summary(stretch_min=least, stretch_max=most)]], 1.0)
     assert (scale.low, scale.high) == pytest.approx((1 / high, high))
-    np.testing.assert_allclose(scale.colours(np.array([1 / high, 1.0, high])), viridis([0.0, 0.5, 1.0]))
+    np.testing.assert_allclose(scale.colours(np.array([1 / high, 1.0, high])), diverging([0.0, 0.5, 1.0]))
     np.testing.assert_array_equal(np.argsort(scale.severity(np.array([1.5, 0.25, 1.0]))), [2, 0, 1])
 
 

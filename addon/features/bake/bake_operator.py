@@ -26,6 +26,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
 
     kind: bpy.props.EnumProperty(
         name="To",
+        description="What plays the shapes: a modifier or shape keys of this file, or another program",
         items=[
             ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
             ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
@@ -59,6 +60,13 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             self.asked = True
             return context.window_manager.invoke_props_dialog(self)
         return super().invoke(context, event)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        writes_files = self.kind != bake.SHAPE_KEYS
+        for name in ("kind", "frames", "step", *(("folder", "overwrite") if writes_files else ())):
+            layout.prop(self, name)
 
     def cancel(self, context: bpy.types.Context) -> None:
         # Of the dialog there is nothing to end.

@@ -11,7 +11,7 @@ from ...core.comparison import USUAL_METHODS
 from ...core.errors import SinewError
 from ...deform import evaluate
 from ...ui import operators
-from . import comparison, comparison_state
+from . import comparison, comparison_state, framing
 
 
 def character(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -45,6 +45,24 @@ def _compared(context: bpy.types.Context) -> list[bpy.types.Object]:
     return comparison.originals(state) if state is not None else []
 
 
+class SinewComparisonChoice(bpy.types.PropertyGroup):
+    """A method in the dialog, called `name`."""
+
+    is_shown: bpy.props.BoolProperty(
+        name="Show", description="Show a copy of the character under this method"
+    )
+
+
+METHOD_ITEMS = [
+    *((m.name, m.label, m.description) for m in properties.METHODS.values()),
+    (
+        evaluate.BLENDER,
+        properties.method_label(evaluate.BLENDER),
+        "As it stands in the stack, without Sinew",
+    ),
+]
+
+
 class SINEW_OT_compare(bpy.types.Operator):
     bl_idname = "sinew.compare"
     bl_label = "Compare"
@@ -56,16 +74,17 @@ class SINEW_OT_compare(bpy.types.Operator):
 
     methods: bpy.props.EnumProperty(
         name="Methods",
-        items=[
-            *((m.name, m.label, m.description) for m in properties.METHODS.values()),
-            (
-                evaluate.BLENDER,
-                properties.method_label(evaluate.BLENDER),
-                "As it stands in the stack, without Sinew",
-            ),
-        ],
+        description="Show a copy of the character under each of these",
+        items=METHOD_ITEMS,
         options={"ENUM_FLAG"},
         default=set(USUAL_METHODS),
+    )
+    # Of a flag, a click takes all others away.
+    choices: bpy.props.CollectionProperty(
+        type=SinewComparisonChoice,
+        name="Choices",
+        description="The same as check boxes, in the dialog",
+        options={"SKIP_SAVE"},
     )
 
     @classmethod
@@ -82,12 +101,21 @@ class SINEW_OT_compare(bpy.types.Operator):
         state = comparison_state.of_scene(context.scene)
         if state is not None and comparison_state.methods_of(state):
             self.methods = set(comparison_state.methods_of(state))
+        self.choices.clear()
+        for name, _label, _description in METHOD_ITEMS:
+            choice = self.choices.add()
+            choice.name, choice.is_shown = name, name in self.methods
         return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.layout.column().prop(self, "methods")
+        column = self.layout.column(align=True)
+        column.label(text="Show a copy under each of these")
+        for choice in self.choices:
+            column.prop(choice, "is_shown", text=properties.method_label(choice.name))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        if self.choices:
+            self.methods = {choice.name for choice in self.choices if choice.is_shown}
         methods = [name for name in evaluate.method_names() if name in self.methods]
         meshes = character(context) or _compared(context)
         try:
@@ -103,6 +131,8 @@ class SINEW_OT_compare(bpy.types.Operator):
         if viewport is not None and viewport.local_view is not None:
             for copy in comparison_state.copies_of(comparison_state.of_scene(context.scene)):
                 copy.local_view_set(viewport, True)
+        if viewport is not None:
+            framing.show_all(context, viewport, meshes)
         for problem in problems:
             self.report({"WARNING"}, problem)
         return {"FINISHED"}
@@ -110,8 +140,11 @@ class SINEW_OT_compare(bpy.types.Operator):
 
 def _right_of_view(context: bpy.types.Context) -> np.ndarray:
     """[3], the direction of the screen's right in the world; +X where there is no 3D view."""
-    region = context.region_data
-    return np.array(region.view_matrix)[0, :3] if region is not None else np.array([1.0, 0.0, 0.0])
+    viewport = _viewport(context)
+    if viewport is None or viewport.region_3d is None:
+        return np.array([1.0, 0.0, 0.0])
+    # Also where the button is in the sidebar, a region without a view of its own.
+    return np.array(viewport.region_3d.view_matrix)[0, :3]
 
 
 class _WhileComparing:
@@ -160,4 +193,4 @@ class SINEW_OT_end_comparison(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SINEW_OT_compare, SINEW_OT_flip_comparison, SINEW_OT_end_comparison)
+CLASSES = (SinewComparisonChoice, SINEW_OT_compare, SINEW_OT_flip_comparison, SINEW_OT_end_comparison)

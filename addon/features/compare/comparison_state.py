@@ -20,8 +20,14 @@ def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> li
     # What the file stores stays that of the method where the list gets others.
     numbers = {name: method.number + 1 for name, method in properties.METHODS.items()}
     return [
-        (name, properties.method_label(name), "", "NONE", numbers.get(name, 0)) for name in methods_of(state)
+        (name, properties.method_label(name), _description(name), "NONE", numbers.get(name, 0))
+        for name in methods_of(state)
     ]
+
+
+def _description(method: str) -> str:
+    known = properties.METHODS.get(method)
+    return known.description if known is not None else "What Blender's modifier does, as its options say"
 
 
 class SinewComparison(bpy.types.PropertyGroup):
@@ -44,6 +50,7 @@ class SinewComparison(bpy.types.PropertyGroup):
     )
     arrangement: bpy.props.EnumProperty(
         name="Arrangement",
+        description="Where the copies are shown",
         items=[
             (SIDE_BY_SIDE, "Side by Side", "Each copy at a place of its own"),
             (OVERLAID, "Overlay", "All copies at the first place beside the original"),
@@ -52,8 +59,20 @@ class SinewComparison(bpy.types.PropertyGroup):
         options=set(),
         update=_changed,
     )
-    first: bpy.props.EnumProperty(name="First", items=_compared_methods, options=set(), update=_changed)
-    second: bpy.props.EnumProperty(name="Second", items=_compared_methods, options=set(), update=_changed)
+    first: bpy.props.EnumProperty(
+        name="First",
+        description="The method that is shown before a flip",
+        items=_compared_methods,
+        options=set(),
+        update=_changed,
+    )
+    second: bpy.props.EnumProperty(
+        name="Second",
+        description="The method that is shown after a flip",
+        items=_compared_methods,
+        options=set(),
+        update=_changed,
+    )
     shows_second: bpy.props.BoolProperty(options={"HIDDEN"}, update=_changed)
 
 

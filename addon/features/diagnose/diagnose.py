@@ -30,6 +30,7 @@ class Check:
 
     mesh     the session_uid of the mesh
     frames   which poses were looked at, in words
+    over     one of stepped.OVER; empty where it was one pose
     suspect  the mesh was touched since
     stale    weights, groups or bones are known to be others than those that were checked
     """
@@ -40,6 +41,7 @@ class Check:
     weights: GroupWeights
     groups: tuple[str, ...]
     bones: Bones
+    over: str = ""
     suspect: bool = False
     stale: bool = False
 
@@ -92,7 +94,7 @@ def check_frames(
                 reading.look(frame, depsgraph)
             yield (number + 1) / len(frames)
     for reading in readings:
-        _keep(reading, most_influences, f"poses of frames {frames[0]} to {frames[-1]}")
+        _keep(reading, most_influences, f"poses of frames {frames[0]} to {frames[-1]}", over)
 
 
 def of(obj: bpy.types.Object) -> Check | None:
@@ -106,11 +108,17 @@ def of(obj: bpy.types.Object) -> Check | None:
     return found
 
 
-def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
-    """Enters edit mode with exactly the vertices of a finding selected; how many they are.
+def check_again(scene: bpy.types.Scene, obj: bpy.types.Object, most_influences: int) -> Iterator[float]:
+    """As it was checked last; yields the share that is done."""
+    found = of(obj)
+    if found is not None and found.over:
+        yield from check_frames(scene, [obj], most_influences, found.over)
+    else:
+        check(scene, [obj], most_influences)
 
-    Raises SinewError where that can not be done.
-    """
+
+def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
+    """Raises SinewError where no such fault is known, or the mesh has other vertices now."""
     found = of(obj)
     finding = next((f for f in found.findings if f.name == name), None) if found is not None else None
     if finding is None:
@@ -119,6 +127,15 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
         raise SinewError(f"{obj.name}: its vertices are others than those checked; press Check again")
     if not obj.data.is_editable:
         raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")
+    return found, finding
+
+
+def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
+    """Enters edit mode with exactly the vertices of a finding selected; how many they are.
+
+    Raises SinewError where that can not be done.
+    """
+    _found, finding = finding_of(obj, name)
     if obj.name not in context.view_layer.objects or not obj.visible_get():
         raise SinewError(f"{obj.name} is hidden; show it to edit it")
     active = context.view_layer.objects.active
@@ -164,7 +181,7 @@ def _read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> _Reading:
     return _Reading(obj, weighting, weights, points, PoseCheck(weighting.influences_over_joints(points)))
 
 
-def _keep(reading: _Reading, most_influences: int, frames: str) -> None:
+def _keep(reading: _Reading, most_influences: int, frames: str, over: str = "") -> None:
     obj = reading.obj
     groups = tuple(group.name for group in obj.vertex_groups)
     masks = group_uses.used(obj, reading.weighting.bones.groups_without_bone(groups))
@@ -176,6 +193,7 @@ def _keep(reading: _Reading, most_influences: int, frames: str) -> None:
         reading.weights,
         groups,
         reading.weighting.bones,
+        over,
     )
 
 

@@ -11,8 +11,8 @@ from ...attach import attach, stack
 from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...ui import operators, stepped
-from ...ui.sidebar import Sidebar, draw_text
-from . import diagnose
+from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
+from . import diagnose, mending
 
 NAMES_SHOWN = 5
 
@@ -54,7 +54,7 @@ class SINEW_OT_check_frames(_OnDeformed, stepped.Stepped, bpy.types.Operator):
     )
     bl_options = {"REGISTER"}
 
-    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="ACTION")
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="ACTION")
     saying = "Sinew checks poses"
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
@@ -75,7 +75,7 @@ class SINEW_OT_select_finding(bpy.types.Operator):
     bl_idname = "sinew.select_finding"
     bl_label = "Select"
     bl_description = "Enter edit mode with exactly these vertices selected; hidden ones are shown"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     object: bpy.props.StringProperty(options={"HIDDEN"})
     finding: bpy.props.StringProperty(options={"HIDDEN"})
@@ -94,6 +94,49 @@ class SINEW_OT_select_finding(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SINEW_OT_mend(bpy.types.Operator):
+    bl_idname = "sinew.mend"
+    bl_label = "Mend"
+    bl_description = (
+        "Mend this fault, on exactly these vertices, and check again. Locked groups stay as they are"
+    )
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    object: bpy.props.StringProperty(options={"HIDDEN"})
+    finding: bpy.props.StringProperty(options={"HIDDEN"})
+    how: bpy.props.EnumProperty(
+        name="How",
+        description="What to do",
+        items=[(each.name, each.label, each.description) for each in mending.ALL.values()],
+        options={"HIDDEN"},
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, given: bpy.types.OperatorProperties) -> str:
+        return f"{mending.ALL[given.how].description}; then check again. Locked groups stay as they are"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, manager = context.scene, context.window_manager
+        obj = scene.objects.get(self.object)
+        if obj is None:
+            self.report({"ERROR"}, f"{self.object} is not in this scene any more; press Check again")
+            return {"CANCELLED"}
+        most = scene.sinew_most_influences
+        manager.progress_begin(0.0, 1.0)
+        try:
+            done = mending.mend(obj, self.finding, self.how, most)
+            for share in diagnose.check_again(scene, obj, most):
+                manager.progress_update(share)
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        finally:
+            manager.progress_end()
+        left = next((each.count for each in diagnose.of(obj).findings if each.name == self.finding), 0)
+        self.report({"INFO"}, f"Mended {done}. Checked again: {left:,} left")
+        return {"FINISHED"}
+
+
 class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
     bl_label = "Diagnostics"
     bl_options = {"DEFAULT_CLOSED"}
@@ -108,16 +151,20 @@ class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("sinew.check", icon="CHECKMARK")
         row.operator_menu_enum("sinew.check_frames", "over", text="Over Frames")
-        for obj in _checkable(context):
-            found = diagnose.of(obj)
-            if found is not None:
+        checks = [(obj, diagnose.of(obj)) for obj in _checkable(context)]
+        known = [(obj, found) for obj, found in checks if found is not None]
+        clean = [obj.name for obj, found in known if not (found.findings or found.stale)]
+        for obj, found in known:
+            if len(known) == 1 or obj.name not in clean:
                 _draw_check(layout.box(), context, obj, found)
+        if clean and len(known) > 1:
+            draw_text(layout, context, f"Nothing found: {names_text(clean)}", icon="CHECKMARK")
 
 
 def _draw_check(
     layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, found: diagnose.Check
 ) -> None:
-    layout.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    layout.label(text=shortened(obj.name, characters(context) - 8), icon="OUTLINER_OB_MESH")
     if found.stale:
         text = "Weights, groups or bones have changed since: press Check again"
         draw_text(layout, context, text, icon="FILE_REFRESH", alert=True)
@@ -140,14 +187,16 @@ def _draw_finding(
 ) -> None:
     draw_text(layout, context, f"{finding.title}: {finding.count:,}", icon="ERROR")
     if finding.groups:
-        more = len(finding.groups) - NAMES_SHOWN
-        names = ", ".join(finding.groups[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")
-        draw_text(layout, context, names)
+        draw_text(layout, context, names_text(finding.groups, NAMES_SHOWN))
     draw_text(layout, context, finding.advice)
     if len(finding.vertices):
         text = f"Select {_vertices(len(finding.vertices)).title()}"
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
         button.object, button.finding = obj.name, finding.name
+    row = layout.row(align=True)
+    for each in mending.MENDS.get(finding.name, ()):
+        button = row.operator("sinew.mend", text=each.label)
+        button.object, button.finding, button.how = obj.name, finding.name, each.name
     layout.separator(factor=0.5)
 
 
@@ -155,4 +204,10 @@ def _vertices(count: int) -> str:
     return f"{count:,} vert{'ices' if count != 1 else 'ex'}"
 
 
-CLASSES = (SINEW_OT_check, SINEW_OT_check_frames, SINEW_OT_select_finding, SINEW_PT_diagnostics)
+CLASSES = (
+    SINEW_OT_check,
+    SINEW_OT_check_frames,
+    SINEW_OT_select_finding,
+    SINEW_OT_mend,
+    SINEW_PT_diagnostics,
+)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.heat import HeatScale, viridis
+from ...core.heat import HeatScale
 from ...io import units
 
 WIDTH, BAR, MARGIN, GAP, FONT_SIZE = 420, 14, 24, 8, 12
@@ -79,7 +79,7 @@ def _draw() -> None:
             x + share * (width - wide) if number in (0, len(texts) - 1) else x + share * width - wide / 2,
             y,
         )
-    _bar(x, y + line, width, BAR * size)
+    _bar(content.scale, x, y + line, width, BAR * size)
     _write(blf, content.title, x, y + line + (BAR + GAP) * size)
 
 
@@ -109,10 +109,10 @@ def _rectangle(x: float, y: float, width: float, height: float) -> None:
     _strip(corners, [BACKGROUND] * 4)
 
 
-def _bar(x: float, y: float, width: float, height: float) -> None:
+def _bar(scale: HeatScale, x: float, y: float, width: float, height: float) -> None:
     shares = np.linspace(0.0, 1.0, STEPS)
     corners = [(x + share * width, y + up) for share in shares for up in (0.0, height)]
-    _strip(corners, [(*colour, 1.0) for colour in viridis(shares) for _corner in range(2)])
+    _strip(corners, [(*colour, 1.0) for colour in scale.ramp(shares) for _corner in range(2)])
 
 
 def _strip(corners: list[tuple[float, float]], colours: list[tuple[float, ...]]) -> None:

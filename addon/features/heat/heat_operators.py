@@ -48,7 +48,7 @@ class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
     bl_description = "Go through frames and list those at which the measure is worst, one for each peak"
     bl_options = {"REGISTER"}
 
-    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         worst = worst_frames.scans[context.scene.session_uid].worst()
@@ -64,7 +64,7 @@ class SINEW_OT_fit_heat_range(_Scans, bpy.types.Operator):
     bl_description = "Go through frames and fix the range so that it holds the values at all of them"
     bl_options = {"REGISTER", "UNDO"}
 
-    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         measures.of(context.scene).fix(worst_frames.scans[context.scene.session_uid].scale)
@@ -75,9 +75,9 @@ class SINEW_OT_go_to_frame(bpy.types.Operator):
     bl_idname = "sinew.go_to_frame"
     bl_label = "Go to Frame"
     bl_description = "Go to this frame"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    frame: bpy.props.FloatProperty(name="Frame")
+    frame: bpy.props.FloatProperty(name="Frame", description="Of the scene")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         evaluate.set_frame(context.scene, self.frame)

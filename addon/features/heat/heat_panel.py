@@ -19,13 +19,15 @@ _WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of 
 
 class SINEW_PT_measures(Sidebar, bpy.types.Panel):
     bl_label = "Heat Map"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(operators.sinew_targets(context))
+        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, measures.of(context.scene)
+        layout.active = operators.are_any_on(context)
         shown = any(properties.of(obj).heat for obj in operators.sinew_targets(context))
         layout.operator("sinew.heat_map", icon="SHADING_RENDERED", depress=shown)
         layout.prop(settings, "quantity", text="")

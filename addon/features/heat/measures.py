@@ -41,7 +41,12 @@ class SinewMeasures(bpy.types.PropertyGroup):
         name="Compared with",
         description="What distances are measured to",
         items=[
-            (properties.BLENDER, "Armature Modifier", "What Blender's modifier does, as its options say", 0),
+            (
+                properties.BLENDER,
+                properties.method_label(properties.BLENDER),
+                "What Blender's modifier does, as its options say",
+                0,
+            ),
             *((m.name, m.label, m.description, m.number + 1) for m in properties.METHODS.values()),
         ],
         options=set(),

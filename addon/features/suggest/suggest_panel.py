@@ -7,9 +7,8 @@ from collections.abc import Iterator
 
 import bpy
 
-from ...attach import attach, properties
+from ...attach import properties
 from ...core.suggestion import CRITERIA, Criterion, Worst
-from ...deform import session
 from ...io import units
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
@@ -27,7 +26,7 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     bl_options = {"REGISTER"}
     saying = "Sinew measures every method"
 
-    over: bpy.props.EnumProperty(name="Over", items=stepped.OVER, default="SCENE")
+    over: bpy.props.EnumProperty(**stepped.OVER_WHICH, default="SCENE")
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         return suggest.scan(context.scene, sinew_targets(context), self.over)
@@ -37,34 +36,17 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
-    bl_idname = "sinew.use_method"
-    bl_label = "Use Method"
-    bl_description = "Deform the selected meshes by this method"
-    bl_options = {"REGISTER", "UNDO"}
-
-    method: bpy.props.StringProperty(name="Method")
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if self.method not in properties.METHODS:
-            self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
-            return {"CANCELLED"}
-        with session.changing(context):
-            for obj in sinew_targets(context):
-                attach.use_one_method(obj, self.method)
-        return {"FINISHED"}
-
-
 class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
     bl_label = "Suggest"
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(operators.sinew_targets(context))
+        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
+        layout.active = operators.are_any_on(context)
         layout.operator_menu_enum("sinew.suggest", "over", text="Measure All Methods", icon="VIEWZOOM")
         suggestion = suggest.suggestions.get(context.scene.session_uid)
         if suggestion is None:
@@ -97,4 +79,4 @@ def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None
     return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")
 
 
-CLASSES = (SINEW_OT_suggest, SINEW_OT_use_method, SINEW_PT_suggest)
+CLASSES = (SINEW_OT_suggest, SINEW_PT_suggest)

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings that the meshes of a character have in common."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import properties
+
+# Of properties.SinewSettings; all stages and parameters of methods are, too.
+SHARED = ("method", "scale_rule", "normals", "leave_small")
+GROUPS = {**properties.STAGE_GROUPS, **properties.METHOD_GROUPS}
+
+
+def share(source: bpy.types.Object, target: bpy.types.Object) -> None:
+    """Gives a mesh those of another. It is for the caller to suspend updates meanwhile."""
+    own, other = properties.of(target), properties.of(source)
+    for name in SHARED:
+        assign(own, name, getattr(other, name))
+    for group, cls in GROUPS.items():
+        for name in cls.__annotations__:
+            assign(getattr(own, group), name, getattr(getattr(other, group), name))
+
+
+def assign(group: bpy.types.PropertyGroup, name: str, value: object) -> None:
+    """Only what differs: each assignment has Blender evaluate the object."""
+    if getattr(group, name) != value:
+        setattr(group, name, value)

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Brings a character and its copies into a 3D view that does not show all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+from . import comparison, comparison_state
+
+# Of the view's height, on each side.
+MARGIN = 0.04
+# How much farther away for each look, and how often.
+STEP, MOST_STEPS = 1.1, 60
+
+
+def show_all(
+    context: bpy.types.Context, viewport: bpy.types.SpaceView3D, meshes: Sequence[bpy.types.Object]
+) -> None:
+    """Moves the view to the middle of them, and away as far as is needed; a view that shows them all, one
+    through a camera and one that is locked to something stay.
+
+    meshes  that are compared
+    """
+    view, area = viewport.region_3d, context.area
+    state = comparison_state.of_scene(context.scene)
+    is_locked = viewport.lock_object is not None or viewport.lock_cursor or view.lock_rotation
+    if state is None or area is None or view.view_perspective == "CAMERA" or is_locked:
+        return
+    depsgraph = context.evaluated_depsgraph_get()
+    shown = [*meshes, *comparison_state.copies_of(state)]
+    points = np.concatenate([comparison.corners(obj.evaluated_get(depsgraph)) for obj in shown])
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    if _are_visible(area, region, view, points):
+        return
+    low, high = points.min(axis=0), points.max(axis=0)
+    view.view_location = Vector(0.5 * (low + high))
+    view.view_distance = max(0.5 * float(np.linalg.norm(high - low)), 1e-3)
+    view.update()
+    for _step in range(MOST_STEPS):
+        if _are_visible(area, region, view, points):
+            return
+        view.view_distance *= STEP
+        view.update()
+
+
+def _are_visible(
+    area: bpy.types.Area, region: bpy.types.Region, view: bpy.types.RegionView3D, points: np.ndarray
+) -> bool:
+    """Whether all points are where neither toolbar nor sidebar covers the view."""
+    margin = MARGIN * region.height
+    left, right = margin, region.width - margin
+    for other in area.regions:
+        if other.type == "UI" and other.width > 1 and other.x > region.x:
+            right = min(right, other.x - region.x - margin)
+        elif other.type == "TOOLS" and other.width > 1:
+            left = max(left, other.x + other.width - region.x + margin)
+    for point in points:
+        place = location_3d_to_region_2d(region, view, Vector(point))
+        if place is None or not (left <= place.x <= right and margin <= place.y <= region.height - margin):
+            return False
+    return True

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What mends a finding: the buttons that do what its sentence says, on exactly its vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils.kdtree import KDTree
+
+from ...core.diagnostics import Finding
+from ...core.errors import SinewError
+from ...core.mend import Rows, WeightMender
+from ...io import mesh_io
+from . import diagnose
+
+# How far from the mirrored place a vertex may be, as a part of the mesh's diagonal.
+MIRROR_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Mend:
+    """A button: what it is called, and what it does in one sentence."""
+
+    name: str
+    label: str
+    description: str
+
+
+LIMIT = Mend(
+    "limit", "Limit Total", "Keep the largest weights of these vertices, and scale them to a sum of 1"
+)
+NORMALIZE = Mend("normalize", "Normalize", "Scale the weights of these vertices to a sum of 1")
+SMOOTH = Mend("smooth", "Smooth", "Bring the weights of these vertices closer to those of their neighbours")
+FILL = Mend(
+    "fill", "From Neighbours", "Give these vertices the weights of those around them, from the border in"
+)
+MIRROR = Mend(
+    "mirror",
+    "From Other Side",
+    "Give these vertices the weights of those at the mirrored place (X), in the groups of the other side",
+)
+REMOVE = Mend("remove", "Remove Groups", "Delete these vertex groups; those that are locked stay")
+ALL = {mend.name: mend for mend in (LIMIT, NORMALIZE, SMOOTH, FILL, MIRROR, REMOVE)}
+
+# By the finding.
+MENDS = {
+    "no_weights": (FILL, MIRROR),
+    "small_sums": (NORMALIZE, FILL, MIRROR),
+    "many_influences": (LIMIT,),
+    "boneless_groups": (REMOVE,),
+    "order_of_groups": (SMOOTH,),
+    "near_half_turn": (SMOOTH,),
+    "jumps": (SMOOTH,),
+}
+
+
+def mend(obj: bpy.types.Object, finding: str, how: str, most_influences: int) -> str:
+    """Changes weights or groups; what was done, in words.
+
+    Raises SinewError, and changes nothing, where nothing can be done.
+    """
+    check, found = diagnose.finding_of(obj, finding)
+    if check.stale:
+        raise SinewError(f"{obj.name}: its weights, groups or bones have changed since; press Check again")
+    if how not in {each.name for each in MENDS.get(finding, ())}:
+        raise SinewError(f"{obj.name}: {how!r} does not mend {found.title.lower()}")
+    if how == REMOVE.name:
+        return _remove(obj, found)
+    rows = _rows(obj, check, found, how, most_influences)
+    if not rows:
+        raise SinewError(f"{obj.name}: {_NOTHING[how]}")
+    mesh_io.write_group_weights(obj, rows)
+    left = len(found.vertices) - len(rows)
+    return f"{len(rows):,} vertices" + (f"; {left:,} could not be" if left else "")
+
+
+_NOTHING = {
+    LIMIT.name: "no weights to limit",
+    NORMALIZE.name: "no weights to scale; their groups may be locked",
+    SMOOTH.name: "no weights to smooth",
+    FILL.name: "no vertex with weights is connected to these",
+    MIRROR.name: "no vertex with weights is at the mirrored place of these",
+}
+
+
+def _remove(obj: bpy.types.Object, found: Finding) -> str:
+    groups = [obj.vertex_groups[name] for name in found.groups if name in obj.vertex_groups]
+    groups = [group for group in groups if not group.lock_weight]
+    if not groups:
+        raise SinewError(f"{obj.name}: these groups are locked")
+    for group in groups:
+        obj.vertex_groups.remove(group)
+    return f"{len(groups)} group{'s' if len(groups) > 1 else ''}"
+
+
+def _rows(
+    obj: bpy.types.Object, check: diagnose.Check, found: Finding, how: str, most_influences: int
+) -> Rows:
+    names = list(check.groups)
+    is_bone = check.bones.of_groups(names) >= 0
+    vertices = found.vertices.tolist()
+    if how == MIRROR.name:
+        mirror_of = _mirrored_groups(obj, names, check)
+        names += [group.name for group in list(obj.vertex_groups)[len(names) :]]
+        is_bone = check.bones.of_groups(names) >= 0
+    is_locked = np.array([obj.vertex_groups[name].lock_weight for name in names], dtype=bool)
+    mender = WeightMender(check.weights, is_bone, is_locked)
+    if how == MIRROR.name:
+        return mender.mirrored(_mirror_pairs(obj, vertices), mirror_of)
+    if how == LIMIT.name:
+        return mender.limited(vertices, most_influences)
+    if how == NORMALIZE.name:
+        return mender.normalized(vertices)
+    work = mender.smoothed if how == SMOOTH.name else mender.filled
+    return work(vertices, _edges(obj), most_influences)
+
+
+def _edges(obj: bpy.types.Object) -> np.ndarray:
+    """int32 [edges, 2]; of the mesh as it is edited, which the check has read."""
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+    edges = np.empty((len(obj.data.edges), 2), dtype=np.int32)
+    obj.data.edges.foreach_get("vertices", edges.ravel())
+    return edges
+
+
+def _mirrored_groups(obj: bpy.types.Object, names: Sequence[str], check: diagnose.Check) -> list[int]:
+    """[groups]: the group of the other side, made where its bone has none yet; else the group itself."""
+    bones = {name for name, deforms in zip(check.bones.names, check.bones.deform, strict=True) if deforms}
+    found = []
+    for number, name in enumerate(names):
+        other = bpy.utils.flip_name(name)
+        if other not in obj.vertex_groups and other in bones and name in bones:
+            obj.vertex_groups.new(name=other)
+        group = obj.vertex_groups.get(other)
+        found.append(number if group is None else group.index)
+    return found
+
+
+def _mirror_pairs(obj: bpy.types.Object, vertices: Sequence[int]) -> dict[int, int]:
+    """The vertex at the mirrored place of each that has one; not itself, and none that is mended, too."""
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+    points, mended = mesh_io.read_points(obj.data), set(vertices)
+    tolerance = MIRROR_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    others = [index for index in range(len(points)) if index not in mended]
+    tree = KDTree(len(others))
+    for index in others:
+        tree.insert(points[index], index)
+    tree.balance()
+    nearest = {v: tree.find((-points[v][0], points[v][1], points[v][2])) for v in vertices}
+    return {v: index for v, (_place, index, far) in nearest.items() if index is not None and far <= tolerance}

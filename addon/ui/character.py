@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings of a whole character, as the panel shows them: properties without values of their own.
+
+Each reads the value of one mesh, the lead, and is written to all meshes that follow the character; so one
+change of a slider or menu is one change of them all, and one step of undo. Keys and drivers belong to a
+mesh's own settings.
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import bpy
+
+from ..attach import attach, properties
+from ..attach.shared_settings import GROUPS, SHARED, assign
+from ..attach.subscribers import subscribers
+from ..deform import session
+from . import operators
+
+# What a property that is computed can not have.
+_NOT_COMPUTED = {"update", "override", "default", "options"}
+
+
+def followers(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The meshes of the characters meant that have Sinew, without those that keep settings of their own."""
+    return [obj for obj in operators.sinew_targets(context) if not properties.of(obj).is_own]
+
+
+def lead(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The mesh whose values are shown: the active one, else the first that follows; else the first."""
+    return min(known_meshes(context), key=lambda obj: properties.of(obj).is_own, default=None)
+
+
+def set_method(context: bpy.types.Context, method: str) -> None:
+    """All meshes that follow blend by `method`, with all of their Armature modifiers."""
+    with session.changing(context):
+        for obj in followers(context):
+            attach.use_one_method(obj, method)
+
+
+class _Known:
+    """The character's meshes as they were found last, by their names, and what was selected then. To find
+    them goes through the whole scene, and each button reads its value several times."""
+
+    selection: tuple[object, ...] = ()
+    names: tuple[str, ...] = ()
+
+
+def find_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Those of the characters meant that have Sinew; known_meshes() has them from now on."""
+    found = operators.sinew_targets(context)
+    _Known.selection, _Known.names = _selection(context), tuple(obj.name for obj in found)
+    return found
+
+
+def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The same as they were found last, as long as the same objects are selected and all still have Sinew."""
+    if _Known.names and _Known.selection == _selection(context):
+        found = [context.scene.objects.get(name) for name in _Known.names]
+        if all(obj is not None and properties.has_sinew(obj) for obj in found):
+            return found
+    return find_meshes(context)
+
+
+def _selection(context: bpy.types.Context) -> tuple[object, ...]:
+    active = context.active_object
+    names = (obj.name for obj in context.selected_objects)
+    return (context.scene.session_uid, active.name if active is not None else "", *names)
+
+
+def _computed(deferred: Any, group: str, name: str) -> object:
+    """The property of a character for one of a mesh.
+
+    deferred  what bpy.props made for the mesh's
+    group     its group within the settings; empty for the settings themselves
+    """
+
+    def of_mesh(settings: properties.SinewSettings) -> bpy.types.PropertyGroup:
+        return getattr(settings, group) if group else settings
+
+    def get(_own: bpy.types.PropertyGroup) -> object:
+        obj = lead(bpy.context)
+        settings = None if obj is None else properties.of(obj)
+        prop = CLASSES_OF[group].bl_rna.properties[name]
+        value = prop.default if settings is None else getattr(of_mesh(settings), name)
+        return prop.enum_items[value].value if prop.type == "ENUM" else value
+
+    def set_all(_own: bpy.types.PropertyGroup, value: object) -> None:
+        prop = CLASSES_OF[group].bl_rna.properties[name]
+        if prop.type == "ENUM":
+            # One without identifier is a heading.
+            value = next(i.identifier for i in prop.enum_items if i.identifier and i.value == value)
+        each = [of_mesh(properties.of(obj)) for obj in followers(bpy.context)]
+        if any(getattr(settings, name) != value for settings in each):
+            with session.changing(bpy.context):
+                for settings in each:
+                    assign(settings, name, value)
+
+    facts = {key: value for key, value in deferred.keywords.items() if key not in _NOT_COMPUTED}
+    return deferred.function(get=get, set=set_all, options=set(), **facts)
+
+
+# The classes of a mesh's settings by the name of the group; empty for the settings themselves.
+CLASSES_OF = {"": properties.SinewSettings, **GROUPS}
+
+
+def _class_of(group: str, names: tuple[str, ...]) -> type:
+    source = inspect.get_annotations(CLASSES_OF[group], eval_str=True)
+    annotations = {name: _computed(source[name], group, name) for name in names}
+    title = group.title().replace("_", "")
+    return type(f"SinewCharacter{title}", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+
+
+_GROUP_CLASSES = {name: _class_of(name, tuple(cls.__annotations__)) for name, cls in GROUPS.items()}
+SinewCharacter = _class_of("", SHARED)
+
+
+def _is_on(_own: bpy.types.PropertyGroup) -> bool:
+    return any(properties.of(obj).enabled for obj in known_meshes(bpy.context))
+
+
+def _switch(_own: bpy.types.PropertyGroup, on: bool) -> None:
+    with session.changing(bpy.context):
+        for obj in operators.sinew_targets(bpy.context):
+            if properties.of(obj).enabled != on:
+                properties.of(obj).enabled = on
+
+
+def _row(own: bpy.types.PropertyGroup) -> int:
+    obj = chosen(own.id_data)
+    return -1 if obj is None else own.id_data.objects.find(obj.name)
+
+
+def _choose_row(own: bpy.types.PropertyGroup, row: int) -> None:
+    objects = own.id_data.objects
+    own.chosen = objects[row].name if 0 <= row < len(objects) else ""
+
+
+def chosen(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The mesh of the list whose details are shown; the active one where another character's was chosen."""
+    meshes = operators.targets(bpy.context)
+    return next((obj for obj in meshes if obj.name == of(scene).chosen), meshes[0] if meshes else None)
+
+
+SinewCharacter.__annotations__.update(
+    {
+        "enabled": bpy.props.BoolProperty(
+            name="On",
+            description="Deform all meshes of the character with Sinew; off: with Blender's Armature "
+            "modifier, to compare the two",
+            get=_is_on,
+            set=_switch,
+            options=set(),
+        ),
+        "row": bpy.props.IntProperty(
+            name="Mesh",
+            description="The mesh whose details are shown, among the scene's objects",
+            get=_row,
+            set=_choose_row,
+            options={"HIDDEN"},
+        ),
+        "chosen": bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"}),
+        **{
+            name: bpy.props.PointerProperty(type=cls, description=GROUPS[name].__doc__)
+            for name, cls in _GROUP_CLASSES.items()
+        },
+    }
+)
+
+CLASSES = (*_GROUP_CLASSES.values(), SinewCharacter)
+
+
+def of(scene: bpy.types.Scene) -> SinewCharacter:
+    """Reading it makes it, in a scene that had none."""
+    return scene.sinew_character
+
+
+def _clear() -> None:
+    """Takes the group out of the file where nothing needs it any more."""
+    if not any(properties.has_sinew(obj) for obj in bpy.data.objects):
+        for scene in bpy.data.scenes:
+            if scene.library is None and scene.is_property_set("sinew_character"):
+                scene.property_unset("sinew_character")
+
+
+def register() -> None:
+    bpy.types.Scene.sinew_character = bpy.props.PointerProperty(type=SinewCharacter)
+    subscribers.after_removal.append(_clear)
+
+
+def unregister() -> None:
+    subscribers.after_removal.remove(_clear)
+    del bpy.types.Scene.sinew_character

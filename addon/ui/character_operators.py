@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that act on a character's settings."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach import properties, shared_settings
+from ..deform import session
+from . import character
+from .operators import OnSinewObjects, sinew_targets
+from .sidebar import Sidebar
+
+
+class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.use_method"
+    bl_label = "Use Method"
+    bl_description = "Deform all meshes of the character by this method"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    method: bpy.props.StringProperty(name="Method", description="Its short name, as in the table of methods")
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, given: bpy.types.OperatorProperties) -> str:
+        method = properties.METHODS.get(given.method)
+        return cls.bl_description if method is None else method.description
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if self.method not in properties.METHODS:
+            self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
+            return {"CANCELLED"}
+        character.set_method(context, self.method)
+        return {"FINISHED"}
+
+
+class SINEW_OT_switch(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.switch"
+    bl_label = "Switch On / Off"
+    bl_description = (
+        "Flip all meshes of the character between Sinew and Blender's Armature modifier, to compare the two"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        shared = character.of(context.scene)
+        shared.enabled = not shared.enabled
+        self.report({"INFO"}, "Sinew is on" if shared.enabled else "Sinew is off")
+        return {"FINISHED"}
+
+
+class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
+    bl_idname = "sinew.own_settings"
+    bl_label = "Own Settings"
+    bl_description = (
+        "Let this mesh differ: it keeps settings of its own, which can have keys, and the character's do not "
+        "change it. Once more: it follows the character again"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: bpy.props.StringProperty(
+        name="Mesh", description="Empty: the active one", options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        active = context.active_object
+        name = self.name or (active.name if active is not None else "")
+        obj = next((o for o in sinew_targets(context) if o.name == name), None)
+        if obj is None:
+            self.report({"ERROR"}, f"{name or 'The active object'} is no mesh that Sinew deforms")
+            return {"CANCELLED"}
+        settings = properties.of(obj)
+        settings.is_own = not settings.is_own
+        others = [other for other in character.followers(context) if other != obj]
+        if not settings.is_own and others:
+            with session.changing(context):
+                shared_settings.share(others[0], obj)
+        return {"FINISHED"}
+
+
+class SINEW_OT_open_tab(bpy.types.Operator):
+    bl_idname = "sinew.open_tab"
+    bl_label = "Open the Sinew Tab"
+    bl_description = "Show the tab Sinew in the sidebar of the 3D view"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if _view3d(context) is not None:
+            return True
+        cls.poll_message_set("This window has no 3D view")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        area = _view3d(context)
+        area.spaces.active.show_region_ui = True
+        region = next(region for region in area.regions if region.type == "UI")
+        if bpy.app.background:
+            return {"FINISHED"}
+        _choose_tab(region)
+        # A sidebar that was closed has no tabs before it is drawn.
+        bpy.app.timers.register(lambda: _choose_tab(region), first_interval=0.1)
+        return {"FINISHED"}
+
+
+def _choose_tab(region: bpy.types.Region) -> None:
+    try:
+        region.active_panel_category = Sidebar.bl_category
+        region.tag_redraw()
+    except (ReferenceError, TypeError, AttributeError):
+        # The window was closed meanwhile, or the sidebar shows no tabs.
+        return
+
+
+def _view3d(context: bpy.types.Context) -> bpy.types.Area | None:
+    if context.area is not None and context.area.type == "VIEW_3D":
+        return context.area
+    areas = [] if context.screen is None else [a for a in context.screen.areas if a.type == "VIEW_3D"]
+    return max(areas, key=lambda area: area.width * area.height, default=None)
+
+
+CLASSES = (SINEW_OT_use_method, SINEW_OT_switch, SINEW_OT_own_settings, SINEW_OT_open_tab)

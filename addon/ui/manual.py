@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's "Online Manual", at Sinew's buttons and properties, opens the page within the extension."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+PAGE = Path(__file__).resolve().parent.parent / "manual.html"
+# By the start of the name, in lower case as Blender looks it up; the first that fits.
+_SECTIONS = {
+    "bpy.ops.sinew.method_preset*": "presets",
+    "bpy.ops.sinew.use_method*": "method",
+    "bpy.ops.sinew.own_settings*": "meshes",
+    "bpy.ops.sinew.make_group*": "stages",
+    "bpy.ops.sinew.take_over_smooth*": "stages",
+    "bpy.ops.sinew.suggest*": "suggest",
+    "bpy.ops.sinew.bake_inbetweens*": "in-betweens",
+    "bpy.ops.sinew.bake*": "bake",
+    "bpy.ops.sinew.compare*": "compare",
+    "bpy.ops.sinew.*comparison*": "compare",
+    "bpy.ops.sinew.*heat*": "heat-map",
+    "bpy.ops.sinew.worst_frames*": "heat-map",
+    "bpy.ops.sinew.go_to_frame*": "heat-map",
+    "bpy.ops.sinew.check*": "diagnostics",
+    "bpy.ops.sinew.*finding*": "diagnostics",
+    "bpy.ops.sinew.mend*": "diagnostics",
+    "bpy.ops.sinew.*precomput*": "method",
+    "bpy.ops.sinew.*": "character",
+    "bpy.types.object.sinew_inbetween*": "in-betweens",
+    "bpy.types.scene.sinew_most_influences*": "diagnostics",
+    "bpy.types.sinewmeasures*": "heat-map",
+    "bpy.types.sinewcomparison*": "compare",
+    "bpy.types.sinewpreferences*": "preferences",
+    "bpy.types.sinew*.scale_rule*": "stages",
+    "bpy.types.sinew*.leave_small*": "stages",
+    "bpy.types.sinew*.is_own*": "meshes",
+    "bpy.types.sinew*.row*": "meshes",
+    "bpy.types.sinew*.enabled*": "character",
+    "bpy.types.sinewsettings.method*": "method",
+    "bpy.types.sinewcharacter.method*": "method",
+    "bpy.types.sinewmethod*": "method",
+    "bpy.types.sinewstage*": "stages",
+    "bpy.types.sinewcharacter*.*": "stages",
+    "bpy.types.sinew*": "character",
+}
+
+
+def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
+    """For bpy.utils.register_manual_map(): the start of addresses, and patterns with the end of each."""
+    return PAGE.as_uri(), tuple((pattern, f"#{section}") for pattern, section in _SECTIONS.items())
+
+
+def register() -> None:
+    bpy.utils.register_manual_map(manual_map)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_manual_map(manual_map)

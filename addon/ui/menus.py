@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew in Blender's menus, where F3 finds it, a pie menu, and shortcuts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import groupby
+
+import bpy
+import rna_keymap_ui
+
+from ..attach import properties
+from . import operators
+from .stepped import OVER
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An operator in the menu.
+
+    text    empty: the operator's own label
+    values  of the operator's properties
+    """
+
+    operator: str
+    text: str = ""
+    icon: str = "NONE"
+    values: dict[str, str] = field(default_factory=dict)
+
+
+def _over(operator: str, text: str) -> tuple[Entry, ...]:
+    """One for each range of frames."""
+    return tuple(
+        Entry(operator, f"{text} over the {label}", values={"over": name}) for name, label, _text in OVER
+    )
+
+
+# All operators that act on what is selected, in the menu's order; None is a line.
+ENTRIES: tuple[Entry | None, ...] = (
+    Entry("sinew.add", icon="MOD_ARMATURE"),
+    Entry("sinew.switch"),
+    Entry("sinew.rebind", icon="FILE_REFRESH"),
+    Entry("sinew.remove", "Remove Sinew", icon="X"),
+    None,
+    Entry("sinew.own_settings", "Own Settings of This Mesh"),
+    Entry("sinew.take_over_smooth", icon="MOD_SMOOTH"),
+    Entry("sinew.make_group", "Make Vertex Group of the Mix", values={"stage": "mix"}),
+    Entry("sinew.make_group", "Make Vertex Group of Limit Bulge", values={"stage": "bulge_limit"}),
+    Entry("sinew.make_group", "Make Vertex Group of Delta Mush", values={"stage": "delta_mush"}),
+    Entry("sinew.method_preset_add", "Save Method as Preset\u2026"),
+    None,
+    *_over("sinew.suggest", "Suggest a Method"),
+    Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
+    Entry("sinew.flip_comparison"),
+    Entry("sinew.end_comparison"),
+    None,
+    Entry("sinew.heat_map", icon="SHADING_RENDERED"),
+    *_over("sinew.worst_frames", "Find Worst Frames"),
+    *_over("sinew.fit_heat_range", "Fit Heat Map"),
+    None,
+    Entry("sinew.check", "Check Weights and Pose"),
+    *_over("sinew.check_frames", "Check"),
+    None,
+    Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
+    Entry("sinew.bake_inbetweens"),
+    None,
+    Entry("sinew.open_tab"),
+)
+
+
+class SINEW_MT_methods(bpy.types.Menu):
+    bl_label = "Method"
+    bl_description = "How the bones' motions are blended, for all meshes of the character"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        has_sinew = operators.has_sinew_targets(context)
+        for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
+            layout.label(text=group)
+            for method in methods:
+                name = "sinew.use_method" if has_sinew else "sinew.add"
+                layout.operator(name, text=method.label).method = method.name
+
+
+class SINEW_MT_menu(bpy.types.Menu):
+    bl_label = "Sinew"
+    bl_description = "Skinning of the selected character"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        # Elsewhere than in a sidebar a menu executes without the dialog.
+        layout.operator_context = "INVOKE_DEFAULT"
+        for entry in ENTRIES:
+            if entry is None:
+                layout.separator()
+                continue
+            text = {"text": entry.text} if entry.text else {}
+            button = layout.operator(entry.operator, icon=entry.icon, **text)
+            for name, value in entry.values.items():
+                setattr(button, name, value)
+            if entry.operator == "sinew.add":
+                layout.menu(SINEW_MT_methods.__name__)
+
+
+class SINEW_MT_pie(bpy.types.Menu):
+    bl_label = "Sinew"
+    bl_description = "What one does most often while posing"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        pie = self.layout.menu_pie()
+        pie.operator("sinew.flip_comparison", icon="UV_SYNC_SELECT")
+        pie.menu(SINEW_MT_methods.__name__, icon="MOD_ARMATURE")
+        if operators.has_sinew_targets(context):
+            pie.operator("sinew.switch", icon="HIDE_OFF")
+        else:
+            pie.operator("sinew.add", icon="ADD")
+        pie.operator("sinew.compare", text="Compare\u2026", icon="MOD_ARRAY")
+        pie.operator("sinew.heat_map", icon="SHADING_RENDERED")
+        pie.operator("sinew.check", icon="CHECKMARK")
+        pie.operator("sinew.open_tab", icon="MENU_PANEL")
+        pie.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
+
+
+def _draw_in_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.menu(SINEW_MT_menu.__name__)
+
+
+def _draw_in_modifiers(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.operator("sinew.add", text="Sinew", icon="MOD_ARMATURE")
+
+
+MENUS = {
+    "VIEW3D_MT_object": _draw_in_menu,
+    "VIEW3D_MT_pose": _draw_in_menu,
+    "VIEW3D_MT_paint_weight": _draw_in_menu,
+    "OBJECT_MT_modifier_add_deform": _draw_in_modifiers,
+}
+# The operator, what it opens, and its key, with Alt and Shift: Blender has none of these in a 3D view.
+SHORTCUTS = (("wm.call_menu_pie", SINEW_MT_pie.__name__, "Y"), ("sinew.flip_comparison", "", "F"))
+# What was added to the add-ons' key configuration.
+_shortcuts: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+
+
+def draw_shortcuts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """In the preferences, to be changed there; the user's own key configuration has them."""
+    user = context.window_manager.keyconfigs.user
+    if user is None or not _shortcuts:
+        return
+    layout.label(text="Shortcuts in the 3D View")
+    keymap = user.keymaps.get(_shortcuts[0][0].name)
+    for operator, menu, _key in SHORTCUTS if keymap is not None else ():
+        for item in keymap.keymap_items:
+            if item.idname == operator and (not menu or item.properties.name == menu):
+                layout.context_pointer_set("keymap", keymap)
+                rna_keymap_ui.draw_kmi([], user, keymap, item, layout, 0)
+
+
+def register() -> None:
+    for name, draw in MENUS.items():
+        getattr(bpy.types, name).append(draw)
+    addons = bpy.context.window_manager.keyconfigs.addon
+    if addons is None:
+        # Without a window.
+        return
+    keymap = addons.keymaps.new(name="3D View Generic", space_type="VIEW_3D")
+    for operator, menu, key in SHORTCUTS:
+        item = keymap.keymap_items.new(operator, key, "PRESS", alt=True, shift=True)
+        if menu:
+            item.properties.name = menu
+        _shortcuts.append((keymap, item))
+
+
+def unregister() -> None:
+    for name, draw in MENUS.items():
+        getattr(bpy.types, name).remove(draw)
+    while _shortcuts:
+        keymap, item = _shortcuts.pop()
+        keymap.keymap_items.remove(item)
+
+
+CLASSES = (SINEW_MT_methods, SINEW_MT_menu, SINEW_MT_pie)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is at work on a mesh, above its stack of modifiers. Blender draws the panel of a modifier itself, and
+the node group within is shared by all meshes: neither can say it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach import properties
+from . import state_text
+from .sidebar import draw_text
+
+# Of the Properties editor, with the stack.
+PANEL = "DATA_PT_modifiers"
+
+
+def _draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
+    obj = context.object
+    if obj is None or not properties.has_sinew(obj):
+        return
+    box = self.layout.box()
+    settings, row = properties.of(obj), box.row(align=True)
+    row.label(text="Sinew", icon=state_text.icon_of(obj))
+    row.prop(settings, "enabled", text="On" if settings.enabled else "Off", toggle=True)
+    row.operator("sinew.open_tab", text="", icon="MENU_PANEL")
+    draw_text(box, context, state_text.sentence_of(obj), alert=bool(settings.error))
+
+
+def register() -> None:
+    getattr(bpy.types, PANEL).prepend(_draw)
+
+
+def unregister() -> None:
+    getattr(bpy.types, PANEL).remove(_draw)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How settings are drawn: a character's (character.py) or those of one mesh, which have the same names."""
+
+from __future__ import annotations
+
+import bpy
+import sinew
+
+from ..attach import corrective_smooth, normals, properties, stage_settings
+from ..deform import method_needs, small_meshes
+from . import operators
+from .sidebar import draw_text
+
+
+def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
+    """The method, and the parameters of all methods at work.
+
+    obj  whose settings these are; of a character, its lead
+    """
+    layout.prop(settings, "method", text="")
+    for name in method_needs.methods_of(obj):
+        for parameter in properties.METHODS[name].parameters:
+            layout.prop(getattr(settings, name), parameter.id)
+
+
+def draw_stages(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    settings: bpy.types.PropertyGroup,
+    obj: bpy.types.Object,
+    only: str = "",
+) -> None:
+    """What follows the method, what bones' scale does, and who computes normals.
+
+    only  the name of the mesh that buttons act on; empty for the character
+    """
+    _draw_mix(layout, context, settings, obj, only)
+    for stage in stage_settings.STAGES.values():
+        if stage.name != "mix":
+            _draw_stage(layout, settings, obj, stage, only)
+    _draw_take_over(layout, context, obj, only)
+    layout.prop(settings, "scale_rule")
+    if normals.ARE_SUPPORTED:
+        layout.prop(settings, "normals")
+    if len(obj.data.vertices) < max(small_meshes.VERTICES.values()):
+        layout.prop(settings, "leave_small")
+
+
+def _draw_mix(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    settings: bpy.types.PropertyGroup,
+    obj: bpy.types.Object,
+    only: str,
+) -> None:
+    mix = settings.mix
+    layout.prop(mix, "method", text="Mix")
+    if mix.method == properties.OFF:
+        return
+    layout.prop_search(mix, "group", obj, "vertex_groups", text="By")
+    if not mix.group:
+        draw_text(layout, context, "Choose the vertex group that says where it takes over", icon="INFO")
+    _draw_make_group(layout, settings, obj, "mix", only)
+
+
+def _draw_make_group(
+    layout: bpy.types.UILayout,
+    settings: bpy.types.PropertyGroup,
+    obj: bpy.types.Object,
+    stage: str,
+    only: str,
+) -> None:
+    """A button where the stage lacks the vertex group that it names, or the mix any."""
+    name = getattr(settings, stage).group
+    if name in obj.vertex_groups or not (name or stage == "mix"):
+        return
+    text = f"Make Vertex Group {name}" if name else "Make a Vertex Group"
+    button = layout.operator("sinew.make_group", text=text, icon="GROUP_VERTEX")
+    button.name, button.stage = only, stage
+
+
+def _draw_stage(
+    layout: bpy.types.UILayout,
+    settings: bpy.types.PropertyGroup,
+    obj: bpy.types.Object,
+    stage: sinew.Stage,
+    only: str,
+) -> None:
+    """Its switch, and while it is on its parameters."""
+    group = getattr(settings, stage.name)
+    switch, *others = stage.parameters
+    layout.prop(group, switch.id, text=stage.label)
+    if not stage_settings.is_on(group, stage):
+        return
+    column = layout.column(align=True)
+    for parameter in others:
+        if parameter.kind == "vertex_group":
+            column.prop_search(group, parameter.id, obj, "vertex_groups")
+            _draw_make_group(column, settings, obj, stage.name, only)
+        else:
+            column.prop(group, parameter.id)
+
+
+def _draw_take_over(
+    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, only: str
+) -> None:
+    """Of the mesh, or of any of the character's."""
+    meshes = [obj] if only else operators.sinew_targets(context)
+    if any(operators.can_take_over(mesh) for mesh in meshes):
+        layout.operator("sinew.take_over_smooth", icon="MOD_SMOOTH").name = only
+        return
+    for mesh in meshes:
+        modifier = corrective_smooth.candidate(mesh)
+        if modifier is not None and properties.of(mesh).enabled:
+            draw_text(layout, context, corrective_smooth.why_not(mesh, modifier), icon="INFO")

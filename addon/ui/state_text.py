@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who deforms a mesh, and why, in the panel's words."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..attach import hooks, properties
+from ..deform import session
+from ..deform.plan import ObjectFacts, State, plan
+from .sidebar import draw_text, names_text
+
+ICONS = {
+    State.OFF: "MODIFIER_OFF",
+    State.BUILT_IN: "MOD_ARMATURE",
+    State.WAITING: "SORTTIME",
+    State.IN_DEPSGRAPH: "CHECKMARK",
+    State.AFTER_UPDATE: "RECOVER_LAST",
+}
+
+
+def reason_of(obj: bpy.types.Object) -> str:
+    """Why it is not deformed as usual; empty where it is, or is off."""
+    settings, state = properties.of(obj), session.state_of(obj)
+    if not settings.enabled:
+        return ""
+    facts = ObjectFacts(is_linked=obj.library is not None, mode=obj.mode)
+    return plan(facts).reason or (state.plan.reason if state is not None else "")
+
+
+def sentence_of(obj: bpy.types.Object) -> str:
+    """What is at work: who deforms the mesh, by which method, and why if not as usual."""
+    settings, state = properties.of(obj), session.state_of(obj)
+    replaced = names_text([each.name for each in settings.replaced_modifiers])
+    if settings.error:
+        return settings.error
+    if not settings.enabled:
+        return f"Off: {replaced} deforms it"
+    reason, method = reason_of(obj), properties.method_label(settings.method)
+    if state is None or uses_builtin(obj) or state.plan.state is State.WAITING:
+        return f"{method}. {reason or f'{replaced} deforms it until the next frame'}"
+    text = f"{method} in the place of {replaced}"
+    return f"{text}, after Blender's evaluation: {reason}" if reason else text
+
+
+def icon_of(obj: bpy.types.Object) -> str:
+    settings, state = properties.of(obj), session.state_of(obj)
+    if settings.error or (settings.enabled and problems_of(obj)):
+        return "ERROR"
+    if not settings.enabled or state is None:
+        return ICONS[State.OFF]
+    return ICONS[State.BUILT_IN if obj.mode in ("EDIT", "SCULPT") else state.plan.state]
+
+
+def problems_of(obj: bpy.types.Object) -> list[str]:
+    """What the artist should see to, apart from an error that switched it off."""
+    settings, state = properties.of(obj), session.state_of(obj)
+    if state is None:
+        return []
+    found = list(state.bound.lacks((settings.method, settings.mix.method)))
+    if state.evaluation.failures:
+        found.append(
+            f"{state.evaluation.failures} times not deformed within Blender's evaluation; last: "
+            f"{state.evaluation.failure}"
+        )
+    found += state.bound.facts.warnings
+    # A Hook may have come since.
+    return [*found, *(sentence for sentence in hooks.misled(obj) if sentence not in found)]
+
+
+def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """All of it, of one mesh."""
+    if properties.of(obj).error:
+        draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
+    elif reason_of(obj):
+        draw_text(layout, context, reason_of(obj), icon="INFO")
+    state = session.state_of(obj)
+    if state is not None and state.plan.normals_reason:
+        draw_text(layout, context, f"Blender computes normals: {state.plan.normals_reason}", icon="INFO")
+    for sentence in problems_of(obj):
+        draw_text(layout, context, sentence, icon="ERROR")
+
+
+def draw_character(
+    layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]
+) -> None:
+    """Of one mesh all; of several their errors, and what else there is to read in their list."""
+    if len(meshes) == 1:
+        draw_mesh(layout, context, meshes[0])
+        return
+    for obj in meshes:
+        if properties.of(obj).error:
+            draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
+    by_reason: dict[str, list[str]] = {}
+    for obj in meshes:
+        if properties.of(obj).enabled and uses_builtin(obj):
+            by_reason.setdefault(reason_of(obj), []).append(obj.name)
+    for reason, names in by_reason.items():
+        who = f"All {len(meshes)} meshes" if len(names) == len(meshes) else names_text(names, most=2)
+        draw_text(layout, context, f"{who}: {reason}", icon="INFO")
+    warned = [obj.name for obj in meshes if not properties.of(obj).error and problems_of(obj)]
+    if warned:
+        draw_text(layout, context, f"{names_text(warned)}: warnings, see Meshes", icon="ERROR")
+
+
+def uses_builtin(obj: bpy.types.Object) -> bool:
+    """Whether its Armature modifiers deform it, though Sinew is on."""
+    return icon_of(obj) == ICONS[State.BUILT_IN]

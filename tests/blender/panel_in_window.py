@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In Blender's window, with Sinew's zip: a character of five meshes by clicks and keys. Prints "FACTS" and a line
+of JSON; pictures of each step lie in the folder.
+
+    blender --factory-startup --enable-event-simulate --python panel_in_window.py -- sinew.zip FOLDER
+
+The window has 1280 x 800 pixels. Places are those of its picture: from the left, from the top.
+"""  # noqa: E501
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import five_meshes
+import window
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+ZIP, FOLDER = window.arguments()
+VIEW = (400, 500)
+# In the sidebar.
+ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
+# In the menu of methods.
+DUAL_QUATERNION = (483, 276)
+# In the dialog of a comparison, which opens at this place.
+DIALOG, QUATERNION_VECTOR, LOG_MATRIX = (400, 400), (171, 534), (171, 577)
+facts: dict[str, object] = {}
+
+
+def main_window() -> bpy.types.Window:
+    return bpy.context.window_manager.windows[0]
+
+
+def meshes() -> list[bpy.types.Object]:
+    return [bpy.data.objects[name] for name in five_meshes.MESHES]
+
+
+def methods() -> list[str]:
+    return [obj.sinew.method if obj.sinew.stand_ins else "" for obj in meshes()]
+
+
+def scene() -> bpy.types.Scene:
+    return main_window().scene
+
+
+def search(text: str) -> Iterator[None]:
+    """F3, as without Developer Extras."""
+    window.press("F3", VIEW)
+    yield
+    yield
+    for letter in text:
+        key = "SPACE" if letter == " " else letter.upper()
+        window.press(key, VIEW, text=letter)
+        yield
+    yield
+    window.photograph(FOLDER / f"search-{text.replace(' ', '-')}.png")
+    window.press("RET", VIEW)
+    yield
+    yield
+
+
+def start() -> Iterator[None]:
+    window.install(ZIP)
+    bpy.context.preferences.view.show_developer_ui = False
+    bpy.context.preferences.filepaths.temporary_directory = str(FOLDER)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    five_meshes.make(vertices=1200)
+    scene().frame_set(12)
+    window.open_sidebar()
+    yield
+    yield
+    window.choose_tab()
+    bpy.ops.ed.undo_push(message="made")
+    yield
+    yield
+
+
+def one_click_for_a_method() -> Iterator[None]:
+    window.photograph(FOLDER / "before.png")
+    yield from window.click(ADD)
+    facts["added"] = methods()
+    window.photograph(FOLDER / "added.png")
+    yield from window.click(METHOD)
+    window.photograph(FOLDER / "methods.png")
+    yield from window.click(DUAL_QUATERNION)
+    facts["chosen"] = methods()
+    yield from window.click(SWITCH)
+    facts["switched off"] = [obj.sinew.enabled for obj in meshes()]
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["on again"] = [obj.sinew.enabled for obj in meshes()]
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["chosen undone"] = methods()
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["added undone"] = methods()
+
+
+def by_search_and_keys() -> Iterator[None]:
+    yield from search("add sinew")
+    facts["added by search"] = methods()
+    yield from search("switch on off")
+    facts["switched by search"] = [obj.sinew.enabled for obj in meshes()]
+    yield from search("switch on off")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.compare("EXEC_DEFAULT", methods={"lbs", "dq"})
+    yield
+    yield
+    window.press("F", VIEW, alt=True, shift=True)
+    yield
+    yield
+    facts["flipped"] = [scene().sinew_comparison.arrangement, scene().sinew_comparison.shows_second]
+    yield from search("flip comparison")
+    facts["flipped by search"] = scene().sinew_comparison.shows_second
+    window.press("Y", VIEW, alt=True, shift=True)
+    yield
+    yield
+    yield
+    window.photograph(FOLDER / "pie.png")
+    window.press("ESC", VIEW)
+    yield
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
+    yield
+
+
+def copies_in_view() -> bool:
+    """Whether the view shows the corners of all copies, beside the sidebar."""
+    area = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    depsgraph = main_window().view_layer.depsgraph
+    copies = [obj for obj in bpy.data.objects if obj.is_property_set("sinew") and obj.sinew.copied_for]
+    for copy in copies:
+        evaluated = copy.evaluated_get(depsgraph)
+        for corner in evaluated.bound_box:
+            point = evaluated.matrix_world @ Vector(corner)
+            place = location_3d_to_region_2d(region, area.spaces[0].region_3d, point)
+            if place is None or not (0 <= place.x <= sidebar.x - region.x and 0 <= place.y <= region.height):
+                return False
+    return bool(copies)
+
+
+def comparison_by_clicks() -> Iterator[None]:
+    with window.in_view3d("WINDOW"):
+        bpy.ops.view3d.view_selected()
+    window.move(DIALOG)
+    yield
+    yield
+    with window.in_view3d():
+        bpy.ops.sinew.compare("INVOKE_DEFAULT")
+    yield
+    yield
+    yield from window.click(QUATERNION_VECTOR)
+    yield from window.click(LOG_MATRIX)
+    window.photograph(FOLDER / "compare.png")
+    window.press("RET", LOG_MATRIX)
+    for _tick in range(4):
+        yield
+    state = scene().sinew_comparison
+    facts["compared"] = sorted({obj.sinew.copied_for for obj in state.collection.objects})
+    facts["copies in view"] = copies_in_view()
+    window.photograph(FOLDER / "compared.png")
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
+        bpy.ops.view3d.view_all()
+    yield
+    yield
+
+
+def menus() -> Iterator[None]:
+    with window.in_view3d("WINDOW"):
+        bpy.ops.wm.call_menu(name="SINEW_MT_menu")
+    yield
+    yield
+    window.photograph(FOLDER / "menu.png")
+    window.press("ESC", VIEW)
+    yield
+    window.press("ESC", VIEW)
+    yield
+
+
+def modifiers() -> Iterator[None]:
+    """What stands above the stack, and its button, while the sidebar is closed."""
+    area = next(area for area in main_window().screen.areas if area.type == "PROPERTIES")
+    area.spaces[0].context = "MODIFIER"
+    view = next(area for area in main_window().screen.areas if area.type == "VIEW_3D")
+    view.spaces[0].show_region_ui = False
+    yield
+    yield
+    window.photograph(FOLDER / "modifiers.png")
+    with bpy.context.temp_override(window=main_window(), area=area, region=area.regions[-1]):
+        bpy.ops.sinew.open_tab("INVOKE_DEFAULT")
+    for _tick in range(4):
+        yield
+    region = next(region for region in view.regions if region.type == "UI")
+    facts["tab"] = [view.spaces[0].show_region_ui, region.active_panel_category]
+
+
+def shortcuts() -> list[str]:
+    keyconfigs = bpy.context.window_manager.keyconfigs
+    items = [item for keymap in keyconfigs.addon.keymaps for item in keymap.keymap_items]
+    names = [f"{item.idname} {getattr(item.properties, 'name', '')}" for item in items]
+    return sorted(name for name in names if "sinew" in name.lower())
+
+
+def goes_without_a_trace() -> Iterator[None]:
+    facts["shortcuts"] = shortcuts()
+    bpy.context.preferences.active_section = "ADDONS"
+    bpy.ops.preferences.addon_show(module="bl_ext.user_default.sinew")
+    yield
+    yield
+    yield
+    window.photograph(FOLDER / "preferences.png")
+    bpy.ops.preferences.addon_disable(module="bl_ext.user_default.sinew")
+    facts["shortcuts afterwards"] = shortcuts()
+    functions = [*bpy.types.VIEW3D_MT_object.draw._draw_funcs, *bpy.types.DATA_PT_modifiers.draw._draw_funcs]
+    facts["menus afterwards"] = [each.__module__ for each in functions if "sinew" in each.__module__]
+    yield
+    yield
+
+
+def steps() -> Iterator[None]:
+    yield from start()
+    yield from one_click_for_a_method()
+    yield from by_search_and_keys()
+    yield from comparison_by_clicks()
+    yield from menus()
+    yield from modifiers()
+    yield from goes_without_a_trace()
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+window.run(steps(), 0.15)

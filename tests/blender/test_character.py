@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One control for a character of five meshes: whatever is set for it goes to all that follow it."""
+
+from __future__ import annotations
+
+import bpy
+import five_meshes
+import numpy as np
+import pytest
+import scenes
+from sinew_addon.attach import properties
+from sinew_addon.deform import small_meshes
+from sinew_addon.ui import character, operators, state_text
+from sinew_addon.ui.sidebar import names_text, shortened
+
+
+@pytest.fixture
+def armature():
+    return five_meshes.make(vertices=1200)
+
+
+def meshes() -> list[bpy.types.Object]:
+    return [bpy.data.objects[name] for name in five_meshes.MESHES]
+
+
+def methods() -> list[str]:
+    return [properties.of(obj).method for obj in meshes()]
+
+
+def shared() -> bpy.types.PropertyGroup:
+    return character.of(bpy.context.scene)
+
+
+def mesh_points(obj: bpy.types.Object) -> np.ndarray:
+    """Without what Solidify and Subdivision add."""
+    return scenes.final_points(obj)
+
+
+@pytest.mark.parametrize("selected", ["Hero Rig", "Body", "Shoes", "Hat"])
+def test_one_click_adds_sinew_with_a_method_to_all_five(armature, selected):
+    five_meshes.select(bpy.data.objects[selected])
+    assert bpy.ops.sinew.add(method="dq") == {"FINISHED"}
+    assert methods() == ["dq"] * 5
+    assert not properties.has_sinew(bpy.data.objects["Hat"])
+
+
+def test_all_five_have_the_shape_of_their_armature_modifiers(armature):
+    """The oracle is Blender's Preserve Volume, with Solidify and Subdivision behind it."""
+    bpy.context.scene.frame_set(15)
+    expected = []
+    for obj in meshes():
+        obj.modifiers["Armature"].use_deform_preserve_volume = True
+        expected.append(mesh_points(obj))
+        obj.modifiers["Armature"].use_deform_preserve_volume = False
+    moved = [np.abs(points - mesh_points(obj)).max() for points, obj in zip(expected, meshes(), strict=True)]
+    assert min(moved) > 0.01, "both methods have one shape: nothing is tested"
+    bpy.ops.sinew.add()
+    assert methods() == ["lbs"] * 5
+    shared().method = "dq"
+    for points, obj in zip(expected, meshes(), strict=True):
+        np.testing.assert_allclose(mesh_points(obj), points, atol=1e-5 * scenes.diagonal(obj) * 3)
+
+
+def test_every_shared_setting_goes_to_all_and_only_by_the_character(armature):
+    bpy.ops.sinew.add()
+    own = properties.of(bpy.data.objects["Hair"])
+    own.method = "qv"
+    assert methods() == ["lbs", "lbs", "qv", "lbs", "lbs"], "a script sets one mesh"
+    shared().method = "log"
+    shared().scale_rule = _items("scale_rule")[-1]
+    shared().leave_small = False
+    shared().mix.method = "lbs"
+    shared().mix.group = "bone.1"
+    shared().delta_mush.enabled = True
+    shared().delta_mush.iterations = 7
+    shared().bulge_limit.strength = 0.25
+    for obj in meshes():
+        settings = properties.of(obj)
+        assert (settings.method, settings.mix.method, settings.mix.group) == ("log", "lbs", "bone.1")
+        assert settings.scale_rule == _items("scale_rule")[-1] != _items("scale_rule")[0]
+        assert settings.leave_small is False
+        assert (settings.delta_mush.enabled, settings.delta_mush.iterations) == (True, 7)
+        assert settings.bulge_limit.strength == 0.25
+        assert not settings.error
+
+
+def _items(name: str) -> list[str]:
+    return [item.identifier for item in properties.SinewSettings.bl_rna.properties[name].enum_items]
+
+
+def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
+    """What is added to a mesh's settings must not be forgotten here."""
+    ours = {
+        *("enabled", "heat", "error", "is_own"),
+        *("stand_ins", "standing_in", "is_saved", "replaced_smooth", "parent_type", "attribute"),
+        *("normals_attribute", "carrier"),
+        *("front", "front_signature", "helper", "copied", "copied_for", "had_animation", "pose", "asked"),
+    }
+    names = set(properties.SinewSettings.bl_rna.properties.keys()) - ours - {"rna_type", "name"}
+    assert names == set(character.SinewCharacter.bl_rna.properties.keys()) - {
+        *("rna_type", "name", "enabled", "row", "chosen")
+    }
+
+
+def test_one_mesh_can_differ_and_follow_again(armature):
+    bpy.ops.sinew.add(method="dq")
+    assert bpy.ops.sinew.own_settings(name="Hair") == {"FINISHED"}
+    hair = properties.of(bpy.data.objects["Hair"])
+    hair.method = "lbs"
+    hair.delta_mush.enabled = True
+    shared().method = "qv"
+    assert methods() == ["qv", "qv", "lbs", "qv", "qv"]
+    five_meshes.select(bpy.data.objects["Hair"])
+    assert shared().method == "qv", "the character's is shown, not the mesh's that differs"
+    bpy.ops.sinew.use_method(method="log")
+    assert methods() == ["log", "log", "lbs", "log", "log"]
+    bpy.ops.sinew.own_settings(name="Hair")
+    assert methods() == ["log"] * 5
+    assert hair.delta_mush.enabled is False
+
+
+def test_on_off_and_remove_act_on_all_or_on_the_one_that_is_named(armature):
+    before = [mesh_points(obj) for obj in meshes()]
+    bpy.ops.sinew.add(method="dq")
+    shared().enabled = False
+    assert [properties.of(obj).enabled for obj in meshes()] == [False] * 5
+    for points, obj in zip(before, meshes(), strict=True):
+        np.testing.assert_array_equal(mesh_points(obj), points)
+    shared().enabled = True
+    assert [properties.of(obj).enabled for obj in meshes()] == [True] * 5
+    bpy.ops.sinew.remove(name="Hair")
+    assert [properties.has_sinew(obj) for obj in meshes()] == [True, True, False, True, True]
+    bpy.ops.sinew.remove()
+    assert not any(properties.has_sinew(obj) for obj in meshes())
+    assert not bpy.context.scene.is_property_set("sinew_character"), "an empty group stays in the file"
+
+
+def test_a_mesh_that_comes_later_joins_with_the_characters_settings(armature):
+    bpy.ops.sinew.add(method="dq")
+    shared().delta_mush.enabled = True
+    bpy.ops.sinew.remove(name="Shoes")
+    bpy.ops.sinew.add(name="Shoes")
+    shoes = properties.of(bpy.data.objects["Shoes"])
+    assert (shoes.method, shoes.delta_mush.enabled) == ("dq", True)
+
+
+def test_what_can_not_have_sinew_does_not_keep_the_others_from_it(armature):
+    cloth = bpy.data.objects["Hair"].modifiers.new("Cloth", "CLOTH")
+    bpy.data.objects["Hair"].modifiers.move(2, 0)
+    assert cloth == bpy.data.objects["Hair"].modifiers[0]
+    assert bpy.ops.sinew.add() == {"FINISHED"}
+    assert [properties.has_sinew(obj) for obj in meshes()] == [True, True, False, True, True]
+
+
+def test_a_mesh_of_another_armature_is_left_alone(armature):
+    other, _rig = scenes.make_arm(name="Other")
+    five_meshes.select(bpy.data.objects["Body"])
+    bpy.ops.sinew.add()
+    assert not properties.has_sinew(other)
+    assert other not in operators.targets(bpy.context)
+
+
+def test_undo_is_one_step(armature):
+    bpy.ops.ed.undo_push(message="made")
+    bpy.ops.sinew.add(method="dq")
+    bpy.ops.ed.undo_push(message="added")
+    shared().method = "qv"
+    bpy.ops.ed.undo_push(message="method")
+    assert methods() == ["qv"] * 5
+    bpy.ops.ed.undo()
+    assert methods() == ["dq"] * 5
+    bpy.ops.ed.undo()
+    assert not any(properties.has_sinew(obj) for obj in meshes())
+
+
+def test_what_is_at_work_is_said_above_the_modifiers(armature, monkeypatch):
+    monkeypatch.setattr(small_meshes, "is_used", True)
+    body = bpy.data.objects["Body"]
+    bpy.ops.sinew.add()
+    assert "same shape in less time" in state_text.sentence_of(body)
+    shared().method = "dq"
+    assert state_text.sentence_of(body) == "Dual Quaternion in the place of Armature"
+    bpy.ops.sinew.heat_map()
+    assert state_text.sentence_of(body).startswith(
+        "Dual Quaternion in the place of Armature, after Blender's"
+    )
+    bpy.ops.sinew.heat_map()
+    shared().enabled = False
+    assert state_text.sentence_of(body) == "Off: Armature deforms it"
+    shared().enabled = True
+    body.modifiers["Armature"].object = None
+    properties.of(body).error = "Body: no armature"
+    assert state_text.sentence_of(body) == "Body: no armature"
+    assert state_text.icon_of(body) == "ERROR"
+
+
+def test_long_names_lose_their_middle():
+    assert shortened("Body") == "Body"
+    assert shortened("Character_Body_Geometry_low.003", 16) == "Characte\u2026low.003"
+    assert len(shortened("x" * 63)) == 24
+    assert names_text(["A", "B", "C", "D", "E"]) == "A, B, C and 2 more"
