@@ -84,6 +84,10 @@ def steps():
     yield
     yield
     window.choose_tab()
+    # The copies stand along what is right in the view.
+    look_at_all()
+    yield
+    yield
     before = names()
     press("sinew.compare", methods=METHODS)
     look_at_all()

@@ -472,6 +472,47 @@ def test_blurred_pictures_are_the_same(shading, tmp_path):
 
 
 @needs_support
+@pytest.mark.once
+def test_pictures_of_eevee_are_the_same(route, tmp_path):
+    if route != routes.EVALUATION:
+        pytest.skip("EEVEE takes long without a graphics card")
+    if not opengl.has_opengl():
+        pytest.skip("EEVEE can not draw here")
+    obj, _armature = make(custom)
+    light_scene(obj)
+    scene = bpy.context.scene
+    scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+    scene.render.resolution_x, scene.render.resolution_y, scene.eevee.taa_render_samples = 64, 48, 1
+    assert has_given(obj)
+    given, left = both(obj, lambda _obj: pixels(tmp_path / "picture.exr"))
+    assert np.ptp(left) > 0.5
+    np.testing.assert_allclose(given, left, rtol=0, atol=1e-4)
+
+
+@needs_support
+@pytest.mark.parametrize("shading", [smooth, sharp, custom], ids=lambda each: each.__name__)
+def test_baked_normals_are_the_same(shading):
+    obj, _armature = make(shading)
+    light_scene(obj)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    image = bpy.data.images.new("Baked", 64, 64, float_buffer=True)
+    nodes = obj.data.materials[0].node_tree.nodes
+    nodes.active = nodes.new("ShaderNodeTexImage")
+    nodes.active.image = image
+
+    def baked(_obj):
+        bpy.ops.object.bake(type="NORMAL", margin=0)
+        found = np.empty(len(image.pixels), dtype=np.float32)
+        image.pixels.foreach_get(found)
+        return found
+
+    given, left = both(obj, baked)
+    assert np.ptp(left) > 0.5
+    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
 def test_what_is_on_in_renders_alone_is_an_obstacle(tmp_path):
     obj, _armature = make(smooth)
     light_scene(obj)

@@ -193,9 +193,11 @@ def _draw_finding(
         text = f"Select {_vertices(len(finding.vertices)).title()}"
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
         button.object, button.finding = obj.name, finding.name
-    row = layout.row(align=True)
-    for each in mending.MENDS.get(finding.name, ()):
-        button = row.operator("sinew.mend", text=each.label)
+    mends = mending.MENDS.get(finding.name, ())
+    # Three side by side would be too narrow to read.
+    grid = layout.grid_flow(row_major=True, columns=min(len(mends), 2), even_columns=True, align=True)
+    for each in mends:
+        button = grid.operator("sinew.mend", text=each.label)
         button.object, button.finding, button.how = obj.name, finding.name, each.name
     layout.separator(factor=0.5)
 
