@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import bpy
 
 from ..attach import properties, shared_settings
@@ -93,22 +95,24 @@ class SINEW_OT_open_tab(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         area = _view3d(context)
         area.spaces.active.show_region_ui = True
-        region = next(region for region in area.regions if region.type == "UI")
-        if bpy.app.background:
-            return {"FINISHED"}
-        _choose_tab(region)
-        # A sidebar that was closed has no tabs before it is drawn.
-        bpy.app.timers.register(lambda: _choose_tab(region), first_interval=0.1)
+        if not bpy.app.background:
+            address = area.as_pointer()
+            # A sidebar that was closed has no tabs before it is drawn.
+            for seconds in (0.0, 0.1):
+                bpy.app.timers.register(lambda: _choose_tab(address), first_interval=seconds)
         return {"FINISHED"}
 
 
-def _choose_tab(region: bpy.types.Region) -> None:
-    try:
-        region.active_panel_category = Sidebar.bl_category
-        region.tag_redraw()
-    except (ReferenceError, TypeError, AttributeError):
-        # The window was closed meanwhile, or the sidebar shows no tabs.
-        return
+def _choose_tab(address: int) -> None:
+    """address  of the area, which may be closed by now"""
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    for area in areas:
+        if area.as_pointer() == address and area.type == "VIEW_3D":
+            region = next(region for region in area.regions if region.type == "UI")
+            # It has no such tab where it shows no tabs at all.
+            with contextlib.suppress(TypeError, AttributeError):
+                region.active_panel_category = Sidebar.bl_category
+            region.tag_redraw()
 
 
 def _view3d(context: bpy.types.Context) -> bpy.types.Area | None:
