@@ -34,6 +34,7 @@ _SECTIONS = {
     "bpy.types.sinewcomparison*": "compare",
     "bpy.types.sinewpreferences*": "preferences",
     "bpy.types.sinew*.scale_rule*": "stages",
+    "bpy.types.sinew*.normals*": "stages",
     "bpy.types.sinew*.leave_small*": "stages",
     "bpy.types.sinew*.is_own*": "meshes",
     "bpy.types.sinew*.row*": "meshes",
