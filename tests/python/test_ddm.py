@@ -334,39 +334,17 @@ def test_a_binding_comes_back_from_its_pickle():
     np.testing.assert_array_equal(sinew.Deformer(again, "ddm").deform(rig.transforms), expected)
 
 
-def test_rows_of_bones_that_no_vertex_uses_are_left_out():
+def test_the_moments_say_which_bones_move_a_vertex():
+    """Weights that depend on where vertices are can name others in a frame."""
     tube = Tube(21, 12)
-    rows = moments(tube, 0.3)
+    data = {"ddm": moments(tube, 0.3)}
     points, offsets, bones, weights = tube.mesh
-    motions = np.tile(np.eye(4, dtype=np.float32), (10, 1, 1))
-    motions[1, 2, 3] = 3.0
-    # As if weights were painted since: all are of bone 0 now.
-    deformer = sinew.Deformer(
-        points, offsets, np.zeros_like(bones), weights, "ddm", vertex_data={"ddm": rows}
-    )
-    assert np.abs(deformer.deform(motions) - points).max() < 1e-6
-
-
-def test_a_small_share_that_is_left_out_changes_nothing():
-    """Weights are of sum 1 again: of less, the neighbourhood would count as torn from its centroid."""
-    tube, share = Tube(21, 12), 5e-4
-    points, *influences = tube.mesh
-    rows = moments(tube, 0.3)
-    less = rows.copy()
-    less[:, 2:] *= 1.0 - share
-    extra = np.zeros((len(points), rows.shape[1]), np.float32)
-    extra[:, 0], extra[:, 1], extra[:, 2], extra[:, 3:6] = np.arange(len(points)), 7, share, share * points
-    less = np.concatenate([less, extra])
-    less = less[np.lexsort((less[:, 1], less[:, 0]))]
-    # Far away, where coordinates are large.
-    motions = np.array(
-        [translation([5.0, 0, 0]) @ motion for motion in tube.bones((1, 0, 0), 90)], np.float32
-    )
-    shapes = [
-        sinew.Deformer(points, *influences, "ddm", vertex_data={"ddm": each}).deform(motions)
-        for each in (rows, less)
-    ]
-    assert np.abs(shapes[0] - shapes[1]).max() < 5e-6
+    motions = np.array(tube.bones((1, 0, 0), 90), np.float32)
+    expected = sinew.Deformer(*tube.mesh, "ddm", vertex_data=data).deform(motions)
+    others = sinew.Deformer(points, offsets, np.zeros_like(bones), weights, "ddm", vertex_data=data)
+    assert np.abs(others.deform(motions) - expected).max() < 1e-6
+    with pytest.raises(ValueError, match="bone_transforms"):
+        others.deform(motions[:1])
 
 
 def test_threads_change_no_bit():
