@@ -17,6 +17,7 @@ def prepare_blender() -> None:
     except ImportError as error:
         raise SinewError(f"this Python has no Blender: {error}; install bpy") from None
     from . import native, registration
+    from .attach import normals
     from .deform import small_meshes
 
     reason = native.load_error()
@@ -24,6 +25,8 @@ def prepare_blender() -> None:
         raise SinewError(reason)
     # Commands compare, save and bake Sinew's own deformation, also of small meshes.
     small_meshes.is_used = False
+    # Most of what they do reads points alone.
+    normals.are_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
 

@@ -16,6 +16,8 @@ import bpy
 from ..io import mesh_io
 from . import node_group, properties, stack
 
+# False: of objects with normals as Blender computes them it computes them itself, when somebody reads them.
+are_used = True
 # Set Mesh Normal has free normals.
 ARE_SUPPORTED = bpy.app.version >= (4, 5)
 # In front of Sinew's modifier and behind it these neither read nor change normals, points and faces.
@@ -37,6 +39,13 @@ class Kind(Enum):
     VERTEX = "vertex"
     CORNER = "corner"  # some edges or faces are sharp
     CUSTOM = "custom"  # of corners, in relation to the computed ones
+
+
+def are_given(settings: properties.SinewSettings) -> bool:
+    """Whether Sinew is to give an object its normals, as far as that is a choice."""
+    return settings.normals == properties.SKINNED_NORMALS or (
+        are_used and settings.normals == properties.AS_BLENDER
+    )
 
 
 def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:

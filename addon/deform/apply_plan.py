@@ -29,7 +29,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
     # While Sinew is off, the modifiers have the flags that it would keep.
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
-    gives_normals = settings.normals != properties.LEAVE_NORMALS
+    gives_normals = normals.are_given(settings)
     domain = normals.domain_of(mesh) if gives_normals else ""
     obstacle = normals.obstacle(obj) if domain else ""
     given = normals.kind_of(mesh, "" if obstacle else domain)

@@ -107,6 +107,15 @@ def make(shading=smooth, frame=7):
     return obj, armature
 
 
+@needs_support
+def test_commands_give_skinned_normals_alone(monkeypatch):
+    monkeypatch.setattr(normals, "are_used", False)
+    obj, _armature = make()
+    assert not has_given(obj)
+    choose(obj, properties.SKINNED_NORMALS)
+    assert has_given(obj)
+
+
 @pytest.mark.parametrize("shading", SHADINGS, ids=lambda each: each.__name__)
 def test_normals_of_every_frame_are_blenders(shading):
     obj, armature = make(shading)
