@@ -59,7 +59,7 @@ def _moments(
 
 _ALL = {
     "cor": Provider("centres of rotation", 1, _centres),
-    "ddm": Provider("smoothed weights", 1, _moments, ("radius",)),
+    "ddm": Provider("smoothed weights", 2, _moments, ("radius",)),
 }
 # A build may be without one of them.
 PROVIDERS = {name: provider for name, provider in _ALL.items() if name in METHODS}

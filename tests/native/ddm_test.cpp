@@ -4,6 +4,7 @@
 #include "sinew/skinning/ddm.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -176,6 +177,25 @@ TEST(DirectDeltaMush, bones_that_the_moments_alone_name_are_bones_of_the_binding
     EXPECT_EQ(mesh.vertex_data.front().values, bound.rows);
     data.rest_bones = data.rest_bones.first(11);
     EXPECT_THROW(Binding{data}, std::invalid_argument);
+}
+
+TEST(DirectDeltaMush, a_vertex_without_faces_has_no_extent) {
+    // Near the origin, where rounding of the mesh's other coordinates is the most beside its own.
+    const std::vector<Vec3<float>> points{{1e-3f, 2e-3f, 1e-3f}, {3, 0, 5}, {4, 1, 5}, {3, 2, 6}};
+    const std::int32_t offsets[] = {0, 2, 4, 6, 8};
+    const std::int32_t bones[] = {0, 1, 0, 1, 0, 1, 0, 1};
+    const float weights[] = {0.3f, 0.7f, 0.3f, 0.7f, 0.3f, 0.7f, 0.3f, 0.7f};
+    const std::int32_t triangle[] = {1, 2, 3};
+    const auto rows = direct_delta_mush({points, offsets, bones, weights}, triangle, 0.1);
+    ASSERT_TRUE(rows);
+    ASSERT_EQ(rows->size(), 8 * kMomentFloats);
+    for (std::size_t row = 0; row < 8; ++row) {
+        float largest = 0.0f;
+        for (std::size_t n = 6; n < kMomentFloats; ++n) {
+            largest = std::max(largest, std::abs((*rows)[row * kMomentFloats + n]));
+        }
+        EXPECT_EQ(largest == 0.0f, row < 2) << row;
+    }
 }
 
 TEST(DirectDeltaMush, of_a_mesh_without_vertices_has_no_rows) {

@@ -28,6 +28,10 @@ constexpr double kNothing = 1e-13;
 // Of exact results.
 constexpr double kLeastExact = 1e-10;
 
+// A neighbourhood whose squared extents are below this, as a part of those of the mesh, is a point: what is found of
+// them is rounding, from which no rotation comes.
+constexpr double kLeastExtentOfMesh = 1e-12;
+
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
 
 // 1, x, y, z, xx, yy, zz, yz, xz, xy: what is smoothed of a bone.
@@ -252,8 +256,11 @@ private:
 };
 
 /// Writes the rows of one vertex, from what its bones have about it.
+///
+/// least_extent  of the sum of squared extents; a neighbourhood of less is a point, and has second moments of 0
 void add_rows(std::uint32_t vertex, const Vec3<double>& point,
-              std::span<const std::pair<std::int32_t, const Found*>> of_bones, std::vector<float>& rows) {
+              std::span<const std::pair<std::int32_t, const Found*>> of_bones, double least_extent,
+              std::vector<float>& rows) {
     double total = 0.0;
     Vec3<double> centre(0.0);  // from the vertex
     const auto at = [](const Found& found, std::size_t i) { return static_cast<double>(found.moments[i]); };
@@ -262,10 +269,16 @@ void add_rows(std::uint32_t vertex, const Vec3<double>& point,
         centre += Vec3<double>(at(*found, 1), at(*found, 2), at(*found, 3));
     }
     centre /= total;
+    double extent = -glm::dot(centre, centre);
+    for (const auto& [bone, found] : of_bones) {
+        extent += (at(*found, 4) + at(*found, 5) + at(*found, 6)) / total;
+    }
+    const bool is_point = extent < least_extent;
     for (const auto& [bone, found] : of_bones) {
         const double weight = at(*found, 0) / total;
         const Vec3<double> first = Vec3<double>(at(*found, 1), at(*found, 2), at(*found, 3)) / total;
         const auto second = [&, found = found](std::size_t column, int a, int b) {
+            if (is_point) return 0.0f;
             const double moment = at(*found, column) / total;
             return static_cast<float>(moment - first[a] * centre[b] - centre[a] * first[b] +
                                       weight * centre[a] * centre[b]);
@@ -305,7 +318,11 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
     std::vector<Vec3<double>> points(data.rest_points.begin(), data.rest_points.end());
     Vec3<double> origin(0.0);
     for (const Vec3<double>& point : points) origin += point / static_cast<double>(vertex_count);
-    for (Vec3<double>& point : points) point -= origin;
+    double size = 0.0;
+    for (Vec3<double>& point : points) {
+        point -= origin;
+        size = std::max(size, glm::dot(point, point));
+    }
     std::vector<const WeightsByBone::value_type*> bones;
     for (const auto& bone : by_bone) bones.push_back(&bone);
     std::vector<std::vector<Found>> found(bones.size());
@@ -341,7 +358,8 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
             of_vertex.emplace_back(bones[bone]->first, &found[bone][next[bone]++]);
         }
         if (influences.offsets[vertex] == influences.offsets[vertex + 1]) continue;
-        if (!of_vertex.empty()) add_rows(vertex, Vec3<double>(data.rest_points[vertex]), of_vertex, rows);
+        if (of_vertex.empty()) continue;
+        add_rows(vertex, Vec3<double>(data.rest_points[vertex]), of_vertex, kLeastExtentOfMesh * size, rows);
     }
     return reporter.go_on(1.0) ? std::optional(std::move(rows)) : std::nullopt;
 }
