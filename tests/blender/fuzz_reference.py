@@ -175,6 +175,7 @@ def _by_one_method(
     deformed, margins = by(data)
     decided = margins > MARGINS.get(method, MARGIN)
     if data and METHODS[method].keeps_moments:
+        decided &= _have_same_extents(kept.astype(np.float64), data[method], vertices)
         # Bones that move far apart make much of the rounding of a small neighbourhood's moments.
         rounded = {name: _with_other_rounding(rows) for name, rows in data.items()}
         extent = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -205,6 +206,18 @@ def _moments(
             continue
         found.append(_moved_moments(space, np.column_stack([np.full(len(own), place), own[:, 1:]])))
     return np.concatenate(found)
+
+
+def _have_same_extents(kept: np.ndarray, moved: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Whether a neighbourhood is a point, or is none, both in object space, where the library decides it, and
+    in armature space: how far it is from the origin counts."""
+
+    def is_point(rows: np.ndarray, number: int) -> bool:
+        own = rows[slice(*np.searchsorted(rows[:, 0], (number, number + 1)))]
+        centroid = own[:, 3:6].sum(axis=0)
+        return not own[:, 6:9].sum() > reference.LEAST_EXTENT * centroid @ centroid
+
+    return np.array([is_point(kept, v) == is_point(moved, place) for place, v in enumerate(vertices)])
 
 
 def _moved_moments(space: np.ndarray, rows: np.ndarray) -> np.ndarray:
