@@ -93,7 +93,7 @@ def _draw_character(
 
 
 class SINEW_PT_stages(Sidebar, bpy.types.Panel):
-    bl_label = "Stages, Scale, Normals"
+    bl_label = "Stages and Scale"
     bl_parent_id = "SINEW_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
 
