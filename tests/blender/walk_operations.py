@@ -1735,6 +1735,8 @@ def copy_scene(w: Walker, r: random.Random) -> str | None:
     bpy.context.view_layer.update()
     bpy.ops.scene.new(type="FULL_COPY" if whole else "LINK_COPY")
     bpy.context.scene.name = "Second"
+    # As a window does at once.
+    bpy.context.view_layer.update()
     return f"a copy of the scene, {'with copies of all' if whole else 'linked'}"
 
 
@@ -1749,6 +1751,8 @@ def view_layer(w: Walker, r: random.Random) -> str | None:
     w.before_evaluation()
     bpy.context.view_layer.update()
     bpy.context.window.view_layer = other
+    # As a window does at once.
+    bpy.context.view_layer.update()
     return f"view layer {other.name}"
 
 
