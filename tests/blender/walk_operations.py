@@ -797,8 +797,8 @@ def _vertices(w: Walker, r: random.Random, obj: bpy.types.Object) -> list[int]:
 
 
 def _show_weights(obj: bpy.types.Object) -> None:
-    """Weights that change through an object that Blender does not evaluate, it shows in none of the others
-    that have the mesh (seen on 4.2 and 5.2)."""
+    """Weights and names of groups that change through an object that Blender does not evaluate, it shows in
+    none of the others that have the mesh (seen on 4.2 and 5.2)."""
     if not obj.visible_get():
         obj.data.update()
 
@@ -859,6 +859,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
         return f"group {made.name} of {obj.name}"
     if what == "rename":
         group.name = w.new_name("group")
+        _show_weights(obj)
         return f"rename a group of {obj.name} to {group.name}"
     if what == "bone":
         bones = [b.name for a in w.armatures() for b in a.data.bones]
@@ -867,6 +868,7 @@ def groups(w: Walker, r: random.Random) -> str | None:
         if name is None:
             return None
         group.name = name
+        _show_weights(obj)
         return f"rename a group of {obj.name} to {name}"
     if what == "delete":
         name = group.name
