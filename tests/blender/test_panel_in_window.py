@@ -3,51 +3,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import shutil
-import subprocess
-from pathlib import Path
-
-import bpy
+import in_window
 import pytest
-from conftest import REPOSITORY
-
-HERE = Path(__file__).parent
-SCRIPTS = (
-    REPOSITORY / "docs" / "window.py",
-    *(HERE / f"{name}.py" for name in ("window_scene", "five_meshes", "panel_in_window")),
-)
 
 
 @pytest.fixture(scope="module")
 def facts(tmp_path_factory) -> dict:
-    program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
-    if not (program and package):
-        pytest.skip("SINEW_FULL_BLENDER or SINEW_PACKAGE is not set: no Blender with a window is tested")
-    if bpy.app.version < (5, 2):
-        pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
-    folder = tmp_path_factory.mktemp("window")
-    shutil.copy(package, folder / "sinew.zip")
-    for script in SCRIPTS:
-        shutil.copy(script, folder)
-    options = ("--factory-startup", "--enable-event-simulate", "--python-exit-code", "3", "--python")
-    run = subprocess.run(
-        [program, "run", *options, "panel_in_window.py", "--", "sinew.zip", "."],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=400,
-        check=False,
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"},
-    )
-    lines = [line for line in run.stdout.splitlines() if line.startswith("FACTS ")]
-    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
-    assert lines, run.stdout[-3000:] + run.stderr[-3000:]
-    found = json.loads(lines[0][6:])
-    output = run.stdout + run.stderr
-    found["printed"] = [line for line in output.splitlines() if "Traceback" in line or "Error:" in line]
-    return found
+    return in_window.facts_of("panel_in_window", tmp_path_factory.mktemp("window"), "five_meshes")
 
 
 def test_five_meshes_need_one_click_for_a_method(facts):

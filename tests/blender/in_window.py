@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A script that runs once in a whole Blender's window, with the zip installed, and prints what it found."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import bpy
+import pytest
+from conftest import REPOSITORY
+
+HERE = Path(__file__).parent
+
+
+def facts_of(script: str, folder: Path, *others: str) -> dict:
+    """The facts that a script here prints as JSON behind FACTS, and under "printed" its lines of errors.
+
+    others  names of further scripts that it imports, beside window and window_scene
+    """
+    program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
+    if not (program and package):
+        pytest.skip("SINEW_FULL_BLENDER or SINEW_PACKAGE is not set: no Blender with a window is tested")
+    if bpy.app.version < (5, 2):
+        pytest.skip("tested once, beside bpy 5.2: it is a Blender of its own")
+    shutil.copy(package, folder / "sinew.zip")
+    shutil.copy(REPOSITORY / "docs" / "window.py", folder)
+    for name in ("window_scene", *others, script):
+        shutil.copy(HERE / f"{name}.py", folder)
+    options = ("--factory-startup", "--enable-event-simulate", "--python-exit-code", "3", "--python")
+    run = subprocess.run(
+        [program, "run", *options, f"{script}.py", "--", "sinew.zip", "."],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=400,
+        check=False,
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"},
+    )
+    output = run.stdout + run.stderr
+    lines = [line for line in run.stdout.splitlines() if line.startswith("FACTS ")]
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    assert lines, run.stdout[-3000:] + run.stderr[-3000:]
+    printed = [line for line in output.splitlines() if "Traceback" in line or "Error:" in line]
+    return json.loads(lines[0][6:]) | {"printed": printed}
