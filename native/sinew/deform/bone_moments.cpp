@@ -19,8 +19,10 @@ struct BoneRow {
     Row numbers;
 };
 
-/// The number of the bone of row `row`, and whether the row says nothing of it.
+/// row  [kMomentFloats]
 std::int32_t bone_of(const float* row) { return static_cast<std::int32_t>(row[1]); }
+
+/// Whether the row says nothing of its bone.
 bool is_empty(const float* row) {
     return std::all_of(row + 2, row + kMomentFloats, [](float number) { return number == 0.0f; });
 }
@@ -201,13 +203,11 @@ std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& mom
                 const std::size_t bone = block.first_bone + (block.mixed ? lane * block.bones : 0) + k;
                 Full row{static_cast<float>(mesh.vertices[b].lane[lane]),
                          static_cast<float>(mesh.used_bones[static_cast<std::size_t>(moments.bones[bone])])};
-                bool is_empty = true;
                 for (std::size_t n = 0; n < kMomentNumbers; ++n) {
                     row[2 + n] =
                         moments.rows[block.first_row + MomentLayout{block.bones}.number(k, n)].lane[lane];
-                    is_empty = is_empty && row[2 + n] == 0.0f;
                 }
-                if (!is_empty) found.push_back(row);
+                if (!is_empty(row.data())) found.push_back(row);
             }
         }
     }
