@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 import sinew
 
+from .arrays import are_equal
 from .parameters import Value
 from .rig import Weighting
 from .scale_rule import BLENDER_4, IGNORED
@@ -261,9 +262,9 @@ def _same(a: Frame, b: Frame) -> bool:
     return (
         (a.method, a.mix, a.parameters) == (b.method, b.mix, b.parameters)
         and a.scale_rule == b.scale_rule
-        and _equal(a.rest_points, b.rest_points)
+        and are_equal(a.rest_points, b.rest_points)
         and np.array_equal(a.pose, b.pose)
-        and _equal(a.bones_from_model, b.bones_from_model)
+        and are_equal(a.bones_from_model, b.bones_from_model)
     )
 
 
@@ -379,7 +380,7 @@ class SkinStack:
         if any(active):
             changed |= self._run(rest_points, frames, out)
         else:
-            changed = changed or not _equal(rest_points, self._rest_points)
+            changed = changed or not are_equal(rest_points, self._rest_points)
             self._end, self._points = None, rest_points
         if self._end is None and out is not None:
             out[:] = self._points
@@ -416,7 +417,3 @@ class SkinStack:
                 result = skin_stage.binding.points.copy()
         self._points = result
         return changed
-
-
-def _equal(a: np.ndarray, b: np.ndarray | None) -> bool:
-    return b is not None and (a is b or np.array_equal(a, b))

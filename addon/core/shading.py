@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import sinew
 
+from .arrays import are_equal
 from .stage_mesh import Topology
 
 # The library's names of domains by Blender's.
@@ -29,14 +30,10 @@ class Shading:
 
     def equals(self, other: Shading) -> bool:
         return (
-            _equal(self.sharp_edges, other.sharp_edges)
-            and _equal(self.sharp_faces, other.sharp_faces)
-            and _equal(self.custom, other.custom)
+            are_equal(self.sharp_edges, other.sharp_edges)
+            and are_equal(self.sharp_faces, other.sharp_faces)
+            and are_equal(self.custom, other.custom)
         )
-
-
-def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
-    return a is b if a is None or b is None else np.array_equal(a, b)
 
 
 class SurfaceNormals:

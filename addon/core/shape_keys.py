@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arrays import are_equal
+
 
 @dataclass(frozen=True)
 class ShapeKeys:
@@ -25,10 +27,7 @@ class ShapeKeys:
     def equals(self, other: ShapeKeys) -> bool:
         if self.names != other.names or not np.array_equal(self.basis, other.basis):
             return False
-        return all(
-            a is b if a is None or b is None else np.array_equal(a, b)
-            for a, b in zip(self.deltas, other.deltas, strict=True)
-        )
+        return all(are_equal(a, b) for a, b in zip(self.deltas, other.deltas, strict=True))
 
     def mix(self, values: np.ndarray) -> np.ndarray:
         """float32 [vertices, 3] with each key at its value; a muted key's value is 0."""
