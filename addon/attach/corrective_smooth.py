@@ -25,12 +25,7 @@ NAMES = {
 
 def candidate(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
     """The first one behind the Armature modifiers that is on."""
-    run = stack.armature_modifiers(obj)
-    if not run:
-        return None
-    modifiers = list(obj.modifiers)
-    behind = modifiers[modifiers.index(run[-1]) + 1 :]
-    found = (m for m in behind if m.type == "CORRECTIVE_SMOOTH" and stack.is_on(m))
+    found = (m for m in stack.downstream(obj) if m.type == "CORRECTIVE_SMOOTH" and stack.is_on(m))
     return next(found, None)
 
 
@@ -54,9 +49,8 @@ def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier)
 
 def _between(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
     """The names of those that are on in front of it, behind the Armature modifiers."""
-    modifiers, own = list(obj.modifiers), stack.sinew_modifier(obj)
-    first = modifiers.index(stack.armature_modifiers(obj)[-1]) + 1
-    return [m.name for m in modifiers[first : modifiers.index(modifier)] if stack.is_on(m) and m != own]
+    behind = stack.downstream(obj)
+    return [m.name for m in behind[: behind.index(modifier)] if stack.is_on(m)]
 
 
 def _beyond_bounds(modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:

@@ -11,12 +11,10 @@ from . import stack
 def misled(obj: bpy.types.Object) -> list[str]:
     """A sentence for each Hook behind that has a list of vertices. Behind Geometry Nodes, as behind all that
     do more than deform, Blender takes as many of the first vertices instead (seen on 4.2 to 5.2)."""
-    run, modifiers = stack.armature_modifiers(obj), list(obj.modifiers)
-    behind = modifiers[modifiers.index(run[-1]) + 1 :] if run else []
     return [
         f"{hook.name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this "
         "Hook; give it a vertex group"
-        for hook in behind
+        for hook in stack.downstream(obj)
         if hook.type == "HOOK" and stack.is_on(hook)
         if len(hook.vertex_indices) and not hook.vertex_group
     ]

@@ -72,24 +72,14 @@ def obstacle(obj: bpy.types.Object) -> str:
     for modifier in stack.upstream(obj):
         if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
             return f"{modifier.name} is in front"
-    for modifier in downstream(obj):
-        if modifier.type not in HARMLESS:
+    for modifier in stack.downstream(obj):
+        if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
             return f"{modifier.name} follows"
     if obj.instance_type != "NONE":
         return "it has instances on its vertices or faces"
     if is_read_by_others(obj):
         return "another object reads its mesh"
     return ""
-
-
-def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The modifiers behind Sinew's and those that it replaces, that are on or may be switched on by an
-    animation."""
-    own, run = stack.sinew_modifier(obj), stack.armature_modifiers(obj)
-    modifiers = list(obj.modifiers)
-    ours = [modifiers.index(each) for each in (own, *run) if each is not None]
-    behind = modifiers[max(ours) + 1 :] if ours else []
-    return [modifier for modifier in behind if stack.can_be_on(obj, modifier)]
 
 
 def may_read_meshes(obj: bpy.types.Object) -> bool:

@@ -100,6 +100,13 @@ def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [m for m in ahead if m != own and not node_group.is_sinew(m)]
 
 
+def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The modifiers behind those that Sinew replaces, or would, without Sinew's own."""
+    run, own = armature_modifiers(obj), sinew_modifier(obj)
+    behind = list(obj.modifiers)[_index(obj, run[-1]) + 1 :] if run else []
+    return [modifier for modifier in behind if modifier != own]
+
+
 def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Those ahead that are on and change positions, topology or weights."""
     return [m for m in upstream(obj) if can_be_on(obj, m) and m.type not in HARMLESS_UPSTREAM]
