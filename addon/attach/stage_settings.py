@@ -62,14 +62,14 @@ def _group(kind: str, owner: sinew.Method | sinew.Stage, update: Callable) -> ty
     )
 
 
-def is_on(group: bpy.types.PropertyGroup, stage: sinew.Stage) -> bool:
-    """Whether the stage does anything, as its first parameter says."""
-    return getattr(group, stage.parameters[0].id) not in (False, OFF)
+def is_on(settings: bpy.types.PropertyGroup, name: str) -> bool:
+    """Whether a stage does anything, as its first parameter says."""
+    return getattr(getattr(settings, name), _SWITCHES[name]) not in (False, OFF)
 
 
 def names_on(settings: bpy.types.PropertyGroup, among: Iterable[str] = STAGES) -> list[str]:
     """The stages that are on by an object's settings."""
-    return [name for name in among if getattr(getattr(settings, name), _SWITCHES[name]) not in (False, OFF)]
+    return [name for name in among if is_on(settings, name)]
 
 
 def values_of(settings: bpy.types.PropertyGroup, name: str) -> dict[str, Any]:

@@ -90,7 +90,7 @@ def _draw_stage(
     group = getattr(settings, stage.name)
     switch, *others = stage.parameters
     layout.prop(group, switch.id, text=stage.label)
-    if not stage_settings.is_on(group, stage):
+    if not stage_settings.is_on(settings, stage.name):
         return
     column = layout.column(align=True)
     for parameter in others:

@@ -7,7 +7,7 @@ import bpy
 
 from ..attach import hooks, properties
 from ..deform import session
-from ..deform.plan import ObjectFacts, State, plan
+from ..deform.plan import MODES_OF_THE_MODIFIER, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
 
 ICONS = {
@@ -49,7 +49,7 @@ def icon_of(obj: bpy.types.Object) -> str:
         return "ERROR"
     if not settings.enabled or state is None:
         return ICONS[State.OFF]
-    return ICONS[State.BUILT_IN if obj.mode in ("EDIT", "SCULPT") else state.plan.state]
+    return ICONS[State.BUILT_IN if uses_builtin(obj) else state.plan.state]
 
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
@@ -105,4 +105,7 @@ def draw_character(
 
 def uses_builtin(obj: bpy.types.Object) -> bool:
     """Whether its Armature modifiers deform it, though Sinew is on."""
-    return icon_of(obj) == ICONS[State.BUILT_IN]
+    settings, state = properties.of(obj), session.state_of(obj)
+    if not settings.enabled or state is None:
+        return False
+    return obj.mode in MODES_OF_THE_MODIFIER or state.plan.state is State.BUILT_IN
