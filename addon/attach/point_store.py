@@ -56,8 +56,7 @@ def _ensure_attribute(obj: bpy.types.Object) -> None:
     settings, mesh = properties.of(obj), obj.data
     if not settings.attribute:
         settings.attribute = _free_attribute_name(mesh, ATTRIBUTE)
-    attribute = mesh.attributes.get(settings.attribute)
-    if attribute is None or attribute.domain != "POINT" or attribute.data_type != "FLOAT_VECTOR":
+    if not mesh_io.has_vectors(mesh, settings.attribute, "POINT"):
         # What an evaluation shows to which Sinew gave no points.
         rest = mesh_io.read_points(mesh)
         mesh_io.write_vectors(mesh, settings.attribute, _marked(rest, rest))
@@ -78,16 +77,14 @@ def _ensure_normals_attribute(obj: bpy.types.Object, domain: str) -> None:
         mesh_io.write_vectors(mesh, settings.normals_attribute, none, domain)
 
 
-def write(
-    obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: np.ndarray | None = None
-) -> None:
+def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: np.ndarray) -> None:
     """Stores float32 [vertices, 3], object space, in the point buffer, and has Blender evaluate it.
 
     rest     the points as the mesh comes with them
-    normals  float32 [vertices or corners, 3], stored behind them; None for none
+    normals  float32 [vertices or corners, 3], stored behind them; or [0, 3]
     """
     stored = _marked(points, rest)
-    if normals is not None:
+    if len(normals):
         stored = np.concatenate((stored, normals))
     point_buffer.write(properties.of(obj).point_buffer, stored)
 

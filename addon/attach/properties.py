@@ -23,6 +23,12 @@ def method_label(name: str) -> str:
     return "Armature modifier" if name == BLENDER else METHODS[name].label
 
 
+def method_description(name: str) -> str:
+    return (
+        "What Blender's modifier does, as its options say" if name == BLENDER else METHODS[name].description
+    )
+
+
 @dataclass
 class Listeners:
     """Who hears of changed settings; set on registration, as what reacts to settings also reads them."""

@@ -33,12 +33,12 @@ def deform(
     differs = shape(obj, skinned, depsgraph)
     if differs is None:
         return
-    shown, source = skinned.shown, skinned.bound.source
+    shown = skinned.shown
     if changes.frame:
         is_reshaped = before is not None and shown.rest_points is not before
         skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
-    count = source.normal_count(skinned.plan.normals.domain)
-    is_stored = not is_inspected or point_store.are_written(obj, len(shown.rest_points) + count)
+    count = len(shown.rest_points) + skinned.normal_count
+    is_stored = not is_inspected or point_store.are_written(obj, count)
     if differs or is_first or not is_stored:
         _store(obj, skinned)
     if differs or is_first:
@@ -46,12 +46,10 @@ def deform(
 
 
 def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
-    points, source, given = skinned.bound.skin_stack.points, skinned.bound.source, skinned.plan.normals
-    normals = None
-    if given.domain:
-        normals = np.empty((source.normal_count(given.domain), 3), dtype=np.float32)
-        skinned.bound.write_normals(points, skinned.shown.rest_points, given, normals)
-    point_store.write(obj, points, source.points, normals)
+    points, normals = skinned.bound.skin_stack.points, np.empty((skinned.normal_count, 3), dtype=np.float32)
+    if len(normals):
+        skinned.bound.write_normals(points, skinned.shown.rest_points, skinned.plan.normals, normals)
+    point_store.write(obj, points, skinned.bound.source.points, normals)
 
 
 def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool | None:

@@ -8,7 +8,16 @@ import logging
 import bpy
 import numpy as np
 
-from ..attach import attach, node_group, normals, point_store, properties, stack, upstream_proxy
+from ..attach import (
+    attach,
+    node_group,
+    normals,
+    point_store,
+    properties,
+    shared_settings,
+    stack,
+    upstream_proxy,
+)
 from ..core.errors import SinewError
 from . import safe_mode, small_meshes
 from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
@@ -126,9 +135,9 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
         log.error("%s", error)
         return True
     settings = properties.of(obj)
-    for name in ("scale_rule", "leave_small", "normals"):
-        setattr(settings, name, getattr(properties.of(origin), name))
-    groups = (*properties.STAGE_GROUPS, *properties.METHOD_GROUPS, "replaced_smooth")
+    for name in shared_settings.SHARED:
+        shared_settings.assign(settings, name, getattr(properties.of(origin), name))
+    groups = (*shared_settings.GROUPS, "replaced_smooth")
     properties.copy_groups(properties.of(origin), settings, groups)
     for replaced in list(settings.replaced_modifiers)[1:]:
         replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD

@@ -90,8 +90,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mode, or the users of its mesh, changed"
     if [armature is None for armature in armatures] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
-    given = skinned.plan.normals
-    memory = _memory_to_write(settings, mesh, skinned, given.domain)
+    memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
         return "its mesh changed"
     out, normals = memory
@@ -111,7 +110,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         shown.frames, shown.rest_points, shown.stage_values = frames, rest_points, values
         shown.number += 1
     if len(normals):
-        bound.write_normals(out, rest_points, given, normals)
+        bound.write_normals(out, rest_points, skinned.plan.normals, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
     shown.first_point = out[0].tobytes()
@@ -132,18 +131,17 @@ def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
 
 
 def _memory_to_write(
-    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject, domain: str
+    settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Of the points and of the normals, none where Blender computes these: in the evaluated mesh, or in the
-    evaluated point buffer. None where it is not there, or not for as many.
-
-    domain  of the normals; empty where Blender computes them
-    """
-    source = skinned.bound.source
-    points, count = len(source.points), source.normal_count(domain)
+    evaluated point buffer. None where it is not there, or not for as many."""
+    points, count = len(skinned.bound.source.points), skinned.normal_count
     if not skinned.plan.in_buffer:
         to_points = mesh_io.vectors_in(mesh, skinned.attribute)
-        to_normals = mesh_io.vectors_in(mesh, skinned.normals_attribute, domain) if count else _NO_NORMALS
+        to_normals = _NO_NORMALS
+        if count:
+            domain = skinned.plan.normals.domain
+            to_normals = mesh_io.vectors_in(mesh, skinned.normals_attribute, domain)
         if to_points is None or to_normals is None:
             return None
         return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None

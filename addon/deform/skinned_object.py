@@ -168,6 +168,11 @@ class SkinnedObject:
         with self.lock:
             return self.bound.skin_stack.points
 
+    @property
+    def normal_count(self) -> int:
+        """How many normals Sinew gives with the points."""
+        return self.bound.source.normal_count(self.plan.normals.domain)
+
     def take_off_normals(self, mesh: bpy.types.Mesh) -> None:
         """Gives a mesh that was made of the object's evaluated one the custom normals that this would have
         without those that Sinew gave."""

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..attach import properties, stored_vertex_data, upstream_proxy
+from ..core.arrays import are_equal
 from ..core.influences import GroupWeights
 from ..core.shading import Shading, SurfaceNormals
 from ..core.shape_keys import ShapeKeys
@@ -117,7 +118,7 @@ class Source:
         """Whether all that methods keep numbers of vertices from, but for weights, is the same; it is where
         points only move in front."""
         return np.array_equal(self.mesh_points, other.mesh_points) and all(
-            (mine is None) == (its is None) and (mine is None or np.array_equal(mine, its))
+            are_equal(mine, its)
             for mine, its in ((self.triangles, other.triangles), (self.sdef_keys, other.sdef_keys))
         )
 

@@ -259,9 +259,8 @@ def _request_points(
     """Has Blender evaluate the object once more, and so request its points, where they may differ."""
     skinned.dirtied_by_frames = False
     if skinned.plan.in_buffer:
-        source = skinned.bound.source
-        count = source.normal_count(skinned.plan.normals.domain)
-        point_store.set_rest_points(obj, source.points, count, anew=is_new_plan)
+        rest_points = skinned.bound.source.points
+        point_store.set_rest_points(obj, rest_points, skinned.normal_count, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
         # The object is copied anew then, and what the change of frame has set is set again: of what is

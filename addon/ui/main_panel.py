@@ -92,14 +92,10 @@ def _draw_character(
         layout.prop(context.scene.render, "use_lock_interface", text=text, icon="INFO")
 
 
-class SINEW_PT_stages(Sidebar, bpy.types.Panel):
+class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Stages and Scale"
     bl_parent_id = "SINEW_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return operators.has_sinew_targets(context)
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
         lead = character.lead(context)

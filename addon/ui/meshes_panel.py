@@ -50,14 +50,10 @@ class SINEW_UL_meshes(bpy.types.UIList):
         row.operator("sinew.own_settings", text="", icon=icon, emboss=False).name = obj.name
 
 
-class SINEW_PT_meshes(Sidebar, bpy.types.Panel):
+class SINEW_PT_meshes(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Meshes"
     bl_parent_id = "SINEW_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

@@ -78,6 +78,14 @@ def has_sinew_targets(context: bpy.types.Context) -> bool:
     return any(properties.has_sinew(obj) for obj in _each_target(context))
 
 
+class OfSkinned:
+    """A panel that is there where Sinew deforms something that is meant."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_sinew_targets(context)
+
+
 def are_any_on(context: bpy.types.Context) -> bool:
     """Whether Sinew is on for any mesh: else panels are grey whose numbers are its own."""
     return any(properties.of(obj).enabled for obj in _each_target(context) if properties.has_sinew(obj))

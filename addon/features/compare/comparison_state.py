@@ -20,14 +20,15 @@ def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> li
     # What the file stores stays that of the method where the list gets others.
     numbers = {name: method.number + 1 for name, method in properties.METHODS.items()}
     return [
-        (name, properties.method_label(name), _description(name), "NONE", numbers.get(name, 0))
+        (
+            name,
+            properties.method_label(name),
+            properties.method_description(name),
+            "NONE",
+            numbers.get(name, 0),
+        )
         for name in methods_of(state)
     ]
-
-
-def _description(method: str) -> str:
-    known = properties.METHODS.get(method)
-    return known.description if known is not None else "What Blender's modifier does, as its options say"
 
 
 class SinewComparison(bpy.types.PropertyGroup):

@@ -99,15 +99,13 @@ def _remove(obj: bpy.types.Object, found: Finding) -> str:
 def _rows(
     obj: bpy.types.Object, check: diagnose.Check, found: Finding, how: str, most_influences: int
 ) -> Rows:
-    names = list(check.groups)
-    is_bone = check.bones.of_groups(names) >= 0
-    vertices = found.vertices.tolist()
-    if how == MIRROR.name:
-        mirror_of = _mirrored_groups(obj, names, check)
-        names += [group.name for group in list(obj.vertex_groups)[len(names) :]]
-        is_bone = check.bones.of_groups(names) >= 0
-    is_locked = np.array([obj.vertex_groups[name].lock_weight for name in names], dtype=bool)
-    mender = WeightMender(check.weights, is_bone, is_locked)
+    if obj.mode == "EDIT":
+        # What the check has read.
+        obj.update_from_editmode()
+    mirror_of = _mirrored_groups(obj, check) if how == MIRROR.name else []
+    is_bone = check.bones.of_groups([group.name for group in obj.vertex_groups]) >= 0
+    is_locked = np.array([group.lock_weight for group in obj.vertex_groups], dtype=bool)
+    mender, vertices = WeightMender(check.weights, is_bone, is_locked), found.vertices.tolist()
     if how == MIRROR.name:
         return mender.mirrored(_mirror_pairs(obj, vertices), mirror_of)
     if how == LIMIT.name:
@@ -115,23 +113,15 @@ def _rows(
     if how == NORMALIZE.name:
         return mender.normalized(vertices)
     work = mender.smoothed if how == SMOOTH.name else mender.filled
-    return work(vertices, _edges(obj), most_influences)
+    return work(vertices, mesh_io.read_topology(obj.data).edges, most_influences)
 
 
-def _edges(obj: bpy.types.Object) -> np.ndarray:
-    """int32 [edges, 2]; of the mesh as it is edited, which the check has read."""
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    edges = np.empty((len(obj.data.edges), 2), dtype=np.int32)
-    obj.data.edges.foreach_get("vertices", edges.ravel())
-    return edges
-
-
-def _mirrored_groups(obj: bpy.types.Object, names: Sequence[str], check: diagnose.Check) -> list[int]:
-    """[groups]: the group of the other side, made where its bone has none yet; else the group itself."""
+def _mirrored_groups(obj: bpy.types.Object, check: diagnose.Check) -> list[int]:
+    """[groups that were checked]: the group of the other side, made where its bone has none yet; else the
+    group itself."""
     bones = {name for name, deforms in zip(check.bones.names, check.bones.deform, strict=True) if deforms}
     found = []
-    for number, name in enumerate(names):
+    for number, name in enumerate(check.groups):
         other = bpy.utils.flip_name(name)
         if other not in obj.vertex_groups and other in bones and name in bones:
             obj.vertex_groups.new(name=other)
@@ -142,8 +132,6 @@ def _mirrored_groups(obj: bpy.types.Object, names: Sequence[str], check: diagnos
 
 def _mirror_pairs(obj: bpy.types.Object, vertices: Sequence[int]) -> dict[int, int]:
     """The vertex at the mirrored place of each that has one; not itself, and none that is mended, too."""
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
     points, mended = mesh_io.read_points(obj.data), set(vertices)
     tolerance = MIRROR_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
     others = [index for index in range(len(points)) if index not in mended]

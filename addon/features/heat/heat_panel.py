@@ -17,13 +17,9 @@ from . import heat_operators, live, measures, redraw, worst_frames
 _WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of the area"}
 
 
-class SINEW_PT_measures(Sidebar, bpy.types.Panel):
+class SINEW_PT_measures(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Heat Map"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, measures.of(context.scene)

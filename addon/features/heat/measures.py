@@ -44,7 +44,7 @@ class SinewMeasures(bpy.types.PropertyGroup):
             (
                 properties.BLENDER,
                 properties.method_label(properties.BLENDER),
-                "What Blender's modifier does, as its options say",
+                properties.method_description(properties.BLENDER),
                 0,
             ),
             *((m.name, m.label, m.description, m.number + 1) for m in properties.METHODS.values()),

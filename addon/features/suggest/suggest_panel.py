@@ -36,13 +36,9 @@ class SINEW_OT_suggest(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
+class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
     bl_label = "Suggest"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return operators.has_sinew_targets(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
