@@ -61,10 +61,12 @@ class Bones:
 
     @cached_property
     def rest_axes(self) -> np.ndarray:
-        """`rest` with axes of unit length: joints of a bendy bone can be scaled at rest."""
+        """`rest`, the joints' with axes of unit length, as they can be scaled. A bone's own stay as Blender
+        rounds them: up to 4e-5 off, which it then takes for scale."""
         axes = self.rest.copy()
-        lengths = np.linalg.norm(axes[:, :3, :3], axis=1, keepdims=True)
-        axes[:, :3, :3] /= np.where(lengths > 0.0, lengths, 1.0)
+        of_joints = axes[len(self.names) :, :3, :3]
+        lengths = np.linalg.norm(of_joints, axis=1, keepdims=True)
+        of_joints /= np.where(lengths > 0.0, lengths, 1.0)
         return axes
 
     def equals(self, other: Bones) -> bool:

@@ -26,10 +26,12 @@ def is_rigid(linear):
 
 def rotation_of_bone(posed_from_rest, rest_bone):
     """The rotation of a bone's motion, 3x3: of a scaled bone, that of its posed axes made orthonormal and
-    right-handed, with Y kept and X as near as possible."""
+    right-handed, with Y kept and X as near as possible. Rest axes that are not quite orthonormal, as some of
+    Blender's, leave it to the reader which rotation that is: Blender's reading counts."""
     if is_rigid(posed_from_rest[:3, :3]):
         return nearest_rotation(posed_from_rest[:3, :3])
-    return axes_keeping_y(posed_from_rest[:3, :3] @ rest_bone[:3, :3]) @ rest_bone[:3, :3].T
+    axes = axes_keeping_y(posed_from_rest[:3, :3] @ rest_bone[:3, :3])
+    return rotation(quaternion_by_blender(axes @ np.linalg.inv(rest_bone[:3, :3])))
 
 
 def axes_keeping_y(axes):
@@ -43,6 +45,25 @@ def axes_keeping_y(axes):
         x = np.cross(y, y[[1, 2, 0]])
     x /= np.linalg.norm(x)
     return np.column_stack([x, y, np.cross(x, y)])
+
+
+def quaternion_by_blender(matrix):
+    """The unit quaternion that Blender's mat3_normalized_to_quat_fast() reads from a 3x3 matrix whose columns
+    it has made of unit length: one component by the diagonal, the others divided by it."""
+    m = matrix / np.linalg.norm(matrix, axis=0)
+    if m[2, 2] < 0.0:
+        signs = (1, -1, -1) if m[0, 0] > m[1, 1] else (-1, 1, -1)
+    else:
+        signs = (-1, -1, 1) if m[0, 0] < -m[1, 1] else (1, 1, 1)
+    w, x, y, z = m[2, 1] - m[1, 2], m[2, 1] + m[1, 2], m[0, 2] + m[2, 0], m[1, 0] + m[0, 1]
+    trace = 1.0 + np.diag(m) @ signs
+    row = {
+        (1, 1, 1): [trace, w, m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+        (1, -1, -1): [w, trace, z, y],
+        (-1, 1, -1): [m[0, 2] - m[2, 0], z, trace, x],
+        (-1, -1, 1): [m[1, 0] - m[0, 1], y, x, trace],
+    }[signs]
+    return np.array(row) / np.linalg.norm(row)
 
 
 def quaternion(rotation):

@@ -29,8 +29,8 @@ struct Dq {
     template <class T>
     [[nodiscard]] static Bone<T> prepare(const Affine<T>& posed_from_rest,
                                          const Affine<T>& rest_bone) noexcept {
-        const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
-        return {to_dual_quat(split.rigid), split.scale, split.has_scale};
+        const auto bone = scaled_rigid(posed_from_rest, rest_bone);
+        return {to_dual_quat(bone.rigid), bone.scale, bone.has_scale};
     }
 
     /// The deformed vertex.

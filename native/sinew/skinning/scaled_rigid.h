@@ -25,11 +25,20 @@ struct ScaledRigid {
 /// A bone's motion with its rigid part as a quaternion-vector pair.
 ///
 /// rest_bone  orthonormal; only read where the motion has scale
+///
+/// Blender's rest axes are up to 4e-5 off orthonormal, those of bones near -Y, and so is the rigid part of what it
+/// then takes for scale: the quaternion is read as Blender reads it.
 template <class T>
 [[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid(const Affine<T>& posed_from_rest,
                                                       const Affine<T>& rest_bone) noexcept {
     const ScaleSplit<T> split = split_scale(posed_from_rest, rest_bone);
-    return {to_quat_vec(split.rigid), split.scale, split.has_scale};
+    QuatVec<T> rigid = to_quat_vec(split.rigid);
+    if (split.has_scale) {
+        const Mat3<T>& axes = split.rigid.linear;
+        rigid.rotation = quat_of_columns(
+            Mat3<T>(glm::normalize(axes[0]), glm::normalize(axes[1]), glm::normalize(axes[2])));
+    }
+    return {rigid, split.scale, split.has_scale};
 }
 
 /// The same motion in another scalar type.
