@@ -14,7 +14,8 @@ not need, then saved as DIR/seed-N.blend.
 Left out of the comparison are vertices at a discontinuity of the modifier itself, where rounding decides:
 dual quaternions that meet within MARGIN of square (the sign of a term flips), weights that sum to within
 MARGIN of the modifier's threshold; and vertices that a change of the input by its rounding moves by the
-tolerance; of stages, a change of what they smooth. All are computed from the input.
+tolerance, there or by the modifier behind; of stages, a change of what they smooth. All are computed from
+the input.
 """
 
 from __future__ import annotations
@@ -451,7 +452,20 @@ def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
         chain = core_session.SkinStack(stages)
         chain.deform(points.astype(np.float32), skinned.shown.frames)
         shapes.append(chain.points)
-    return np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
+    moved = np.abs(shapes[1] - shapes[0]).max(axis=1) > scenes.TOLERANCE * extent
+    return moved | magnified_behind(obj, shapes[0])
+
+
+def magnified_behind(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
+    """bool [vertices]: those so near the centre of the sphere onto which the modifier behind casts them
+    that their rounding decides the direction.
+
+    points  [vertices, 3], object space: what comes to it
+    """
+    distances = np.linalg.norm(points, axis=1)
+    cast = obj.modifiers.get("Cast")
+    reach = 0.0 if cast is None else cast.factor * distances.mean()
+    return distances * scenes.TOLERANCE < reach * ROUNDING
 
 
 def check(seed: int, features: set[str], wanted: Sequence[str] = routes.ROUTES) -> Outcome:
