@@ -3,7 +3,8 @@
 
     python docs/make_reference.py commands|python|cpp
 
-docs/mkdocs_hook.py calls this when the site is built. The parsers are asked, so Sinew's library must be installed; Python and C++ are read, not run.
+docs/mkdocs_hook.py calls this when the site is built. The parsers are asked, so Sinew's library must be
+installed; Python and C++ are read, not run.
 """
 
 from __future__ import annotations
@@ -128,11 +129,7 @@ def python_api() -> str:
     """What `sinew` and its modules name in `__all__`, from their docstrings and types."""
     package, native = _parsed("__init__.py"), _parsed("_native.pyi")
     known = _definitions(native)
-    pages = [
-        "# Python",
-        said(_docstring(package)),
-        "The package is `sinew-skinning`, its licence the GPL-3.0-or-later.",
-    ]
+    pages = ["# Python", said(_docstring(package))]
     modules = []
     for name in _exported(package):
         if name in known:
@@ -274,7 +271,10 @@ def cpp_api() -> str:
         "method is in `sinew/skinning/NAME.h`.",
     ]
     for name in public_headers():
-        pages += [f"## sinew/{name}", block("cpp", declarations((HEADERS / name).read_text(encoding="utf-8")))]
+        pages += [
+            f"## sinew/{name}",
+            block("cpp", declarations((HEADERS / name).read_text(encoding="utf-8"))),
+        ]
     return "\n\n".join(pages) + "\n"
 
 

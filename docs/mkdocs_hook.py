@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the site has beside docs/: documents elsewhere in the repository, and pages made from code.
 
-Every page is known to mkdocs by its path in the repository, so that a link between documents is the same on the site as
-in the repository; and mkdocs, which checks links, finds those that lead nowhere.
+Every page is known to mkdocs by its path in the repository, so that a link between documents is the same on
+the site as in the repository; and mkdocs, which checks links, finds those that lead nowhere.
 """
 
 from __future__ import annotations
