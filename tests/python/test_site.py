@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The site: what is broken fails its build, nothing is missing, and what is made from code is all there."""
+
+from __future__ import annotations
+
+import argparse
+import html
+import importlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+import sinew
+from sinew_addon import cli
+
+ROOT = Path(__file__).resolve().parents[2]
+# Made by ./dev site and ./dev test.
+PYTHON = ROOT / ".venvs" / "site" / "bin" / "python"
+# What the site is made from.
+DOCUMENTS = sorted(path.name for path in ROOT.glob("*.md"))
+FOLDERS = ["docs", "addon", "native", "bench", "experiments", "tests/golden"]
+
+sys.path.insert(0, str(ROOT / "docs"))
+make_reference = importlib.import_module("make_reference")
+sys.path.remove(str(ROOT / "docs"))
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory) -> Path:
+    """What the site is made from, as a copy that a test may break."""
+    folder = tmp_path_factory.mktemp("checkout")
+    for name in FOLDERS:
+        shutil.copytree(
+            ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
+        )
+    for name in ["mkdocs.yml", *DOCUMENTS]:
+        shutil.copy(ROOT / name, folder)
+    return folder
+
+
+def build(checkout: Path, out: Path) -> subprocess.CompletedProcess:
+    """The line of ./dev, as it stands there."""
+    assert PYTHON.exists(), "./dev site makes what builds the site"
+    dev = (ROOT / "dev").read_text(encoding="utf-8")
+    line = re.search(r"\.venvs/site/bin/python (-m mkdocs .*)", dev)[1]
+    words = [word.replace("$out", str(out)) for word in shlex.split(line)]
+    return subprocess.run(
+        [PYTHON, *words], cwd=checkout, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def site(checkout, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("site")
+    done = build(checkout, out)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.mark.parametrize(
+    ("document", "text", "complaint"),
+    [
+        ("docs/tour.md", "[a page](nothing.md)", "nothing.md"),
+        ("docs/tour.md", "![a picture](nothing.png)", "nothing.png"),
+        ("docs/tour.md", "[a document](../NOTHING.md)", "NOTHING.md"),
+        ("docs/tour.md", "[a section](../CONTRIBUTING.md#nothing)", "#nothing"),
+        ("CONTRIBUTING.md", "[a section](docs/tour.md#nothing)", "#nothing"),
+        ("README.md", "![a picture](docs/nothing.png)", "nothing.png"),
+        ("docs/nothing.md", "# A page that the navigation does not have", "nothing.md"),
+    ],
+)
+def test_what_is_broken_fails_the_build(document, text, complaint, site, checkout, tmp_path):
+    path = checkout / document
+    before = path.read_bytes() if path.exists() else None
+    try:
+        path.write_bytes((before or b"") + f"\n\n{text}\n".encode())
+        done = build(checkout, tmp_path / "site")
+    finally:
+        if before is None:
+            path.unlink()
+        else:
+            path.write_bytes(before)
+    assert done.returncode != 0
+    assert complaint in done.stderr
+    assert "1 warnings in strict mode" in done.stderr + done.stdout
+
+
+# --- What is built
+
+
+class Page(HTMLParser):
+    """What a page refers to, as (tag, address); its anchors; its text."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.refers: list[tuple[str, str]] = []
+        self.anchors: set[str] = set()
+        self.words: list[str] = []
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if values.get("id"):
+            self.anchors.add(values["id"])
+        address = values.get("href") or values.get("src")
+        if address:
+            self.refers.append((tag, address))
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return "".join(self.words)
+
+
+@pytest.fixture(scope="module")
+def pages(site) -> dict[Path, Page]:
+    return {path: Page(path) for path in site.rglob("*.html") if path.name != "404.html"}
+
+
+def test_every_document_is_a_page(site):
+    names = {path.stem for path in (ROOT / "docs").glob("*.md")}
+    names |= {path.stem.lower() for path in ROOT.glob("*.md")} | set(make_reference.PAGES)
+    assert names <= {path.stem for path in site.glob("*.html")}
+    assert not list(site.rglob("*.py"))
+
+
+def test_all_that_pages_refer_to_is_there(pages):
+    images = 0
+    for path, page in pages.items():
+        for tag, address in page.refers:
+            parts = urlsplit(address)
+            if parts.scheme or parts.netloc:
+                # A reader may go elsewhere; a page loads nothing from there.
+                assert tag == "a", (path.name, address)
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            assert target.exists(), (path.name, address)
+            if parts.fragment and target in pages:
+                assert unquote(parts.fragment) in pages[target].anchors, address
+            images += tag == "img"
+    documents = [*(ROOT / "docs").glob("*.md"), *(ROOT / name for name in DOCUMENTS)]
+    assert images == sum(path.read_text(encoding="utf-8").count("![") for path in documents) > 30
+
+
+def test_the_command_line_is_whole(pages, site):
+    text = pages[site / "commands.html"].text
+    parser, modules = cli.make_parser()
+    subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction)).choices
+    assert set(subparsers) == set(modules)
+    sections = re.split(r"^sinew (\w+)¶", text, flags=re.MULTILINE)
+    found = dict(zip(sections[1::2], sections[2::2], strict=True))
+    assert list(found) == list(modules)
+    for name, subparser in subparsers.items():
+        said = " ".join(found[name].split())
+        for action in subparser._actions:
+            assert ", ".join(action.option_strings) in said, (name, action)
+            if action.help:
+                assert action.help.replace("`", "").split("%(")[0].strip() in said, (name, action)
+
+
+def test_the_python_package_is_whole(pages, site):
+    headings = re.findall(r"^([\w.]+)¶", pages[site / "python.html"].text, flags=re.MULTILINE)
+    wanted = set()
+    for name in sinew.__all__:
+        value = getattr(sinew, name)
+        if isinstance(value, type):
+            wanted |= {name} | {
+                f"{name}.{member}"
+                for member, found in vars(value).items()
+                if not member.startswith("_") and not isinstance(found, property)
+            }
+        elif hasattr(value, "__all__"):
+            own = {member for member in value.__all__ if member != "Blended"}
+            wanted |= {f"sinew.{name}"} | {f"{name}.{member}" for member in own}
+        elif callable(value):
+            wanted.add(name)
+    assert wanted <= set(headings), wanted - set(headings)
+    assert len(headings) == len(set(headings))
+
+
+def test_properties_of_python_are_there(pages, site):
+    text = pages[site / "python.html"].text
+    for name in sinew.__all__:
+        value = getattr(sinew, name)
+        for member, found in vars(value).items() if isinstance(value, type) else ():
+            assert not isinstance(found, property) or re.search(rf"^{member}$", text, re.MULTILINE), member
+
+
+def test_what_the_library_exports_to_cpp_is_there(pages, site):
+    text = pages[site / "cpp.html"].text
+    exported = 0
+    for name in make_reference.public_headers():
+        assert f"sinew/{name}¶" in text
+        header = (ROOT / "native" / "sinew" / name).read_text(encoding="utf-8")
+        for match in re.finditer(r"SINEW_EXPORT (?:[^(;{]*?)(\w+)(?:\(| \{)", header):
+            assert re.search(rf"\b{match[1]}\b", text), (name, match[1])
+            exported += 1
+    assert exported > 12
+    assert "private:" not in text
+
+
+# --- Text
+
+
+def test_arguments_become_a_list_and_what_is_aligned_stays():
+    text = (
+        "It has *no* `a_b`, a_b.\n\nout: written,\n    then returned.\nvalue, other: numbers.\n\n"
+        "one  first\ntwo  second"
+    )
+    assert make_reference.said(text) == (
+        "It has \\*no\\* `a_b`, a\\_b.\n\n- `out`: written, then returned.\n- `value, other`: numbers.\n\n"
+        "```text\none  first\ntwo  second\n```"
+    )
+    assert html.unescape(make_reference.escaped("a < b > c & d")) == "a < b > c & d"
+
+
+def test_declarations_have_no_bodies():
+    header = """#pragma once
+namespace sinew {
+
+namespace detail {
+inline int hidden() { return 1; }
+}  // namespace detail
+
+/// Twice (a {brace} here).
+[[nodiscard]] inline int twice(int a) noexcept {
+    if (a) { return 2 * a; }
+    return 0;
+}
+
+/// A list.
+inline constexpr int kAll = apply([](auto... all) { return sum(all...); });
+
+class Thing {
+public:
+    /// How many.
+    int count() const { return count_; }
+
+private:
+    int count_;
+};
+
+}  // namespace sinew
+"""
+    assert (
+        make_reference.declarations(header)
+        == """/// Twice (a {brace} here).
+[[nodiscard]] inline int twice(int a) noexcept;
+
+/// A list.
+inline constexpr int kAll = apply([](auto... all) { return sum(all...); });
+
+class Thing {
+public:
+    /// How many.
+    int count() const;
+};"""
+    )
