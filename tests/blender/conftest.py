@@ -20,11 +20,12 @@ from sinew_addon.deform import small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
-# What commands write: left to 4.2, 4.5 and the newest, between which 5.0 and 5.1 lie. These run all other
-# tests: how Blender evaluates, stores and edits.
+# What commands write: left to 4.2 and the newest, between which the others lie. These run all other tests:
+# how Blender evaluates, stores and edits.
 LEFT_TO_OTHERS = {
-    *("test_bake", "test_bake_apart", "test_batch", "test_check", "test_command_line", "test_compare"),
-    *("test_comparison", "test_output", "test_restore", "test_stages_in_features"),
+    *("test_bake", "test_bake_apart", "test_batch", "test_check", "test_cluster", "test_command_line"),
+    *("test_compare", "test_comparison", "test_hostile", "test_output", "test_report", "test_restore"),
+    "test_stages_in_features",
 }
 REAL_RIGS = ("human.blend", "CesiumMan.glb", "Fox.glb")
 
