@@ -111,6 +111,7 @@ def test_the_zip_holds_what_the_platform_asks_for(package):
     assert any(
         f"-cp{sys.version_info.major}{sys.version_info.minor}-" in wheel for wheel in manifest["wheels"]
     )
+    assert {"LICENSE", "NOTICES.md"} <= set(names)
     assert not [n for n in names if "numpy" in n or "__pycache__" in n or n == "pyproject.toml"]
 
 

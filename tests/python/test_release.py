@@ -141,6 +141,16 @@ def test_the_next_versions():
     assert following == {"major": "2.0.0", "minor": "1.5.0", "patch": "1.4.10", "3.0.0": "3.0.0"}
 
 
+def test_what_is_compiled_in_has_a_notice():
+    declared = re.findall(r"FetchContent_Declare\((\w+)", (ROOT / "cmake/dependencies.cmake").read_text())
+    # Of tests and measurements alone, which nobody is given.
+    compiled_in = {*declared, "pybind11"} - {"googletest", "benchmark"}
+    assert len(compiled_in) >= 4
+    notices = (ROOT / "NOTICES.md").read_text(encoding="utf-8")
+    listed = {name.lower() for name in re.findall(r"^\| (\w+) \|.*https://", notices, re.MULTILINE)}
+    assert listed == compiled_in
+
+
 # --- The changelog
 
 
