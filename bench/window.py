@@ -2,7 +2,7 @@
 """Playback and live posing in Blender's window, with the Armature modifier and with Sinew, in one file
 alternately.
 
-    blender --factory-startup --python bench/window.py -- --zip dist/sinew-0.1.0.zip [--file RIG]
+    blender --factory-startup --python bench/window.py -- --zip dist/sinew-VERSION.zip [--file RIG]
 
 Blender itself plays and draws, as fast as it can; each round switches Sinew on and off and measures
 

@@ -26,6 +26,8 @@ OUTSIDE = {
     "CONTRIBUTING.md": "contributing.html",
     "CHANGELOG.md": "changelog.html",
     "SECURITY.md": "security.html",
+    "RELEASING.md": "releasing.html",
+    "NOTICES.md": "notices.html",
     "bench/README.md": "measurements.html",
     "experiments/README.md": "experiments.html",
     "tests/golden/README.md": "golden.html",

@@ -161,7 +161,8 @@ def main() -> None:
     warn_of_gaps(wheels)
     files = {path.relative_to(ADDON).as_posix(): path.read_bytes() for path in shipped_files(ADDON)}
     files["blender_manifest.toml"] = manifest_with_wheels(manifest, wheels).encode()
-    files["LICENSE"] = (ROOT / "LICENSE").read_bytes()
+    for name in ("LICENSE", "NOTICES.md"):
+        files[name] = (ROOT / name).read_bytes()
     files |= {f"wheels/{wheel.path.name}": wheel.path.read_bytes() for wheel in wheels}
     target = ROOT / "dist" / f"sinew-{version}.zip"
     write_zip(target, files)

@@ -2,7 +2,7 @@
 """Bakes human.blend by the panel's dialog in a Blender with a window: Esc in the middle of each kind, then
 each to its end, and Ctrl+Z. Keys are pressed by simulation: it takes --enable-event-simulate.
 
-    blender --factory-startup OPTION human.blend --python bake_in_window.py -- sinew-0.1.0.zip bake.png
+    blender --factory-startup OPTION human.blend --python bake_in_window.py -- sinew-VERSION.zip bake.png
 """
 
 from __future__ import annotations

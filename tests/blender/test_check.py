@@ -14,6 +14,7 @@ from pathlib import Path
 import bpy
 import pytest
 import scenes
+import sinew
 from program import run_sinew
 from sinew_addon.attach import attach, properties
 from sinew_addon.commands.check import line_of
@@ -277,9 +278,9 @@ def test_another_blender_with_sinew(skinned, other_blender):
     # Its library goes, or another version comes.
     (manifest,) = other_blender.with_name("user").rglob("sinew/blender_manifest.toml")
     whole = manifest.read_text()
-    manifest.write_text(whole.replace('version = "0.1.0"', 'version = "0.0.9"'))
+    manifest.write_text(whole.replace(f'version = "{sinew.__version__}"', 'version = "0.0.9"'))
     (problem,) = check(skinned, "--blender", other_blender, status=1)["skinned.blend"]["problems"]
-    assert "has Sinew 0.0.9, this is 0.1.0; install the same" in problem
+    assert f"has Sinew 0.0.9, this is {sinew.__version__}; install the same" in problem
     manifest.write_text(whole)
     manifest.with_name("__init__.py").write_text("raise RuntimeError('broken')")
     (problem,) = check(skinned, "--blender", other_blender, status=1)["skinned.blend"]["problems"]

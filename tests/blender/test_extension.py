@@ -111,7 +111,89 @@ def test_the_zip_holds_what_the_platform_asks_for(package):
     assert any(
         f"-cp{sys.version_info.major}{sys.version_info.minor}-" in wheel for wheel in manifest["wheels"]
     )
+    assert {"LICENSE", "NOTICES.md"} <= set(names)
     assert not [n for n in names if "numpy" in n or "__pycache__" in n or n == "pyproject.toml"]
+
+
+def run_split(package, out) -> subprocess.CompletedProcess[str]:
+    program = REPOSITORY / "tools" / "split_package.py"
+    return subprocess.run(
+        [sys.executable, program, package, "--out", out], capture_output=True, text=True, check=False
+    )
+
+
+def with_wheels_of(package: Path, tags: dict[str, str], target: Path) -> Path:
+    """The zip with its wheels renamed to other platforms: nobody here looks into them."""
+    with zipfile.ZipFile(package) as archive, zipfile.ZipFile(target, "w") as changed:
+        names = archive.namelist()
+        wheels = [name for name in names if name.endswith("-linux_x86_64.whl")]
+        renamed = [(name, name.replace("linux_x86_64", tag)) for name in wheels for tag in tags.values()]
+        for source, name in [*((name, name) for name in names if name not in wheels), *renamed]:
+            data = archive.read(source)
+            if name == "blender_manifest.toml":
+                text = data.decode()
+                before = text[text.index("platforms = ") : text.index("]\n", text.index("wheels = ")) + 2]
+                listed = [f"./{name}" for _source, name in renamed]
+                data = text.replace(
+                    before, f"platforms = {json.dumps([*tags])}\nwheels = {json.dumps(listed)}\n"
+                ).encode()
+            changed.writestr(name, data)
+    return target
+
+
+def test_blender_splits_the_zip_and_finds_each_valid(package, tmp_path):
+    if sys.platform != "linux" or os.uname().machine != "x86_64":
+        pytest.skip("the wheels in the zip have other names here")
+    tags = {
+        "linux-x64": "manylinux_2_28_x86_64",
+        "windows-x64": "win_amd64",
+        "macos-arm64": "macosx_11_0_arm64",
+    }
+    whole = with_wheels_of(package, tags, tmp_path / "whole.zip")
+    made = run_split(whole, tmp_path / "split")
+    assert made.returncode == 0, made.stderr
+    zips = [Path(line) for line in made.stdout.split()]
+    assert len(zips) == len(tags)
+    for platform, tag in tags.items():
+        (path,) = (path for path in zips if path.stem.endswith(platform.replace("-", "_")))
+        with zipfile.ZipFile(path) as archive:
+            wheels = [name for name in archive.namelist() if name.endswith(".whl")]
+            manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+        assert wheels
+        assert all(name.endswith(f"-{tag}.whl") for name in wheels)
+        built = manifest["build"]["generated"]
+        assert built["platforms"] == [platform]
+        assert {name.removeprefix("./") for name in built["wheels"]} == set(wheels)
+    again = run_split(whole, tmp_path / "again")
+    assert again.returncode == 0, again.stderr
+    assert [path.read_bytes() for path in zips] == [Path(line).read_bytes() for line in again.stdout.split()]
+
+
+@pytest.mark.parametrize(
+    ("line", "wrong", "named"),
+    [
+        (b"maintainer = ", b"keeper = ", "maintainer"),
+        (b"tagline = ", b'tagline = "Ends with a dot." # ', "tagline"),
+        (
+            b"files = ",
+            b'files = "Is longer than the sixty-four characters that Blender takes in this place" # ',
+            "files",
+        ),
+        (b"files = ", b'discs = "No permission" # ', "discs"),
+    ],
+)
+def test_a_zip_that_blender_refuses_is_not_split(line, wrong, named, package, tmp_path):
+    with zipfile.ZipFile(package) as archive, zipfile.ZipFile(tmp_path / "wrong.zip", "w") as changed:
+        for name in archive.namelist():
+            data = archive.read(name)
+            if name == "blender_manifest.toml":
+                assert b"\n" + line in data
+                data = data.replace(b"\n" + line, b"\n" + wrong)
+            changed.writestr(name, data)
+    refused = run_split(tmp_path / "wrong.zip", tmp_path / "split")
+    assert refused.returncode == 1
+    assert named in refused.stderr
+    assert not (tmp_path / "split").exists()
 
 
 WITHOUT_LIBRARY = """

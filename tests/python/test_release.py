@@ -1,0 +1,379 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The version is the same everywhere, and tools/release.py sets it everywhere or nowhere."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+_SPEC = importlib.util.spec_from_file_location("sinew_release", ROOT / "tools" / "release.py")
+release = importlib.util.module_from_spec(_SPEC)
+sys.modules[_SPEC.name] = release
+_SPEC.loader.exec_module(release)
+
+DATE = "2031-02-03"
+CHANGES = f"""# Changelog
+
+{release.UNRELEASED}
+
+### Added
+
+- A thing.
+
+## [0.3.0] - 2030-01-02
+
+### Fixed
+
+- Another.
+
+## [0.2.0] - 2029-01-02
+
+- The first.
+"""
+
+
+@pytest.fixture
+def texts() -> dict[str, str]:
+    return release.read_texts(ROOT)
+
+
+def parsed(texts: dict[str, str]) -> dict[str, object]:
+    """Each file as its own reader has it."""
+    project = re.search(r"project\(sinew\s+VERSION\s+(\S+)", texts["CMakeLists.txt"])
+    return {
+        "CMakeLists.txt": project[1],
+        "pyproject.toml": tomllib.loads(texts["pyproject.toml"]),
+        "addon/pyproject.toml": tomllib.loads(texts["addon/pyproject.toml"]),
+        "addon/blender_manifest.toml": tomllib.loads(texts["addon/blender_manifest.toml"]),
+        "CITATION.cff": yaml.safe_load(texts["CITATION.cff"]),
+    }
+
+
+def versions(files: dict) -> list[str]:
+    (library,) = (r for r in files["addon/pyproject.toml"]["project"]["dependencies"] if "sinew" in r)
+    return [
+        files["CMakeLists.txt"],
+        files["pyproject.toml"]["project"]["version"],
+        files["addon/pyproject.toml"]["project"]["version"],
+        library.removeprefix("sinew-skinning=="),
+        files["addon/blender_manifest.toml"]["version"],
+        files["CITATION.cff"]["version"],
+    ]
+
+
+# --- The version
+
+
+def test_all_files_have_the_same_version(texts):
+    assert set(versions(parsed(texts))) == {release.version_in(texts)}
+
+
+def test_nothing_else_names_the_version(texts):
+    """What a release would have to change, too."""
+    version = release.version_in(texts)
+    looked_at = [
+        path
+        for folder in ("addon", "bench", "docs", "native", "tests", "tools")
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".md", ".h", ".cpp", ".txt", ".toml", ".html")
+    ]
+    assert len(looked_at) > 300
+    named = re.compile(rf"sinew[^\n]{{0,20}}(?<![\d.]){re.escape(version)}(?![\d.]|\d)", re.IGNORECASE)
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in [*looked_at, *ROOT.glob("*.md")]
+        if named.search(path.read_text(encoding="utf-8"))
+    }
+    assert found <= {place.file for place in release.PLACES} | {"CHANGELOG.md"}
+
+
+def test_a_new_version_is_set_everywhere_and_changes_nothing_else(texts):
+    after = release.with_version(texts, "9.8.7", DATE)
+    assert versions(parsed(after)) == ["9.8.7"] * 6
+    for name, text in texts.items():
+        changed = set(after[name].splitlines()) - set(text.splitlines())
+        assert len(changed) == {"addon/pyproject.toml": 2, "CITATION.cff": 2, "CHANGELOG.md": 0}.get(name, 1)
+        assert all("9.8.7" in line or line == f"date-released: {DATE}" for line in changed)
+    assert str(parsed(after)["CITATION.cff"]["date-released"]) == DATE
+    # The next one replaces the date.
+    assert after | {"CITATION.cff": ""} == release.with_version(after, "9.8.7", "2032-01-01") | {
+        "CITATION.cff": ""
+    }
+    assert release.with_version(after, "9.8.8", "2032-01-01")["CITATION.cff"].count("date-released") == 1
+    assert (
+        release.with_version(after, release.version_in(texts), DATE)["pyproject.toml"]
+        == (texts["pyproject.toml"])
+    )
+
+
+def test_files_that_disagree_are_named(texts):
+    texts["CITATION.cff"] = texts["CITATION.cff"].replace("\nversion: ", "\nversion: 7")
+    with pytest.raises(SystemExit, match=r"several versions: .* in CITATION.cff.*\.$"):
+        release.version_in(texts)
+
+
+def test_a_file_without_a_version_is_named(texts):
+    texts["pyproject.toml"] = texts["pyproject.toml"].replace("\nversion = ", "\nedition = ")
+    with pytest.raises(SystemExit, match=r"^release: pyproject.toml has 0 places like "):
+        release.version_in(texts)
+
+
+@pytest.mark.parametrize(
+    "wrong", ["", "1", "1.2", "v1.2.3", "1.2.3rc1", "01.2.3", "1.2.3.4", "1.2.3\n", "1\u0662.0.0"]
+)
+def test_what_is_no_version_is_refused(wrong):
+    with pytest.raises(SystemExit, match="is not a version"):
+        release.numbers(wrong)
+
+
+def test_the_next_versions():
+    following = {step: release.next_version("1.4.9", step) for step in ("major", "minor", "patch", "3.0.0")}
+    assert following == {"major": "2.0.0", "minor": "1.5.0", "patch": "1.4.10", "3.0.0": "3.0.0"}
+
+
+def test_what_is_compiled_in_has_a_notice():
+    declared = re.findall(r"FetchContent_Declare\((\w+)", (ROOT / "cmake/dependencies.cmake").read_text())
+    # Of tests and measurements alone, which nobody is given.
+    compiled_in = {*declared, "pybind11"} - {"googletest", "benchmark"}
+    assert len(compiled_in) >= 4
+    notices = (ROOT / "NOTICES.md").read_text(encoding="utf-8")
+    listed = {name.lower() for name in re.findall(r"^\| (\w+) \|.*https://", notices, re.MULTILINE)}
+    assert listed == compiled_in
+
+
+# --- The changelog
+
+
+def test_the_changelog_has_the_form_that_a_release_needs(texts):
+    changelog = texts["CHANGELOG.md"]
+    headings = re.findall(r"^## .*$", changelog, re.MULTILINE)
+    assert headings[0] == release.UNRELEASED
+    assert len(headings) == 1 + len(release.released_versions(changelog))
+    kinds = set(re.findall(r"^### (.*)$", changelog, re.MULTILINE))
+    assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+def test_the_unreleased_changes_get_a_version_and_a_date():
+    after = release.with_release(CHANGES, "0.4.0", DATE)
+    assert re.findall(r"^## .*$", after, re.MULTILINE) == [
+        release.UNRELEASED,
+        f"## [0.4.0] - {DATE}",
+        "## [0.3.0] - 2030-01-02",
+        "## [0.2.0] - 2029-01-02",
+    ]
+    assert release.notes_of(after, release.UNRELEASED) == ""
+    assert release.notes_of(after, "## [0.4.0]") == "### Added\n\n- A thing.\n"
+    assert release.notes_of(after, "## [0.2.0]") == "- The first.\n"
+    assert after.replace(f"{release.UNRELEASED}\n\n## [0.4.0] - {DATE}", release.UNRELEASED) == CHANGES
+
+
+@pytest.mark.parametrize(
+    ("version", "changes", "said"),
+    [
+        ("0.3.0", CHANGES, "0.3.0 is not newer than 0.3.0"),
+        ("0.2.9", CHANGES, "0.2.9 is not newer than 0.3.0"),
+        ("0.10.0", CHANGES, None),
+        ("0.0.1", CHANGES.partition("\n## [0.3")[0], "0.0.1 is older than "),
+        ("9.0.0", CHANGES.replace("- A thing.\n", ""), "has nothing below"),
+    ],
+)
+def test_what_stands_in_the_way_in_texts(texts, version, changes, said):
+    found = release.obstacles_in_texts(texts | {"CHANGELOG.md": changes}, version)
+    assert [said in line for line in found] == ([True] if said else [])
+
+
+def test_a_first_release_may_have_the_version_that_is_there(texts):
+    changes = CHANGES.partition("\n## [0.3")[0]
+    assert release.obstacles_in_texts(texts | {"CHANGELOG.md": changes}, release.version_in(texts)) == []
+
+
+# --- The whole, in a repository of its own
+
+# Stands for the build alone: a zip with a wheel in it, named as ./dev package names its own.
+PACKAGES = """#!/usr/bin/env python3
+import re, sys, zipfile
+assert sys.argv[1:] == ["package"]
+version = re.search('^version = "(.*)"', open("pyproject.toml").read(), re.M)[1]
+with zipfile.ZipFile(f"dist/sinew-{version}.zip", "w") as archive:
+    archive.writestr(f"wheels/sinew_skinning-{version}-cp311-cp311-linux_x86_64.whl", b"wheel")
+    archive.writestr("__init__.py", b"")
+print(f"dist/sinew-{version}.zip")
+"""
+SKINNING = "sinew_skinning-7.0.0-cp311-cp311-linux_x86_64.whl"
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    root = tmp_path / "checkout"
+    for name in [*release.FILES, "tools/release.py"]:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, root / name)
+    (root / "CHANGELOG.md").write_text(CHANGES, encoding="utf-8")
+    (root / "dist").mkdir()
+    (root / ".gitignore").write_text("/dist/\n")
+    write_dev(root, PACKAGES)
+    git(root, "init", "--quiet", "--initial-branch=main")
+    commit(root)
+    return root
+
+
+def write_dev(root: Path, text: str) -> None:
+    (root / "dev").write_text(text)
+    (root / "dev").chmod(0o755)
+
+
+def git(root: Path, *words: str) -> str:
+    identity = ["-c", "user.name=T", "-c", "user.email=t@example.org", "-c", "commit.gpgsign=false"]
+    return subprocess.run(
+        ["git", *identity, *words], cwd=root, check=True, capture_output=True, text=True
+    ).stdout
+
+
+def commit(root: Path) -> None:
+    git(root, "add", "--all")
+    git(root, "commit", "--quiet", "--message", "all")
+
+
+def run(root: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-I", "tools/release.py", *options],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def left_in(root: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(root).as_posix(): path.read_bytes()
+        for path in root.rglob("*")
+        if path.is_file() and ".git" not in path.parts
+    }
+
+
+def test_a_release(checkout):
+    done = run(checkout, "7.0.0")
+    assert done.returncode == 0, done.stderr
+    folder = checkout / "dist" / "release-7.0.0"
+    assert {path.name for path in folder.iterdir()} == {"sinew-7.0.0.zip", SKINNING, "NOTES.md", "SHA256SUMS"}
+    assert (folder / "NOTES.md").read_text() == "### Added\n\n- A thing.\n"
+    sums = dict(line.split("  ")[::-1] for line in (folder / "SHA256SUMS").read_text().splitlines())
+    assert sums == {
+        name: hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        for name in ("sinew-7.0.0.zip", SKINNING, "NOTES.md")
+    }
+    assert (folder / SKINNING).read_bytes() == b"wheel"
+    assert release.version_in(release.read_texts(checkout)) == "7.0.0"
+    changed = {line[3:] for line in git(checkout, "status", "--porcelain").splitlines()}
+    assert changed == set(release.FILES)
+    assert len(git(checkout, "log", "--oneline").splitlines()) == 1
+    assert git(checkout, "tag") == ""
+    assert "git tag --sign v7.0.0" in done.stdout
+    # Once committed, its notes are there for who publishes them.
+    assert run(checkout, "--notes", "7.0.0").stdout == "### Added\n\n- A thing.\n"
+    assert "this is 7.0.0, not 7.0.1" in run(checkout, "--notes", "7.0.1").stderr
+    # The same again is none.
+    commit(checkout)
+    again = run(checkout, "7.0.0")
+    assert again.returncode == 1
+    assert "dist/release-7.0.0 is there already" in again.stderr
+    assert "has nothing below" in again.stderr
+
+
+def obstruct_branch(root):
+    git(root, "switch", "--quiet", "--create", "other")
+
+
+def obstruct_tag(root):
+    git(root, "tag", "v7.0.0")
+
+
+def obstruct_tree(root):
+    (root / "new.txt").write_text("new")
+
+
+def obstruct_repository(root):
+    shutil.rmtree(root / ".git")
+
+
+def obstruct_build(root):
+    write_dev(root, "#!/bin/sh\necho half >dist/half\nexit 3\n")
+    commit(root)
+
+
+def obstruct_zip(root):
+    write_dev(root, "#!/bin/sh\nmkdir -p dist; echo no zip >dist/sinew.zip; echo dist/sinew.zip\n")
+    commit(root)
+
+
+def obstruct_naming(root):
+    write_dev(root, "#!/bin/sh\necho nothing\n")
+    commit(root)
+
+
+@pytest.mark.parametrize(
+    ("obstruct", "said"),
+    [
+        (obstruct_branch, "release: this is the branch other, not main."),
+        (obstruct_tag, "release: the tag v7.0.0 is there already."),
+        (obstruct_tree, "release: the checkout has changes: commit them, or take them back."),
+        (obstruct_repository, "release: this is no git checkout."),
+        (obstruct_build, "release: ./dev package failed; the files have their old text again."),
+        (
+            obstruct_zip,
+            "release: ./dev package made sinew.zip, which is no zip; the files have their old text again.",
+        ),
+        (obstruct_naming, "release: ./dev package named no zip; the files have their old text again."),
+    ],
+)
+def test_what_fails_leaves_all_as_it_was(checkout, obstruct, said):
+    obstruct(checkout)
+    before = left_in(checkout)
+    done = run(checkout, "7.0.0")
+    assert done.returncode == 1
+    assert done.stderr.strip() == said
+    after = left_in(checkout)
+    assert {name: data for name, data in after.items() if not name.startswith("dist/")} == before
+    assert not [name for name in after if "release-" in name]
+
+
+def test_a_file_that_can_not_be_written_changes_none(checkout, monkeypatch):
+    before = left_in(checkout)
+    replace = release.os.replace
+
+    def full_disk(source, target):
+        if Path(target).name == "CHANGELOG.md" and not full_disk.done:
+            full_disk.done = True
+            raise OSError("no space left on device")
+        replace(source, target)
+
+    full_disk.done = False
+    monkeypatch.setattr(release.os, "replace", full_disk)
+    with pytest.raises(OSError, match="no space"):
+        release.prepare(checkout, "7.0.0", DATE)
+    assert full_disk.done
+    assert left_in(checkout) == before
+
+
+def test_a_dry_run_changes_nothing_and_says_what_is_in_the_way(checkout):
+    obstruct_tree(checkout)
+    before = left_in(checkout)
+    done = run(checkout, "--dry-run", "major")
+    assert done.returncode == 0, done.stderr
+    version = release.next_version(release.version_in(release.read_texts(checkout)), "major")
+    assert "In the way: the checkout has changes" in done.stdout
+    for name in release.FILES:
+        assert re.search(rf"^{re.escape(name)}: .*{re.escape(version)}", done.stdout, re.MULTILINE)
+    assert left_in(checkout) == before
+    assert "is not a version" in run(checkout, "--dry-run", "7").stderr

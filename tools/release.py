@@ -1,0 +1,320 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Prepares a release: sets its version, dates its changes, builds it, writes notes and checksums.
+
+Nothing public changes, and there is no commit and no tag: these are said at the end. What stands in the way
+is found before anything is written; where the build fails, the files get their old text back.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+# What CMake, pip and Blender's manifest all take.
+VERSION = r"(?:0|[1-9][0-9]*)\.(?:0|[1-9][0-9]*)\.(?:0|[1-9][0-9]*)"
+CHANGELOG = "CHANGELOG.md"
+CITATION = "CITATION.cff"
+UNRELEASED = "## [Unreleased]"
+
+
+class Place(NamedTuple):
+    """Where the version stands: the one group of the one match in the file."""
+
+    file: str
+    pattern: str
+
+
+PLACES = (
+    Place("CMakeLists.txt", r"^project\(sinew VERSION (\S+) "),
+    Place("pyproject.toml", r'^version = "([^"]*)"$'),
+    Place("addon/pyproject.toml", r'^version = "([^"]*)"$'),
+    Place("addon/pyproject.toml", r'"sinew-skinning==([^"]*)"'),
+    Place("addon/blender_manifest.toml", r'^version = "([^"]*)"$'),
+    Place(CITATION, r"^version: (\S+)$"),
+)
+FILES = tuple(dict.fromkeys([*(place.file for place in PLACES), CHANGELOG]))
+
+Texts = Mapping[str, str]
+
+
+def fail(message: str) -> SystemExit:
+    return SystemExit(f"release: {message}")
+
+
+def read_texts(root: Path) -> dict[str, str]:
+    return {name: (root / name).read_text(encoding="utf-8") for name in FILES}
+
+
+def numbers(version: str) -> tuple[int, ...]:
+    """To compare versions by."""
+    if not re.fullmatch(VERSION, version):
+        raise fail(f"{version} is not a version: three numbers with dots between, such as 1.4.0.")
+    return tuple(map(int, version.split(".")))
+
+
+# --- The version in files
+
+
+def match_of(place: Place, text: str) -> re.Match[str]:
+    found = list(re.finditer(place.pattern, text, re.MULTILINE))
+    if len(found) != 1:
+        raise fail(f"{place.file} has {len(found)} places like {place.pattern} instead of one.")
+    return found[0]
+
+
+def version_in(texts: Texts) -> str:
+    """The one version that all files name."""
+    named = {(place.file, match_of(place, texts[place.file])[1]) for place in PLACES}
+    versions = {version for _file, version in named}
+    if len(versions) != 1:
+        listed = ", ".join(f"{version} in {file}" for file, version in sorted(named))
+        raise fail(f"the files name several versions: {listed}.")
+    return versions.pop()
+
+
+def with_version(texts: Texts, version: str, date: str) -> dict[str, str]:
+    result = dict(texts)
+    for place in PLACES:
+        text = result[place.file]
+        start, end = match_of(place, text).span(1)
+        result[place.file] = text[:start] + version + text[end:]
+    undated = re.sub(r"^date-released: .*\n", "", result[CITATION], flags=re.MULTILINE)
+    result[CITATION] = re.sub(
+        r"^version: .*$", rf"\g<0>\ndate-released: {date}", undated, count=1, flags=re.MULTILINE
+    )
+    return result
+
+
+# --- CHANGELOG.md
+
+
+def section(changelog: str, heading: str) -> tuple[int, int]:
+    """Where the text below a heading begins and ends."""
+    found = list(re.finditer(rf"^{re.escape(heading)}(?: - .*)?$", changelog, re.MULTILINE))
+    if len(found) != 1:
+        raise fail(f"{CHANGELOG} has {len(found)} headings {heading} instead of one.")
+    following = re.compile(r"^## ", re.MULTILINE).search(changelog, found[0].end())
+    return found[0].end(), following.start() if following else len(changelog)
+
+
+def notes_of(changelog: str, heading: str) -> str:
+    """What a section says; nothing where it has no entry."""
+    start, end = section(changelog, heading)
+    text = changelog[start:end].strip()
+    return f"{text}\n" if re.search(r"^- ", text, re.MULTILINE) else ""
+
+
+def released_versions(changelog: str) -> list[str]:
+    return re.findall(rf"^## \[({VERSION})\] - \d{{4}}-\d\d-\d\d$", changelog, re.MULTILINE)
+
+
+def with_release(changelog: str, version: str, date: str) -> str:
+    """The unreleased changes below a heading of this version, and the heading for the next ones above it."""
+    start, _end = section(changelog, UNRELEASED)
+    return f"{changelog[:start]}\n\n## [{version}] - {date}{changelog[start:]}"
+
+
+# --- What stands in the way
+
+
+def git(root: Path, *words: str) -> str | None:
+    """What git prints, or None where it fails."""
+    try:
+        done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def obstacles_in_texts(texts: Texts, version: str) -> list[str]:
+    found = []
+    named, released = version_in(texts), released_versions(texts[CHANGELOG])
+    if released and numbers(version) <= max(map(numbers, released)):
+        newest = max(released, key=numbers)
+        found.append(f"{version} is not newer than {newest}, which {CHANGELOG} has as released.")
+    elif numbers(version) < numbers(named):
+        found.append(f"{version} is older than {named}, which the files name.")
+    if not notes_of(texts[CHANGELOG], UNRELEASED):
+        found.append(f"{CHANGELOG} has nothing below {UNRELEASED}.")
+    return found
+
+
+def obstacles_in_checkout(root: Path, version: str) -> list[str]:
+    state = git(root, "status", "--porcelain")
+    if state is None:
+        return ["this is no git checkout."]
+    found = []
+    branch = git(root, "symbolic-ref", "--short", "HEAD")
+    if branch != "main":
+        found.append(f"this is {f'the branch {branch}' if branch else 'no branch'}, not main.")
+    if state:
+        found.append("the checkout has changes: commit them, or take them back.")
+    if git(root, "tag", "--list", f"v{version}"):
+        found.append(f"the tag v{version} is there already.")
+    if release_folder(root, version).exists():
+        found.append(f"{release_folder(root, version).relative_to(root)} is there already: take it away.")
+    return found
+
+
+# --- Doing it
+
+
+def release_folder(root: Path, version: str) -> Path:
+    return root / "dist" / f"release-{version}"
+
+
+def write_texts(root: Path, texts: Texts) -> None:
+    """Each is whole beside its old one before any is replaced: a full disk changes none."""
+    unfinished = {name: (root / name).with_name(f".{Path(name).name}.{os.getpid()}") for name in texts}
+    try:
+        for name, path in unfinished.items():
+            path.write_text(texts[name], encoding="utf-8", newline="")
+            shutil.copymode(root / name, path)
+        for name, path in unfinished.items():
+            os.replace(path, root / name)
+    finally:
+        for path in unfinished.values():
+            path.unlink(missing_ok=True)
+
+
+def build_packages(root: Path) -> list[Path]:
+    """The zips that ./dev package says it made."""
+    done = subprocess.run([root / "dev", "package"], cwd=root, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise fail("./dev package failed; the files have their old text again.")
+    packages = [root / line for line in done.stdout.splitlines() if line.endswith(".zip")]
+    if not packages:
+        raise fail("./dev package named no zip; the files have their old text again.")
+    return packages
+
+
+def wheels_in(package: Path) -> dict[str, bytes]:
+    try:
+        with zipfile.ZipFile(package) as archive:
+            return {
+                entry.removeprefix("wheels/"): archive.read(entry)
+                for entry in archive.namelist()
+                if re.fullmatch(r"wheels/[^/\\]+\.whl", entry)
+            }
+    except zipfile.BadZipFile:
+        raise fail(
+            f"./dev package made {package.name}, which is no zip; the files have their old text again."
+        ) from None
+
+
+def write_release(folder: Path, packages: list[Path], notes: str) -> None:
+    """The zips, the wheels in them, the notes and SHA256SUMS, as sha256sum --check reads it."""
+    unfinished = folder.with_name(f".{folder.name}.{os.getpid()}")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    try:
+        unfinished.mkdir(parents=True)
+        for package in packages:
+            shutil.copyfile(package, unfinished / package.name)
+            for name, data in wheels_in(package).items():
+                (unfinished / name).write_bytes(data)
+        (unfinished / "NOTES.md").write_text(notes, encoding="utf-8", newline="")
+        sums = [
+            f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
+            for path in sorted(unfinished.iterdir())
+        ]
+        (unfinished / "SHA256SUMS").write_text("".join(sums), encoding="utf-8", newline="")
+        unfinished.rename(folder)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def prepare(
+    root: Path, version: str, date: str, build: Callable[[Path], list[Path]] = build_packages
+) -> Path:
+    """The release's folder; or all as it was, and an error."""
+    before = read_texts(root)
+    obstacles = obstacles_in_checkout(root, version) + obstacles_in_texts(before, version)
+    if obstacles:
+        raise fail(" ".join(obstacles))
+    try:
+        write_texts(root, edited(before, version, date))
+        write_release(release_folder(root, version), build(root), notes_of(before[CHANGELOG], UNRELEASED))
+    except BaseException:
+        write_texts(root, before)
+        raise
+    return release_folder(root, version)
+
+
+def edited(texts: Texts, version: str, date: str) -> dict[str, str]:
+    result = with_version(texts, version, date)
+    result[CHANGELOG] = with_release(texts[CHANGELOG], version, date)
+    return result
+
+
+def next_version(named: str, step: str) -> str:
+    """named with one of its numbers raised, where step says which; else step itself."""
+    major, minor, patch = numbers(named)
+    raised = {
+        "major": f"{major + 1}.0.0",
+        "minor": f"{major}.{minor + 1}.0",
+        "patch": f"{major}.{minor}.{patch + 1}",
+    }
+    return raised.get(step, step)
+
+
+def show(root: Path, version: str, date: str) -> None:
+    texts = read_texts(root)
+    after = edited(texts, version, date)
+    for obstacle in obstacles_in_checkout(root, version) + obstacles_in_texts(texts, version):
+        print(f"In the way: {obstacle}")
+    for name in FILES:
+        old, new = texts[name].splitlines(), after[name].splitlines()
+        for line in new:
+            if line not in old:
+                print(f"{name}: {line}")
+    print(f"Then ./dev package, and {release_folder(root, version).relative_to(root)} with zips, wheels,")
+    print("NOTES.md and SHA256SUMS. Nothing was changed.")
+
+
+def next_steps(folder: Path, version: str) -> str:
+    return f"""{folder} has the release {version}. Nothing is public, committed or tagged. Next:
+  1. RELEASING.md, "Before": what is tested by hand
+  2. git commit --all --message "release: {version}"
+  3. git tag --sign v{version} --message "Sinew {version}"
+  4. git push origin main v{version}: the tag has .github/workflows/release.yml build and publish
+To take it back before that: git restore . and rm -r {folder}"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="./dev release", description=__doc__.splitlines()[0])
+    parser.add_argument("version", help="such as 1.4.0; or major, minor, patch: the next one of these")
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument("--dry-run", action="store_true", help="say what it would do, and what is in the way")
+    chosen.add_argument("--notes", action="store_true", help="print the notes of the version that is here")
+    options = parser.parse_args()
+
+    texts = read_texts(ROOT)
+    version = next_version(version_in(texts), options.version)
+    numbers(version)
+    date = datetime.datetime.now(datetime.UTC).date().isoformat()
+    if options.notes:
+        if version != version_in(texts):
+            raise fail(f"this is {version_in(texts)}, not {version}.")
+        print(notes_of(texts[CHANGELOG], f"## [{version}]"), end="")
+    elif options.dry_run:
+        show(ROOT, version, date)
+    else:
+        folder = prepare(ROOT, version, date)
+        print(next_steps(folder.relative_to(ROOT), version))
+
+
+if __name__ == "__main__":
+    sys.stdout.reconfigure(encoding="utf-8")
+    main()

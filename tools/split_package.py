@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splits the extension's zip into one for each platform, and validates them, both by Blender's own program.
+
+The Python that runs this needs bpy, as .venv has it: Blender's program for extensions lies within.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from package import write_zip
+
+
+def blenders_program() -> Path:
+    """What `blender --command extension` runs: a program of its own, without bpy."""
+    spec = importlib.util.find_spec("bpy")
+    found = [
+        path
+        for folder in (spec.submodule_search_locations or [] if spec else [])
+        for path in Path(folder).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
+    ]
+    if len(found) != 1:
+        raise SystemExit("split: this Python has no bpy with Blender's program for extensions.")
+    return found[0]
+
+
+def run(*words: str | Path) -> None:
+    done = subprocess.run(
+        [sys.executable, blenders_program(), *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise SystemExit(f"split: Blender refuses {words[-1]}:\n{done.stdout}{done.stderr}".rstrip())
+
+
+def validate(package: Path) -> None:
+    run("validate", package)
+
+
+def files_in(package: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(package) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def split(package: Path, out: Path) -> list[Path]:
+    """The zips made in out: the platforms that the package's manifest names, each with its own wheels."""
+    with tempfile.TemporaryDirectory() as place:
+        sources, made = Path(place, "sources"), Path(place, "made")
+        made.mkdir()
+        with zipfile.ZipFile(package) as archive:
+            archive.extractall(sources)
+        run("build", "--split-platforms", "--output-dir", made, "--source-dir", sources)
+        # Blender dates what it wrote itself; the same files are to give the same bytes.
+        split_files = {path: files_in(path) for path in sorted(made.glob("*.zip"))}
+        for path, files in split_files.items():
+            write_zip(path, files)
+            validate(path)
+        for path, files in split_files.items():
+            write_zip(out / path.name, files)
+    return [out / path.name for path in split_files]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("package", type=Path, help="the zip that ./dev package made")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the zips")
+    options = parser.parse_args()
+    validate(options.package)
+    for path in split(options.package, options.out):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()
