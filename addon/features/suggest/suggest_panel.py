@@ -13,6 +13,7 @@ from ...io import units
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import counted, tr
 from . import suggest
 
 
@@ -48,9 +49,9 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if suggestion is None:
             return
         count = len(suggestion.frames)
-        draw_text(
-            layout, context, f"The worst of {count} frame{'s' if count > 1 else ''}, the best method marked"
-        )
+        one = "The worst of {count} frame, the best method marked"
+        many = "The worst of {count} frames, the best method marked"
+        draw_text(layout, context, counted(count, one, many))
         used = {properties.of(obj).method for obj in operators.sinew_targets(context)}
         best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
         for name in suggestion.rank():
@@ -62,14 +63,14 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
             for criterion in CRITERIA:
                 value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
                 icon = "CHECKMARK" if name in best[criterion.name] else "BLANK1"
-                values.label(text=f"{criterion.label} {value}", icon=icon)
+                values.label(text=f"{tr(criterion.label)} {value}", icon=icon)
         for criterion in CRITERIA:
-            draw_text(layout, context, f"{criterion.label}: {criterion.text}")
+            draw_text(layout, context, f"{tr(criterion.label)}: {tr(criterion.text)}")
 
 
 def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
     if worst is None:
-        return "none"
+        return tr("none")
     if criterion.unit == "count":
         return f"{worst.value:,.0f}"
     return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew's texts in other languages. Blender as a module has no languages: what a whole one shows is in
+test_panel_in_window.py."""
+
+from __future__ import annotations
+
+import string
+
+import messages
+import pytest
+from sinew_addon.ui import translations
+
+LANGUAGES = list(translations.LANGUAGES)
+
+
+def names_in_braces(text: str) -> set[str]:
+    return {
+        name for _before, name, _format, _conversion in string.Formatter().parse(text) if name is not None
+    }
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_text_is_translated(language):
+    shown = messages.shown()
+    assert len(shown) > 300
+    missing = {text: where for text, where in shown.items() if text not in translations.LANGUAGES[language]}
+    assert missing == {}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_translation_is_left_over(language):
+    used = messages.shown().keys() | messages.literals()
+    assert [text for text in translations.LANGUAGES[language] if text not in used] == []
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_translations_have_the_same_names_in_braces(language):
+    differing = {
+        text: translated
+        for text, translated in translations.LANGUAGES[language].items()
+        if names_in_braces(text) != names_in_braces(translated) or text.count("%") != translated.count("%")
+    }
+    assert differing == {}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_translations_end_as_their_texts_do(language):
+    """A tooltip has no full stop, as Blender adds it; what a button opens has an ellipsis."""
+
+    def end(text: str) -> str:
+        return text[-1] if text[-1] in ".…:" else ""
+
+    # A report of something done to so many meshes: in German a participle, then a colon.
+    allowed = {"Rebound"}
+    texts = translations.LANGUAGES[language].items()
+    assert [text for text, other in texts if end(text) != end(other) and text not in allowed] == []
+
+
+def test_texts_put_together_are_translated_as_a_whole():
+    """No text with words is put together in a panel's code: it would stay English."""
+    assert messages.joined_in_code() == []
