@@ -30,7 +30,9 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.method not in properties.METHODS:
-            self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
+            names = ", ".join(properties.METHODS)
+            text = tr("Method {name}: choose one of {names}", name=repr(self.method), names=names)
+            self.report({"ERROR"}, text)
             return {"CANCELLED"}
         character.set_method(context, self.method)
         return {"FINISHED"}

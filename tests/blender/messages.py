@@ -122,15 +122,16 @@ def _of_code() -> Iterator[tuple[str, str]]:
 
 def joined_in_code() -> list[str]:
     """Where panels put words and values together without tr()."""
-    return [
-        f"{path.relative_to(ADDON)}:{node.lineno}: {part.value}"
-        for path, node in _drawing_code()
-        for shown in _shown_by(node)
-        for joined in ast.walk(shown)
-        if isinstance(joined, ast.JoinedStr)
-        for part in joined.values
-        if isinstance(part, ast.Constant) and any(letter.isalpha() for letter in part.value)
-    ]
+    found = []
+    for path, node in _drawing_code():
+        parts = [part for shown in _shown_by(node) for part in ast.walk(shown)]
+        # How a value is written, such as :g, is a JoinedStr, too.
+        formats = {id(part.format_spec) for part in parts if isinstance(part, ast.FormattedValue)}
+        texts = [part for part in parts if isinstance(part, ast.JoinedStr) and id(part) not in formats]
+        words = [each.value for text in texts for each in text.values if isinstance(each, ast.Constant)]
+        where = f"{path.relative_to(ADDON)}:{getattr(node, 'lineno', 0)}"
+        found += [f"{where}: {word}" for word in words if any(letter.isalpha() for letter in word)]
+    return found
 
 
 def _drawing_code() -> Iterator[tuple[Path, ast.AST]]:

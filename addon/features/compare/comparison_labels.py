@@ -50,9 +50,8 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     found = []
     originals = comparison.originals(state)
     if originals:
-        found.append(
-            (tr("Original: {method}", method=_method_label(originals[0])), (1.0, 1.0, 1.0), originals)
-        )
+        text = tr("Original: {method}", method=_method_label(originals[0]))
+        found.append((text, (1.0, 1.0, 1.0), originals))
     for method in comparison_state.shown_methods(state):
         copies = groups.get(method, [])
         if copies:

@@ -137,7 +137,8 @@ class SINEW_OT_mend(bpy.types.Operator):
         finally:
             manager.progress_end()
         left = next((each.count for each in diagnose.of(obj).findings if each.name == self.finding), 0)
-        self.report({"INFO"}, f"Mended {done}. Checked again: {left:,} left")
+        text = tr("Mended {what}. Checked again: {count} left", what=done, count=f"{left:,}")
+        self.report({"INFO"}, text)
         return {"FINISHED"}
 
 
@@ -180,7 +181,7 @@ def _draw_check(
         _draw_finding(column, context, obj, finding)
     if not found.findings:
         column.label(text="Nothing found", icon="CHECKMARK")
-    draw_text(column, context, f"Checked: weights, {found.frames}")
+    draw_text(column, context, tr("Checked: weights, {poses}", poses=found.frames))
     upstream = [modifier.name for modifier in stack.upstream_changes(obj)]
     if upstream:
         names = ", ".join(upstream)

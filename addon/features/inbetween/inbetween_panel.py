@@ -47,8 +47,10 @@ class SINEW_OT_bake_inbetweens(bpy.types.Operator):
             manager.progress_end()
         if not baked:
             return {"CANCELLED"}
-        names = ", ".join(f"{one.bones} bones into {one.action.name}" for one in baked)
-        self.report({"INFO"}, f"Baked {names}")
+        names = (
+            tr("{count} bones into {action}", count=each.bones, action=each.action.name) for each in baked
+        )
+        self.report({"INFO"}, tr("Baked {names}", names=", ".join(names)))
         return {"FINISHED"}
 
 

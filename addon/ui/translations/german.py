@@ -273,6 +273,7 @@ TEXTS = {
     "Deform all meshes of the character by this method": (
         "Alle Maschen der Figur mit dieser Methode verformen"
     ),
+    "Method {name}: choose one of {names}": "Methode {name}: Wähle eine von {names}",
     "Its short name, as in the table of methods": "Ihr kurzer Name wie in der Tabelle der Methoden",
     "Open the Sinew Tab": "Reiter Sinew öffnen",
     "Show the tab Sinew in the sidebar of the 3D view": (
@@ -555,7 +556,9 @@ TEXTS = {
         "dreht sich zu weit für diesen Spline und könnte springen: Setze ein Schlüsselbild dazwischen, "
         "oder wähle eine Methode, die auf Splines weich ist"
     ),
+    "{count} bones into {action}": "{count} Knochen in {action}",
     # Bake
+    "Baked {names}": "Gebacken: {names}",
     "Bake": "Backen",
     "Bake…": "Backen…",
     "Bake Shapes…": "Formen backen…",
@@ -711,6 +714,8 @@ TEXTS = {
     "Distance is to": "Abstand zu",
     "Sinew deforms nothing here now": "Sinew verformt hier zurzeit nichts",
     # Worst frames
+    "worst at {frame}": "am schlechtesten bei {frame}",
+    "{measure} over {count} frames: {result}": "{measure} über {count} Einzelbilder: {result}",
     "Worst Frames": "Schlechteste Einzelbilder",
     "Find Worst Frames": "Schlechteste Einzelbilder suchen",
     "Find Worst Frames over the Scene's Frames": "Schlechteste Einzelbilder der Szene suchen",
@@ -750,6 +755,9 @@ TEXTS = {
     "Check over the Action's Frames": "Über die Einzelbilder der Aktion prüfen",
     "Sinew checks poses": "Sinew prüft Posen",
     "{count} kinds of faults": "{count} Arten von Fehlern",
+    "Checked: weights, {poses}": "Geprüft: Gewichtungen, {poses}",
+    "pose of frame {frame}": "Pose von Einzelbild {frame}",
+    "poses of frames {first} to {last}": "Posen der Einzelbilder {first} bis {last}",
     "Nothing found": "Nichts gefunden",
     "Nothing found: {names}": "Nichts gefunden: {names}",
     "Select": "Auswählen",
@@ -807,6 +815,12 @@ TEXTS = {
     "{what}; then check again. Locked groups stay as they are": (
         "{what}; dann noch einmal prüfen. Gesperrte Gruppen bleiben, wie sie sind"
     ),
+    "Mended {what}. Checked again: {count} left": "Behoben: {what}. Noch einmal geprüft: {count} übrig",
+    "{done}; {count} could not be": "{done}; bei {count} ging es nicht",
+    "{count} vertex": "{count} Punkt",
+    "{count} vertices": "{count} Punkte",
+    "{count} group": "{count} Gruppe",
+    "{count} groups": "{count} Gruppen",
     "Limit Total": "Anzahl begrenzen",
     "Keep the largest weights of these vertices, and scale them to a sum of 1": (
         "Die größten Gewichtungen dieser Punkte behalten und auf die Summe 1 skalieren"
