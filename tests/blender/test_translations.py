@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's texts in other languages. Blender as a module has no languages: what a whole one shows is in
-test_panel_in_window.py."""
+"""Sinew's texts in other languages. Blender as a module has no languages: what is shown is tested in a whole
+one, by language_in_window.py."""
 
 from __future__ import annotations
 
 import string
 
+import in_window
 import messages
 import pytest
 from sinew_addon.ui import translations
@@ -59,3 +60,37 @@ def test_translations_end_as_their_texts_do(language):
 def test_texts_put_together_are_translated_as_a_whole():
     """No text with words is put together in a panel's code: it would stay English."""
     assert messages.joined_in_code() == []
+
+
+@pytest.fixture(scope="module")
+def facts(tmp_path_factory) -> dict:
+    return in_window.facts_of("language_in_window", tmp_path_factory.mktemp("window"), "five_meshes")
+
+
+def test_blender_shows_german(facts):
+    german = translations.LANGUAGES["de"]
+    shown = facts["german"]
+    assert shown["panel"] == german["Stages and Scale"]
+    assert shown["operator"] == german["Rebind"]
+    assert shown["tooltip"] == german[facts["english"]["tooltip"]]
+    assert shown["own tooltip"] == german[facts["english"]["own tooltip"]]
+    assert shown["choice"] == german["Dual Quaternion"]
+    assert shown["put together"] == "4 Maschen"
+    assert shown["state"] == "Linear anstelle von Armature"
+    assert shown["blender's"] == "Punktgruppe"
+
+
+def test_english_comes_back(facts):
+    english = facts["english"]
+    assert english["panel"] == "Stages and Scale"
+    assert english["operator"] == "Rebind"
+    assert english["put together"] == "4 meshes"
+    assert english["state"] == "Linear Blend in the place of Armature"
+
+
+def test_translations_go_with_the_add_on(facts):
+    assert facts["without"] == "Stages and Scale"
+
+
+def test_panels_in_german_print_no_errors(facts):
+    assert facts["printed"] == []
