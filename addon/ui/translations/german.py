@@ -253,7 +253,7 @@ TEXTS = {
     "Each mesh keeps its shape; one that joins others has their settings": (
         "Jede Masche behält ihre Form; eine, die zu anderen hinzukommt, bekommt deren Einstellungen"
     ),
-    "Rebind": "Neu binden",
+    "Rebind": "Binden",
     "Read meshes, weights and bones anew, and switch on again after an error": (
         "Maschen, Gewichtungen und Knochen neu lesen und nach einem Fehler wieder einschalten"
     ),
