@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In Blender's window, with Sinew's zip: what it says in German, and after a change of language. Prints "FACTS"
-and a line of JSON; a picture of the panel lies in the folder.
+"""In Blender's window, with Sinew's zip: what it says in German, and after a change of language. Prints
+"FACTS" and a line of JSON; a picture of the panel lies in the folder.
 
     blender --factory-startup --enable-event-simulate --python language_in_window.py -- sinew.zip FOLDER
 """

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import string
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,7 +44,7 @@ TYPES = (
 def shown() -> dict[str, str]:
     """Each text, and a place where it is."""
     found: dict[str, str] = {}
-    for source in (_of_classes(), _of_data(), _of_lists(), _of_code()):
+    for source in (_of_classes(), _of_data(), _of_lists(), _of_code(), _of_phrases()):
         for text, where in source:
             # What has no letters reads alike in all languages.
             if any(letter.isalpha() for letter in text):
@@ -120,6 +121,15 @@ def _of_code() -> Iterator[tuple[str, str]]:
                 yield text, f"{path.relative_to(ADDON)}:{node.lineno}"
 
 
+def _of_phrases() -> Iterator[tuple[str, str]]:
+    """Sentences that are made below the panels."""
+    for path in sorted(ADDON.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "phrase":
+                for text in _constants(node.args[0]):
+                    yield text, f"{path.relative_to(ADDON)}:{node.lineno}"
+
+
 def joined_in_code() -> list[str]:
     """Where panels put words and values together without tr()."""
     found = []
@@ -132,6 +142,24 @@ def joined_in_code() -> list[str]:
         where = f"{path.relative_to(ADDON)}:{getattr(node, 'lineno', 0)}"
         found += [f"{where}: {word}" for word in words if any(letter.isalpha() for letter in word)]
     return found
+
+
+def wrong_values() -> list[str]:
+    """Where tr() or phrase() is given other values than the names that its text has in braces."""
+    found = []
+    for path in sorted(ADDON.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call) or getattr(node.func, "id", "") not in ("tr", "phrase"):
+                continue
+            for text in _constants(node.args[0]):
+                if names_in_braces(text) != {keyword.arg for keyword in node.keywords}:
+                    found.append(f"{path.relative_to(ADDON)}:{node.lineno}: {text}")
+    return found
+
+
+def names_in_braces(text: str) -> set[str]:
+    fields = (name for _before, name, _format, _conversion in string.Formatter().parse(text))
+    return {name for name in fields if name is not None}
 
 
 def _drawing_code() -> Iterator[tuple[Path, ast.AST]]:

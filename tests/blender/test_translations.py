@@ -4,20 +4,13 @@ one, by language_in_window.py."""
 
 from __future__ import annotations
 
-import string
-
 import in_window
 import messages
 import pytest
+from messages import names_in_braces
 from sinew_addon.ui import translations
 
 LANGUAGES = list(translations.LANGUAGES)
-
-
-def names_in_braces(text: str) -> set[str]:
-    return {
-        name for _before, name, _format, _conversion in string.Formatter().parse(text) if name is not None
-    }
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -55,6 +48,10 @@ def test_translations_end_as_their_texts_do(language):
     allowed = {"Rebound"}
     texts = translations.LANGUAGES[language].items()
     assert [text for text, other in texts if end(text) != end(other) and text not in allowed] == []
+
+
+def test_texts_are_given_the_values_that_they_name():
+    assert messages.wrong_values() == []
 
 
 def test_texts_put_together_are_translated_as_a_whole():

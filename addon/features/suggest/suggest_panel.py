@@ -12,7 +12,7 @@ from ...core.suggestion import CRITERIA, Criterion, Worst
 from ...io import units
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
-from ...ui.sidebar import Sidebar, draw_text
+from ...ui.sidebar import Sidebar, characters, draw_text
 from ...ui.translations import counted, tr
 from . import suggest
 
@@ -58,12 +58,16 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
             column = layout.column(align=True)
             button = column.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
             button.method = name
-            # Two columns: the sidebar is narrow.
-            values = column.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-            for criterion in CRITERIA:
-                value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
-                icon = "CHECKMARK" if name in best[criterion.name] else "BLANK1"
-                values.label(text=f"{tr(criterion.label)} {value}", icon=icon)
+            texts = {
+                criterion.name: f"{tr(criterion.label)} {value_text(context.scene, criterion, worst)}"
+                for criterion in CRITERIA
+                for worst in [suggestion.worst.get((name, criterion.name))]
+            }
+            # Two columns, where the sidebar has room for them beside their icons.
+            columns = 2 if max(map(len, texts.values())) <= characters(context) // 2 - 4 else 1
+            values = column.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
+            for criterion, text in texts.items():
+                values.label(text=text, icon="CHECKMARK" if name in best[criterion] else "BLANK1")
         for criterion in CRITERIA:
             draw_text(layout, context, f"{tr(criterion.label)}: {tr(criterion.text)}")
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 import bpy
 
+from ...core.phrases import Phrase
 from . import german
 
 # By the language alone, which Blender takes for all of its countries: de for de_DE.
@@ -19,11 +20,16 @@ LANGUAGES = {"de": german.TEXTS}
 CONTEXTS = (bpy.app.translations.contexts.default, bpy.app.translations.contexts.operator_default)
 
 
-def tr(text: str, **values: object) -> str:
+def tr(text: str, /, **values: object) -> str:
     """A text of the interface in the user's language.
 
     values  for its names in braces
     """
+    if isinstance(text, Phrase):
+        parts = {
+            name: tr(value) if isinstance(value, Phrase) else value for name, value in text.values.items()
+        }
+        return bpy.app.translations.pgettext_iface(text.template).format(**parts)
     found = bpy.app.translations.pgettext_iface(text)
     return found.format(**values) if values else found
 

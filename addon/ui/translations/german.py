@@ -138,7 +138,7 @@ TEXTS = {
     "How far one iteration moves a vertex: 1 to the middle of its neighbours": (
         "Wie weit eine Wiederholung einen Punkt bewegt: 1 bis in die Mitte seiner Nachbarn"
     ),
-    "Smooth Type": "Art der Glättung",
+    "Smooth Type": "Glättung",
     "Whether neighbours count alike, or by the length of their edges": (
         "Ob Nachbarn gleich viel zählen oder nach der Länge ihrer Kanten"
     ),
@@ -201,7 +201,7 @@ TEXTS = {
         "Alle Maschen der Figur mit Sinew verformen; aus: mit Blenders Skelett-Modifikator, um beide zu "
         "vergleichen"
     ),
-    "Own Settings": "Eigene Einstellungen",
+    "Own Settings": "Eigenständig",
     "This mesh keeps settings of its own: what is set for the character does not change it": (
         "Diese Masche behält eigene Einstellungen: Was für die Figur eingestellt wird, ändert sie nicht"
     ),
@@ -327,7 +327,7 @@ TEXTS = {
     "Method Presets": "Voreinstellungen für Methoden",
     "Save Method as Preset…": "Methode als Voreinstellung sichern…",
     # Stages in the panel
-    "Stages and Scale": "Stufen und Skalierung",
+    "Stages and Scale": "Stufen, Skala",
     "By": "Nach",
     "Choose the vertex group that says where it takes over": (
         "Wähle die Punktgruppe, die sagt, wo sie übernimmt"
@@ -366,7 +366,7 @@ TEXTS = {
     "Bones": "Knochen",
     "{bones}, {weighted} with weights": "{bones}, {weighted} mit Gewichtungen",
     "Influences": "Einflüsse",
-    "{mean} a vertex, at most {most}": "{mean} je Punkt, höchstens {most}",
+    "{mean} a vertex, at most {most}": "{mean} je Punkt, max. {most}",
     "Last frame": "Letztes Bild",
     # Who deforms a mesh, and why
     "{method} in the place of {modifiers}": "{method} anstelle von {modifiers}",
@@ -407,7 +407,57 @@ TEXTS = {
     "it shows a heat map": "sie zeigt eine Wärmekarte",
     "it has instances on its vertices or faces": "sie hat Instanzen auf ihren Punkten oder Flächen",
     "another object reads its mesh": "ein anderes Objekt liest ihre Masche",
+    "{name} is in front": "{name} ist davor",
+    "{name} follows": "{name} folgt",
+    "{bare} of {count} vertices have no weights and stay at rest": (
+        "{bare} von {count} Punkten haben keine Gewichtungen und bleiben in Ruhe"
+    ),
+    "Groups without a bone: {names}": "Gruppen ohne Knochen: {names}",
+    "The mesh lacks the shape keys {first}, {second} and {third}: all vertices are blended linearly": (
+        "Der Masche fehlen die Formschlüssel {first}, {second} und {third}: Alle Punkte werden linear "
+        "gemischt"
+    ),
+    "The mesh has no faces, which {method} needs: its vertices are blended linearly": (
+        "Die Masche hat keine Flächen, die {method} braucht: Ihre Punkte werden linear gemischt"
+    ),
+    "mmd_tools deforms a part of this mesh by its shape key {name}: unbind its SDEF, then Sinew "
+    "deforms all of it": (
+        "mmd_tools verformt einen Teil dieser Masche mit ihrem Formschlüssel {name}: Löse dessen SDEF, "
+        "dann verformt Sinew sie ganz"
+    ),
+    "no vertex group {name}": "Keine Punktgruppe {name}",
+    "no vertex group is chosen": "Keine Punktgruppe gewählt",
+    "{missing} for the mix: nothing is mixed": "{missing} zum Mischen: Es wird nichts gemischt",
+    "{missing} for {stage}: it acts everywhere": "{missing} für {stage}: Es wirkt überall",
+    "{name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this Hook; "
+    "give it a vertex group": (
+        "{name}: Hinter Sinews Modifikator bewegt Blender andere Punkte als die, die diesem Haken "
+        "zugewiesen sind; gib ihm eine Punktgruppe"
+    ),
+    "Armature modifiers apart from the first stay Blender's: {names}; move them right behind it to "
+    "have Sinew deform by them": (
+        "Skelett-Modifikatoren abseits des ersten bleiben bei Blender: {names}; rücke sie direkt hinter "
+        "ihn, damit Sinew sie übernimmt"
+    ),
+    "{name} stays Blender's: {reason}": "{name} bleibt bei Blender: {reason}",
+    "its Rest Source is not Original Coords, but a shape of its own": (
+        "seine Ruhequelle sind nicht die ursprünglichen Koordinaten, sondern eine eigene Form"
+    ),
+    "{names} between it and the Armature modifier": "{names} zwischen ihm und dem Skelett-Modifikator",
+    "it is on in the viewport or in renders alone": "er ist nur im Ansichtsfenster oder nur beim Rendern an",
+    "its settings are animated": "seine Einstellungen sind animiert",
+    "{names} beyond what Delta Mush takes": "{names} außerhalb dessen, was Delta Mush annimmt",
+    "modifiers in front make other vertices, which it does not smooth": (
+        "Modifikatoren davor machen andere Punkte, die Delta Mush nicht glättet"
+    ),
+    "Delta Mush is on already": "Delta Mush ist schon an",
     # Precomputation
+    "Without its {what} it has the Armature modifier's shape: finding them was stopped": (
+        "Ohne {what} hat sie die Form des Skelett-Modifikators: Die Suche wurde angehalten"
+    ),
+    "It has the Armature modifier's shape until its {what} are found": (
+        "Bis {what} gefunden sind, hat sie die Form des Skelett-Modifikators"
+    ),
     "Watch Precomputation": "Vorberechnung verfolgen",
     "Show in the status bar how far precomputations are; Esc stops them": (
         "In der Statusleiste zeigen, wie weit Vorberechnungen sind; Esc hält sie an"
@@ -466,9 +516,9 @@ TEXTS = {
     "How far a vertex leaves or nears its bone's axis": (
         "Wie weit sich ein Punkt von der Achse seines Knochens entfernt oder ihr nähert"
     ),
-    "Flips": "Umklappungen",
+    "Flips": "Falten",
     "How much of the surface is folded over": "Wie viel der Oberfläche umgeklappt ist",
-    "Crossings": "Durchdringungen",
+    "Crossings": "Schnitte",
     "How many triangles cross others that they do not at rest": (
         "Wie viele Dreiecke andere durchdringen, die sie in Ruhe nicht durchdringen"
     ),
@@ -776,6 +826,10 @@ TEXTS = {
     ),
     "What {names} in front makes of the mesh is not checked: it has no vertices to select": (
         "Was {names} davor aus der Masche macht, wird nicht geprüft: Es hat keine Punkte zum Auswählen"
+    ),
+    "More than {count} influences": "Mehr als {count} Einflüsse",
+    "Use Weights > Limit Total with a limit of {count}, then Normalize All.": (
+        "Nutze Gewichtungen > Totale Grenze mit der Grenze {count}, dann Alles normalisieren."
     ),
     "Vertices without weights": "Punkte ohne Gewichtungen",
     "Assign them to a bone's group, or parent the mesh again with automatic weights for them.": (
