@@ -594,7 +594,7 @@ TEXTS = {
         "Setze Schlüsselbilder für Posen: Sinew bewegt die Knochen dazwischen"
     ),
     "Plays {played} of {count} bones; meanwhile their curves are muted": (
-        "Bewegt {played} von {count} Knochen; ihre Kurven sind so lange stummgeschaltet"
+        "Bewegt {played} von {count} Knochen; deren Kurven sind stummgeschaltet"
     ),
     "{bone} {reason}: Blender's curves play": "{bone} {reason}: Blenders Kurven bewegen ihn",
     "rotates by 180 degrees or more from key to key, and takes the shorter way: key in between": (
@@ -727,7 +727,7 @@ TEXTS = {
     "The area of the faces around a vertex, as a part of their area at rest.": (
         "Der Inhalt der Flächen um einen Punkt, als Teil ihres Inhalts in Ruhe."
     ),
-    "Flipped faces": "Umgeklappte Flächen",
+    "Flipped faces": "Umgeklappt",
     "The share of a vertex's faces that are flipped against the bones that move them.": (
         "Der Anteil der Flächen eines Punktes, die gegen die sie bewegenden Knochen umgeklappt sind."
     ),
