@@ -41,6 +41,7 @@ def register() -> None:
         precomputing,
         preferences,
         presets,
+        translations,
     )
 
     # Panels appear in this order.
@@ -50,6 +51,7 @@ def register() -> None:
         *(suggest, inbetween, bake, compare, heat, diagnose),
     ):
         _register_classes(owner.CLASSES)
+    translations.register()
     properties.register()
     stored_vertex_data.register()
     character.register()
@@ -78,7 +80,7 @@ def unregister() -> None:
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
-        from .ui import character, manual, menus, modifier_panel, precomputing
+        from .ui import character, manual, menus, modifier_panel, precomputing, translations
 
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
@@ -95,6 +97,7 @@ def unregister() -> None:
         character.unregister()
         stored_vertex_data.unregister()
         properties.unregister()
+        translations.unregister()
     while _registered:
         bpy.utils.unregister_class(_registered.pop())
 

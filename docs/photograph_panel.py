@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Installs Sinew's zip in a Blender with a window, works its panel on human.blend and photographs it.
 
-blender --factory-startup human.blend --python docs/photograph_panel.py -- sinew-VERSION.zip panel.png
+blender --factory-startup human.blend --python docs/photograph_panel.py -- sinew-VERSION.zip panel.png [de_DE]
+
+The language of Blender's interface may be given; without it, it is English.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import window
 
-ZIP, PICTURE = window.arguments()
+ZIP, PICTURE, *LANGUAGE = window.arguments()
 FRAME = 16
 
 
@@ -45,7 +47,15 @@ def set_up() -> dict[str, object]:
     }
 
 
+def speak(language: str) -> None:
+    view = bpy.context.preferences.view
+    view.language = language
+    view.use_translate_interface = view.use_translate_tooltips = view.use_translate_reports = True
+
+
 def steps():
+    if LANGUAGE:
+        speak(LANGUAGE[0].name)
     facts = set_up()
     window.open_sidebar()
     with window.in_view3d("WINDOW"):

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import SinewError
+from ..core.phrases import Phrase, phrase
 from ..io.animation_paths import animated_paths
 from . import properties, stack, stage_settings, upstream_proxy
 
@@ -36,15 +37,18 @@ def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier)
     beyond = _beyond_bounds(modifier)
     reasons = (
         (modifier.rest_source != "ORCO", "its Rest Source is not Original Coords, but a shape of its own"),
-        (bool(between), f"{', '.join(between)} between it and the Armature modifier"),
+        (bool(between), phrase("{names} between it and the Armature modifier", names=", ".join(between))),
         (modifier.show_viewport != modifier.show_render, "it is on in the viewport or in renders alone"),
         (any(each.startswith(path) for each in animated_paths(obj)), "its settings are animated"),
-        (bool(beyond), f"{', '.join(beyond)} beyond what Delta Mush takes"),
+        (bool(beyond), phrase("{names} beyond what Delta Mush takes", names=", ".join(beyond))),
         (_has_other_vertices(obj), "modifiers in front make other vertices, which it does not smooth"),
         ("delta_mush" in stage_settings.names_on(properties.of(obj)), "Delta Mush is on already"),
     )
     reason = next((reason for holds, reason in reasons if holds), "")
-    return f"{modifier.name} stays Blender's: {reason}" if reason else ""
+    if not reason:
+        return ""
+    whole = reason if isinstance(reason, Phrase) else phrase(reason)
+    return phrase("{name} stays Blender's: {reason}", name=modifier.name, reason=whole)
 
 
 def _between(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.phrases import phrase
 from . import stack
 
 
@@ -12,8 +13,11 @@ def misled(obj: bpy.types.Object) -> list[str]:
     """A sentence for each Hook behind that has a list of vertices. Behind Geometry Nodes, as behind all that
     do more than deform, Blender takes as many of the first vertices instead (seen on 4.2 to 5.2)."""
     return [
-        f"{hook.name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this "
-        "Hook; give it a vertex group"
+        phrase(
+            "{name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this Hook; "
+            "give it a vertex group",
+            name=hook.name,
+        )
         for hook in stack.downstream(obj)
         if hook.type == "HOOK" and stack.is_on(hook)
         if len(hook.vertex_indices) and not hook.vertex_group

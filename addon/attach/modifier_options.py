@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.influences import GroupWeights, entries_of_bones
+from ..core.phrases import phrase
 from ..core.rig import Bones, Weighting
 from . import stack
 
@@ -66,7 +67,10 @@ def differences(obj: bpy.types.Object) -> list[str]:
     others = [m for m in obj.modifiers if m.type == "ARMATURE" and m not in skinned and m.object is not None]
     if others:
         found.append(
-            f"Armature modifiers apart from the first stay Blender's: {', '.join(m.name for m in others)}; "
-            "move them right behind it to have Sinew deform by them"
+            phrase(
+                "Armature modifiers apart from the first stay Blender's: {names}; move them right behind it "
+                "to have Sinew deform by them",
+                names=", ".join(modifier.name for modifier in others),
+            )
         )
     return found

@@ -13,6 +13,7 @@ from enum import Enum
 
 import bpy
 
+from ..core.phrases import phrase
 from ..io import mesh_io
 from . import node_group, properties, stack
 
@@ -71,10 +72,10 @@ def obstacle(obj: bpy.types.Object) -> str:
     """Why Blender has to compute the normals of a skinned object, as a clause; empty where it need not."""
     for modifier in stack.upstream(obj):
         if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
-            return f"{modifier.name} is in front"
+            return phrase("{name} is in front", name=modifier.name)
     for modifier in stack.downstream(obj):
         if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
-            return f"{modifier.name} follows"
+            return phrase("{name} follows", name=modifier.name)
     if obj.instance_type != "NONE":
         return "it has instances on its vertices or faces"
     if is_read_by_others(obj):

@@ -10,6 +10,7 @@ from itertools import permutations
 import numpy as np
 
 from .influences import SMALLEST_WEIGHT_SUM, GroupWeights, Influences
+from .phrases import phrase
 from .rig import Weighting
 from .vectors import dots
 
@@ -101,11 +102,14 @@ def check_weights(
         ),
         Finding(
             "many_influences",
-            f"More than {most_influences} influences",
+            phrase("More than {count} influences", count=most_influences),
             np.flatnonzero(counts > most_influences),
             f"More than {most_influences} bones move these vertices; game engines drop the smallest weights, "
             "and the shape differs there.",
-            f"Use Weights > Limit Total with a limit of {most_influences}, then Normalize All.",
+            phrase(
+                "Use Weights > Limit Total with a limit of {count}, then Normalize All.",
+                count=most_influences,
+            ),
         ),
     ]
     boneless = [name for name in weighting.bones.groups_without_bone(group_names) if name not in masks]

@@ -12,6 +12,7 @@ import numpy as np
 from .bendy import spread_over_joints
 from .envelopes import Envelopes, fill_from_envelopes, multiply_by_envelopes
 from .influences import Entries, Influences
+from .phrases import phrase
 
 NAMES_SHOWN = 5
 
@@ -167,9 +168,10 @@ def describe_rig(weighting: Weighting, points: np.ndarray, boneless: Sequence[st
     warnings = []
     bare = int((counts == 0).sum())
     if bare:
-        warnings.append(f"{bare} of {len(counts)} vertices have no weights and stay at rest")
+        text = "{bare} of {count} vertices have no weights and stay at rest"
+        warnings.append(phrase(text, bare=bare, count=len(counts)))
     if boneless:
-        warnings.append(f"Groups without a bone: {_shortened(boneless)}")
+        warnings.append(phrase("Groups without a bone: {names}", names=_shortened(boneless)))
     return RigFacts(
         vertices=len(counts),
         bones=len(bones.names),

@@ -6,13 +6,17 @@ from __future__ import annotations
 import numpy as np
 
 from .influences import Influences
+from .phrases import phrase
 
 METHOD = "sdef"
 KEYS = ("mmd_sdef_c", "mmd_sdef_r0", "mmd_sdef_r1")
 """Shape keys whose points are C, R0 and R1."""
 
-MISSING = (
-    f"The mesh lacks the shape keys {KEYS[0]}, {KEYS[1]} and {KEYS[2]}: all vertices are blended linearly"
+MISSING = phrase(
+    "The mesh lacks the shape keys {first}, {second} and {third}: all vertices are blended linearly",
+    first=KEYS[0],
+    second=KEYS[1],
+    third=KEYS[2],
 )
 
 ELSEWHERE = "mmd_sdef_skinning"

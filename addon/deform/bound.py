@@ -14,6 +14,7 @@ from ..attach import attach, properties, stage_settings
 from ..attach.modifier_options import ModifierOptions
 from ..attach.properties import METHODS
 from ..core import sdef
+from ..core.phrases import phrase
 from ..core.rig import Bones, RigFacts, Weighting
 from ..core.session import Binding, SkinStack, SkinStage
 from ..core.stage_mesh import StageMesh
@@ -62,7 +63,10 @@ class Bound:
         return [
             *([sdef.MISSING] if lacks_keys else []),
             *(
-                f"The mesh has no faces, which {METHODS[name].label} needs: its vertices are blended linearly"
+                phrase(
+                    "The mesh has no faces, which {method} needs: its vertices are blended linearly",
+                    method=phrase(METHODS[name].label),
+                )
                 for name in methods
                 if name in METHODS and "topology" in METHODS[name].needs
                 if triangles is not None and not len(triangles)

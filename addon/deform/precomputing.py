@@ -21,6 +21,7 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread
 from ..core.errors import SinewError
 from ..core.file_cache import FileCache
+from ..core.phrases import phrase
 from ..core.precompute import Precomputation, precomputations
 from ..core.spaces import SAME_SPACE
 from ..core.vertex_data import PROVIDERS, VertexData
@@ -78,7 +79,7 @@ def take_results(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
         try:
             has_ended |= data.take_result(method)
         except Exception as error:
-            what = PROVIDERS[method].what
+            what = phrase(PROVIDERS[method].what)
             skinned.evaluation.user_error = SinewError(
                 f"{obj.name}: its {what} can not be found: {type(error).__name__}: {error}; press Rebind, or "
                 "Remove"
@@ -107,10 +108,11 @@ def waits_for(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
     if not missing:
         return ""
     data, method = missing[0]
-    what = PROVIDERS[method].what
+    what = phrase(PROVIDERS[method].what)
     if data.is_stopped(method):
-        return f"Without its {what} it has the Armature modifier's shape: finding them was stopped"
-    return f"It has the Armature modifier's shape until its {what} are found"
+        text = "Without its {what} it has the Armature modifier's shape: finding them was stopped"
+        return phrase(text, what=what)
+    return phrase("It has the Armature modifier's shape until its {what} are found", what=what)
 
 
 def store_in_meshes(pairs: list[tuple[bpy.types.Object, SkinnedObject | None]]) -> None:

@@ -10,6 +10,7 @@ from ..attach import attach, hooks, properties, stack, stage_settings
 from ..attach.modifier_options import ModifierOptions, differences
 from ..core import sdef
 from ..core.errors import SinewError
+from ..core.phrases import phrase
 from ..core.rig import RigFacts, Weighting, describe_rig
 from ..core.spaces import transformed
 from ..io import armature_io, mesh_io
@@ -47,8 +48,11 @@ def _other_sdef(obj: bpy.types.Object) -> list[str]:
     if block is None or block.mute:
         return []
     return [
-        f"mmd_tools deforms a part of this mesh by its shape key {sdef.ELSEWHERE}: unbind its SDEF, then "
-        "Sinew deforms all of it"
+        phrase(
+            "mmd_tools deforms a part of this mesh by its shape key {name}: unbind its SDEF, then Sinew "
+            "deforms all of it",
+            name=sdef.ELSEWHERE,
+        )
     ]
 
 
@@ -60,11 +64,13 @@ def _missing_groups(obj: bpy.types.Object) -> list[str]:
     groups, found = stage_settings.vertex_groups(settings), []
     for stage in stage_settings.names_on(settings):
         name = groups.get(stage, "")
-        missing = f"no vertex group {name}" if name else "no vertex group is chosen"
+        missing = phrase("no vertex group {name}", name=name) if name else phrase("no vertex group is chosen")
         if stage == "mix" and name not in obj.vertex_groups:
-            found.append(f"{missing} for the mix: nothing is mixed")
+            found.append(phrase("{missing} for the mix: nothing is mixed", missing=missing))
         elif name and name not in obj.vertex_groups:
-            found.append(f"{missing} for {stage_settings.STAGES[stage].label}: it acts everywhere")
+            label = phrase(stage_settings.STAGES[stage].label)
+            text = "{missing} for {stage}: it acts everywhere"
+            found.append(phrase(text, missing=missing, stage=label))
     return found
 
 

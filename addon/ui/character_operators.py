@@ -12,6 +12,7 @@ from ..deform import session
 from . import character
 from .operators import OnSinewObjects, sinew_targets
 from .sidebar import Sidebar
+from .translations import tip, tr
 
 
 class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
@@ -25,11 +26,13 @@ class SINEW_OT_use_method(OnSinewObjects, bpy.types.Operator):
     @classmethod
     def description(cls, _context: bpy.types.Context, given: bpy.types.OperatorProperties) -> str:
         method = properties.METHODS.get(given.method)
-        return cls.bl_description if method is None else method.description
+        return tip(cls.bl_description if method is None else method.description)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.method not in properties.METHODS:
-            self.report({"ERROR"}, f"Method {self.method!r}: choose one of {', '.join(properties.METHODS)}")
+            names = ", ".join(properties.METHODS)
+            text = tr("Method {name}: choose one of {names}", name=repr(self.method), names=names)
+            self.report({"ERROR"}, text)
             return {"CANCELLED"}
         character.set_method(context, self.method)
         return {"FINISHED"}
@@ -68,7 +71,8 @@ class SINEW_OT_own_settings(OnSinewObjects, bpy.types.Operator):
         name = self.name or (active.name if active is not None else "")
         obj = next((o for o in sinew_targets(context) if o.name == name), None)
         if obj is None:
-            self.report({"ERROR"}, f"{name or 'The active object'} is no mesh that Sinew deforms")
+            name = name or tr("The active object")
+            self.report({"ERROR"}, tr("{name} is no mesh that Sinew deforms", name=name))
             return {"CANCELLED"}
         settings = properties.of(obj)
         settings.is_own = not settings.is_own
@@ -89,7 +93,7 @@ class SINEW_OT_open_tab(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if _view3d(context) is not None:
             return True
-        cls.poll_message_set("This window has no 3D view")
+        cls.poll_message_set(tr("This window has no 3D view"))
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:

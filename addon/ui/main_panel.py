@@ -11,6 +11,7 @@ from . import character, operators, precomputing, state_text
 from .presets import SINEW_PT_method_presets
 from .settings_layout import draw_method, draw_stages
 from .sidebar import Sidebar, draw_text, names_text
+from .translations import counted, tr
 
 
 class SINEW_PT_main(Sidebar, bpy.types.Panel):
@@ -24,14 +25,15 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
         layout = self.layout
         meshes = operators.targets(context)
         for other in attach.not_meshes(context.selected_objects):
-            text = f"{other.name} stays with its Armature modifier: Sinew deforms meshes only"
+            text = tr("{name} stays with its Armature modifier: Sinew deforms meshes only", name=other.name)
             draw_text(layout, context, text, icon="INFO")
         if not meshes:
             draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
             return
         waits = operators.waits_for_render()
         if waits:
-            draw_text(layout, context, f"{waits}: until then nothing can be changed", icon="INFO")
+            text = tr("{wait}: until then nothing can be changed", wait=tr(waits))
+            draw_text(layout, context, text, icon="INFO")
         column = layout.column()
         column.enabled = not waits
         _draw_title(column, context, meshes)
@@ -49,8 +51,9 @@ def _draw_title(
     names = [armature.name for armature in operators.armatures(context)] or [meshes[0].name]
     text = names_text(names, most=2)
     if len(meshes) > 1:
-        text += f" \u00b7 {len(meshes)} meshes"
-    layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if len(meshes) > 1 else "OUTLINER_OB_MESH")
+        text += f" \u00b7 {tr('{count} meshes', count=len(meshes))}"
+    icon = "OUTLINER_OB_ARMATURE" if len(meshes) > 1 else "OUTLINER_OB_MESH"
+    layout.label(text=text, icon=icon, translate=False)
 
 
 def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> None:
@@ -58,7 +61,9 @@ def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> Non
     if not count:
         return
     row = layout.row(align=True)
-    text = "Add Sinew" if len(meshes) == 1 else f"Add Sinew to {count} Mesh{'es' if count > 1 else ''}"
+    text = "Add Sinew"
+    if len(meshes) > 1:
+        text = counted(count, "Add Sinew to {count} Mesh", "Add Sinew to {count} Meshes")
     row.operator("sinew.add", text=text, icon="MOD_ARMATURE")
     row.operator_menu_enum("sinew.add", "method", text="", icon="DOWNARROW_HLT")
 
@@ -81,9 +86,10 @@ def _draw_character(
     column.active = shared.enabled
     draw_method(column, settings, lead)
     followers = [properties.of(obj) for obj in meshes if not properties.of(obj).is_own]
-    methods = {properties.method_label(settings.method) for settings in followers}
+    methods = {tr(properties.method_label(settings.method)) for settings in followers}
     if len(methods) > 1:
-        text = f"The meshes differ: {', '.join(sorted(methods))}. A method that you choose goes to all"
+        names = ", ".join(sorted(methods))
+        text = tr("The meshes differ: {names}. A method that you choose goes to all", names=names)
         draw_text(column, context, text, icon="INFO")
     state_text.draw_character(layout, context, meshes)
     precomputing.draw(layout, [(obj, session.state_of(obj)) for obj in meshes if properties.of(obj).enabled])
@@ -101,7 +107,7 @@ class SINEW_PT_stages(Sidebar, operators.OfSkinned, bpy.types.Panel):
         lead = character.lead(context)
         names = [] if lead is None else stage_settings.names_on(properties.of(lead))
         if names:
-            self.layout.label(text=", ".join(stage_settings.STAGES[name].label for name in names))
+            self.layout.label(text=", ".join(tr(stage_settings.STAGES[name].label) for name in names))
 
     def draw(self, context: bpy.types.Context) -> None:
         lead = character.lead(context)

@@ -10,6 +10,7 @@ from ..deform import session
 from . import character, operators, state_text
 from .settings_layout import draw_method, draw_stages
 from .sidebar import Sidebar, characters, draw_text, shortened
+from .translations import tr
 
 MOST_ROWS = 6
 
@@ -37,12 +38,12 @@ class SINEW_UL_meshes(bpy.types.UIList):
         row = layout.row(align=True)
         name = shortened(obj.name, characters(context) // 2)
         if not properties.has_sinew(obj):
-            row.label(text=name, icon="OUTLINER_OB_MESH")
+            row.label(text=name, icon="OUTLINER_OB_MESH", translate=False)
             row.operator("sinew.add", text="Add", emboss=False).name = obj.name
             return
         settings = properties.of(obj)
         split = row.split(factor=0.6)
-        split.label(text=name, icon=state_text.icon_of(obj))
+        split.label(text=name, icon=state_text.icon_of(obj), translate=False)
         method = split.row()
         method.active = settings.enabled and settings.is_own
         method.label(text=settings.method if settings.enabled else "off")
@@ -70,7 +71,7 @@ class SINEW_PT_meshes(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if properties.has_sinew(obj):
             _draw_details(layout, context, obj, is_alone=len(meshes) == 1)
         else:
-            text = f"{obj.name}: without Sinew, its Armature modifier deforms it"
+            text = tr("{name}: without Sinew, its Armature modifier deforms it", name=obj.name)
             draw_text(layout, context, text, icon="INFO")
 
 
@@ -99,18 +100,19 @@ def _draw_further_modifiers(layout: bpy.types.UILayout, settings: properties.Sin
         s.method != properties.SAME_METHOD for s in settings.replaced_modifiers
     ):
         for replaced in list(settings.replaced_modifiers)[1:]:
-            layout.prop(replaced, "method", text=replaced.name)
+            layout.prop(replaced, "method", text=replaced.name, translate=False)
 
 
 def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     armature, state = properties.of(obj).armature, session.state_of(obj)
-    rows = [("Armature", armature.name if armature else "none")]
+    rows = [("Armature", armature.name if armature else tr("none"))]
     if state is not None:
         facts = state.bound.facts
+        mean, weighted = f"{facts.mean_influences:.2f}", facts.weighted_bones
         rows += [
             ("Vertices", f"{facts.vertices:,}"),
-            ("Bones", f"{facts.bones}, {facts.weighted_bones} with weights"),
-            ("Influences", f"{facts.mean_influences:.2f} a vertex, at most {facts.most_influences}"),
+            ("Bones", tr("{bones}, {weighted} with weights", bones=facts.bones, weighted=weighted)),
+            ("Influences", tr("{mean} a vertex, at most {most}", mean=mean, most=facts.most_influences)),
         ]
         if not state.uses_builtin:
             rows.append(("Last frame", f"{state.shown.milliseconds:.2f} ms"))
@@ -118,7 +120,7 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     for name, value in rows:
         split = column.split(factor=0.4)
         split.label(text=name)
-        split.label(text=shortened(value))
+        split.label(text=shortened(value), translate=False)
 
 
 CLASSES = (SINEW_UL_meshes, SINEW_PT_meshes)

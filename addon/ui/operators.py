@@ -12,6 +12,7 @@ from ..attach.method_items import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..core.errors import SinewError
 from ..deform import session
+from .translations import counted, tr
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -100,7 +101,7 @@ def can_change(operator: type[bpy.types.Operator]) -> bool:
     """For poll()."""
     reason = waits_for_render()
     if reason:
-        operator.poll_message_set(reason)
+        operator.poll_message_set(tr(reason))
     return not reason
 
 
@@ -129,7 +130,8 @@ def _for_each(
         operator.report({"WARNING" if count else "ERROR"}, problem)
     if count == 0:
         return {"CANCELLED"}
-    operator.report({"INFO"}, f"{done} {count} mesh{'es' if count > 1 else ''}")
+    meshes = counted(count, "{count} mesh", "{count} meshes")
+    operator.report({"INFO"}, f"{tr(done)} {meshes}")
     return {"FINISHED"}
 
 
@@ -180,9 +182,11 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
             return can_change(cls)
         others = attach.not_meshes(context.selected_objects)
         if others:
-            cls.poll_message_set(f"{others[0].name} is no mesh: Sinew deforms meshes only")
+            text = tr("{name} is no mesh: Sinew deforms meshes only", name=others[0].name)
+            cls.poll_message_set(text)
         else:
-            cls.poll_message_set("Select a mesh with an Armature modifier, or an armature that deforms one")
+            text = tr("Select a mesh with an Armature modifier, or an armature that deforms one")
+            cls.poll_message_set(text)
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -208,7 +212,7 @@ class OnSinewObjects:
     def poll(cls, context: bpy.types.Context) -> bool:
         if has_sinew_targets(context):
             return can_change(cls)
-        cls.poll_message_set("Select a mesh that Sinew deforms, or its armature")
+        cls.poll_message_set(tr("Select a mesh that Sinew deforms, or its armature"))
         return False
 
 
@@ -273,7 +277,7 @@ class SINEW_OT_make_group(OnSinewObjects, _OfOneMesh, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.stage not in stage_settings.STAGES:
-            self.report({"ERROR"}, f"There is no stage {self.stage!r}")
+            self.report({"ERROR"}, tr("There is no stage {name}", name=repr(self.stage)))
             return {"CANCELLED"}
         objects = self.meant(sinew_targets(context))
         if not self.name:

@@ -11,6 +11,7 @@ from ..attach.subscribers import subscribers
 from ..core.precompute import precomputations
 from ..deform import precompute_watch, precomputing
 from ..deform.skinned_object import SkinnedObject
+from .translations import tr
 
 # Seconds between looks at whether there is still something to stop.
 INTERVAL = 0.2
@@ -78,13 +79,16 @@ def draw(layout: bpy.types.UILayout, pairs: Sequence[tuple[bpy.types.Object, Ski
             runs.setdefault(what, []).append(run.progress)
     for what, shares in runs.items():
         share = sum(shares) / len(shares)
-        meshes = f" of {len(shares)} meshes" if len(shares) > 1 else ""
+        found, done = tr(what), f"{share:.0%}"
+        text = tr("Finding {what}: {share}", what=found, share=done)
+        if len(shares) > 1:
+            text = tr("Finding {what} of {count} meshes: {share}", what=found, count=len(shares), share=done)
         row = layout.row(align=True)
-        row.progress(factor=share, text=f"Finding {what}{meshes}: {share:.0%}")
+        row.progress(factor=share, text=text, translate=False)
         row.operator("sinew.stop_precomputation", text="", icon="X")
     stopped = (what for obj, skinned in known for what in precomputing.stopped(obj, skinned))
     for what in dict.fromkeys(stopped):
-        layout.operator("sinew.precompute", text=f"Find {what}", icon="PLAY")
+        layout.operator("sinew.precompute", text=tr("Find {what}", what=tr(what)), icon="PLAY")
 
 
 def _show() -> None:
@@ -95,8 +99,8 @@ def _show() -> None:
     share = min((run.progress for run in runs), default=1.0)
     for window in bpy.context.window_manager.windows:
         if _watcher_of(window) is not None:
-            text = f"Sinew computes what its methods need: {share:.0%} (Esc stops)" if runs else None
-            window.workspace.status_text_set(text)
+            text = tr("Sinew computes what its methods need: {share} (Esc stops)", share=f"{share:.0%}")
+            window.workspace.status_text_set(text if runs else None)
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 for region in area.regions:

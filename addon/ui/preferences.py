@@ -10,6 +10,7 @@ import bpy
 from ..deform import safe_mode, session
 from . import menus
 from .sidebar import draw_text
+from .translations import tr
 
 
 def _changed(_preferences: SinewPreferences, context: bpy.types.Context) -> None:
@@ -30,8 +31,8 @@ class SinewPreferences(bpy.types.AddonPreferences):
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.prop(self, "safe_mode")
         if os.environ.get(safe_mode.VARIABLE) is not None:
-            value = os.environ[safe_mode.VARIABLE]
-            text = f"The environment variable {safe_mode.VARIABLE} decides: it is {value!r}"
+            name, value = safe_mode.VARIABLE, repr(os.environ[safe_mode.VARIABLE])
+            text = tr("The environment variable {name} decides: it is {value}", name=name, value=value)
             draw_text(self.layout, context, text, icon="INFO")
         menus.draw_shortcuts(self.layout, context)
 

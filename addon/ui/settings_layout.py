@@ -10,6 +10,7 @@ from ..attach import corrective_smooth, normals, properties, stage_settings
 from ..deform import method_needs, small_meshes
 from . import operators
 from .sidebar import draw_text
+from .translations import tr
 
 
 def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
@@ -74,7 +75,7 @@ def _draw_make_group(
     name = getattr(settings, stage).group
     if name in obj.vertex_groups or not (name or stage == "mix"):
         return
-    text = f"Make Vertex Group {name}" if name else "Make a Vertex Group"
+    text = tr("Make Vertex Group {name}", name=name) if name else "Make a Vertex Group"
     button = layout.operator("sinew.make_group", text=text, icon="GROUP_VERTEX")
     button.name, button.stage = only, stage
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import bpy
 
 from .. import native
+from .translations import tr
 
 # Characters of the interface font that fit a pixel of sidebar at scale 1; a label is not wrapped by Blender.
 CHARACTERS_PER_PIXEL = 0.14
@@ -46,7 +47,7 @@ def names_text(names: Sequence[str], most: int = 3) -> str:
     """Some names as one text, the others by their number."""
     text = ", ".join(shortened(name) for name in names[:most])
     more = len(names) - most
-    return f"{text} and {more} more" if more > 0 else text
+    return tr("{names} and {count} more", names=text, count=more) if more > 0 else text
 
 
 def draw_text(
@@ -56,12 +57,13 @@ def draw_text(
     icon: str = "NONE",
     alert: bool = False,
 ) -> None:
-    """Text broken into as many labels as the sidebar's width needs."""
+    """Text in the user's language, broken into as many labels as the sidebar's width needs."""
     width = max(20, characters(context) - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
     # A name may be longer than a line; broken, it would be two.
-    text = " ".join(shortened(word, width) for word in text.split())
+    text = " ".join(shortened(word, width) for word in tr(text).split())
     for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
+        shown = icon if number == 0 or icon == "NONE" else "BLANK1"
+        column.label(text=line, icon=shown, translate=False)

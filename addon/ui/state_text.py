@@ -9,6 +9,7 @@ from ..attach import hooks, properties
 from ..deform import session
 from ..deform.plan import MODES_OF_THE_MODIFIER, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
+from .translations import tr
 
 ICONS = {
     State.OFF: "MODIFIER_OFF",
@@ -35,12 +36,13 @@ def sentence_of(obj: bpy.types.Object) -> str:
     if settings.error:
         return settings.error
     if not settings.enabled:
-        return f"Off: {replaced} deforms it"
-    reason, method = reason_of(obj), properties.method_label(settings.method)
+        return tr("Off: {modifiers} deforms it", modifiers=replaced)
+    reason, method = tr(reason_of(obj)), tr(properties.method_label(settings.method))
     if state is None or uses_builtin(obj) or state.plan.state is State.WAITING:
-        return f"{method}. {reason or f'{replaced} deforms it until the next frame'}"
-    text = f"{method} in the place of {replaced}"
-    return f"{text}, after Blender's evaluation: {reason}" if reason else text
+        until = tr("{modifiers} deforms it until the next frame", modifiers=replaced)
+        return f"{method}. {reason or until}"
+    text = tr("{method} in the place of {modifiers}", method=method, modifiers=replaced)
+    return tr("{text}, after Blender's evaluation: {reason}", text=text, reason=reason) if reason else text
 
 
 def icon_of(obj: bpy.types.Object) -> str:
@@ -60,8 +62,11 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
     found = list(state.bound.lacks((settings.method, settings.mix.method)))
     if state.evaluation.failures:
         found.append(
-            f"{state.evaluation.failures} times not deformed within Blender's evaluation; last: "
-            f"{state.evaluation.failure}"
+            tr(
+                "{count} times not deformed within Blender's evaluation; last: {failure}",
+                count=state.evaluation.failures,
+                failure=tr(state.evaluation.failure),
+            )
         )
     found += state.bound.facts.warnings
     # A Hook may have come since.
@@ -76,7 +81,8 @@ def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
         draw_text(layout, context, reason_of(obj), icon="INFO")
     state = session.state_of(obj)
     if state is not None and state.plan.normals_reason:
-        draw_text(layout, context, f"Blender computes normals: {state.plan.normals_reason}", icon="INFO")
+        text = tr("Blender computes normals: {reason}", reason=tr(state.plan.normals_reason))
+        draw_text(layout, context, text, icon="INFO")
     for sentence in problems_of(obj):
         draw_text(layout, context, sentence, icon="ERROR")
 
@@ -96,11 +102,14 @@ def draw_character(
         if properties.of(obj).enabled and uses_builtin(obj):
             by_reason.setdefault(reason_of(obj), []).append(obj.name)
     for reason, names in by_reason.items():
-        who = f"All {len(meshes)} meshes" if len(names) == len(meshes) else names_text(names, most=2)
-        draw_text(layout, context, f"{who}: {reason}", icon="INFO")
+        who = names_text(names, most=2)
+        if len(names) == len(meshes):
+            who = tr("All {count} meshes", count=len(meshes))
+        draw_text(layout, context, f"{who}: {tr(reason)}", icon="INFO")
     warned = [obj.name for obj in meshes if not properties.of(obj).error and problems_of(obj)]
     if warned:
-        draw_text(layout, context, f"{names_text(warned)}: warnings, see Meshes", icon="ERROR")
+        text = tr("{names}: warnings, see Meshes", names=names_text(warned))
+        draw_text(layout, context, text, icon="ERROR")
 
 
 def uses_builtin(obj: bpy.types.Object) -> bool:

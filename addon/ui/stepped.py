@@ -12,6 +12,7 @@ import bpy
 from ..core.errors import SinewError
 from ..deform import evaluate, precompute_watch, session
 from ..io import pose_io
+from .translations import tr
 
 # The window draws in between: rarely enough to cost little, often enough for Esc.
 SECONDS_BETWEEN_REDRAWS = 0.1
@@ -79,7 +80,8 @@ class Stepped:
         if share is None:
             return self._finished(context)
         context.window_manager.progress_update(share)
-        context.workspace.status_text_set(f"{self.saying}: {share:.0%} (Esc stops)")
+        text = tr("{doing}: {share} (Esc stops)", doing=tr(self.saying), share=f"{share:.0%}")
+        context.workspace.status_text_set(text)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

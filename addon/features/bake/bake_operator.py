@@ -13,6 +13,7 @@ from ...core.errors import SinewError
 from ...core.frames import parse_frames
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.translations import tr
 from . import bake, bake_apart
 
 
@@ -96,7 +97,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         except BaseException:
             self.started.discard()
             raise
-        self.report({"INFO"}, f"Baked {self.started.what}")
+        self.report({"INFO"}, tr("Baked {names}", names=self.started.what))
         return {"FINISHED"}
 
     def _start(self, context: bpy.types.Context) -> bake.Started:

@@ -13,6 +13,7 @@ from mathutils import Vector
 
 from ...attach import properties
 from ...deform import evaluate, session
+from ...ui.translations import tr
 from . import comparison, comparison_state
 
 FONT = 0
@@ -49,11 +50,12 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     found = []
     originals = comparison.originals(state)
     if originals:
-        found.append((f"Original: {_method_label(originals[0])}", (1.0, 1.0, 1.0), originals))
+        text = tr("Original: {method}", method=_method_label(originals[0]))
+        found.append((text, (1.0, 1.0, 1.0), originals))
     for method in comparison_state.shown_methods(state):
         copies = groups.get(method, [])
         if copies:
-            found.append((properties.method_label(method), tuple(copies[0].color[:3]), copies))
+            found.append((tr(properties.method_label(method)), tuple(copies[0].color[:3]), copies))
     depsgraph = context.evaluated_depsgraph_get()
     placed = [(text, colour, _top(objects, context, depsgraph)) for text, colour, objects in found]
     return [label for label in placed if label[2] is not None]
@@ -62,7 +64,7 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
 def _method_label(obj: bpy.types.Object) -> str:
     settings = properties.of(obj)
     by_sinew = settings.enabled and session.state_of(obj) is not None
-    return properties.method_label(settings.method if by_sinew else evaluate.BLENDER)
+    return tr(properties.method_label(settings.method if by_sinew else evaluate.BLENDER))
 
 
 def _top(

@@ -11,6 +11,7 @@ from ...core.comparison import USUAL_METHODS
 from ...core.errors import SinewError
 from ...deform import evaluate
 from ...ui import operators
+from ...ui.translations import tr
 from . import comparison, comparison_state, framing
 
 
@@ -90,11 +91,11 @@ class SINEW_OT_compare(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode.startswith("EDIT"):
-            cls.poll_message_set("Leave edit mode first")
+            cls.poll_message_set(tr("Leave edit mode first"))
             return False
         if operators.armatures(context) or _compared(context):
             return operators.can_change(cls)
-        cls.poll_message_set("Select a mesh that an armature deforms, or the armature")
+        cls.poll_message_set(tr("Select a mesh that an armature deforms, or the armature"))
         return False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -7,6 +7,7 @@ import bpy
 
 from ...attach import properties
 from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import tr
 from . import comparison, comparison_state
 
 
@@ -47,7 +48,7 @@ def _draw_arrangement(
         column.prop(state, "second", text="")
         (shown,) = comparison_state.shown_methods(state)
         layout.operator("sinew.flip_comparison", text="Flip", icon="UV_SYNC_SELECT")
-        draw_text(layout, context, f"Shown: {properties.method_label(shown)}")
+        draw_text(layout, context, tr("Shown: {method}", method=tr(properties.method_label(shown))))
 
 
 CLASSES = (SINEW_PT_comparison,)

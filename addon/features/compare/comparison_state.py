@@ -61,14 +61,14 @@ class SinewComparison(bpy.types.PropertyGroup):
         update=_changed,
     )
     first: bpy.props.EnumProperty(
-        name="First",
+        name="First Method",
         description="The method that is shown before a flip",
         items=_compared_methods,
         options=set(),
         update=_changed,
     )
     second: bpy.props.EnumProperty(
-        name="Second",
+        name="Second Method",
         description="The method that is shown after a flip",
         items=_compared_methods,
         options=set(),

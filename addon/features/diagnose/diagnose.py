@@ -21,6 +21,7 @@ from ...core.rotations import rotations_of
 from ...deform import evaluate, events, group_uses, session
 from ...io import armature_io, mesh_io
 from ...ui import stepped
+from ...ui.translations import tr
 from ..pages import measure
 
 
@@ -75,7 +76,8 @@ def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_infl
     readings = [_read(obj, depsgraph) for obj in objects]
     for reading in readings:
         reading.look(scene.frame_current, depsgraph)
-        _keep(reading, most_influences, f"pose of frame {scene.frame_current}")
+        poses = tr("pose of frame {frame}", frame=scene.frame_current)
+        _keep(reading, most_influences, poses)
 
 
 def check_frames(
@@ -93,8 +95,9 @@ def check_frames(
             for reading in readings:
                 reading.look(frame, depsgraph)
             yield (number + 1) / len(frames)
+    poses = tr("poses of frames {first} to {last}", first=frames[0], last=frames[-1])
     for reading in readings:
-        _keep(reading, most_influences, f"poses of frames {frames[0]} to {frames[-1]}", over)
+        _keep(reading, most_influences, poses, over)
 
 
 def of(obj: bpy.types.Object) -> Check | None:

@@ -12,6 +12,7 @@ from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
+from ...ui.translations import counted, tip, tr
 from . import diagnose, mending
 
 NAMES_SHOWN = 5
@@ -22,7 +23,7 @@ class _OnDeformed:
     def poll(cls, context: bpy.types.Context) -> bool:
         if _checkable(context):
             return True
-        cls.poll_message_set("Select a mesh that an armature deforms, or the armature")
+        cls.poll_message_set(tr("Select a mesh that an armature deforms, or the armature"))
         return False
 
 
@@ -67,7 +68,7 @@ class SINEW_OT_check_frames(_OnDeformed, stepped.Stepped, bpy.types.Operator):
 
 def _tell(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
     kinds = sum(len(diagnose.of(obj).findings) for obj in _checkable(context))
-    operator.report({"INFO"}, f"{kinds} kinds of faults" if kinds else "Nothing found")
+    operator.report({"INFO"}, tr("{count} kinds of faults", count=kinds) if kinds else "Nothing found")
     return {"FINISHED"}
 
 
@@ -83,14 +84,15 @@ class SINEW_OT_select_finding(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = context.scene.objects.get(self.object)
         if obj is None:
-            self.report({"ERROR"}, f"{self.object} is not in this scene any more; press Check again")
+            text = tr("{name} is not in this scene any more; press Check again", name=self.object)
+            self.report({"ERROR"}, text)
             return {"CANCELLED"}
         try:
             count = diagnose.select(obj, self.finding, context)
         except SinewError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Selected {_vertices(count)}")
+        self.report({"INFO"}, counted(count, "Selected {count} vertex", "Selected {count} vertices"))
         return {"FINISHED"}
 
 
@@ -113,13 +115,15 @@ class SINEW_OT_mend(bpy.types.Operator):
 
     @classmethod
     def description(cls, _context: bpy.types.Context, given: bpy.types.OperatorProperties) -> str:
-        return f"{mending.ALL[given.how].description}; then check again. Locked groups stay as they are"
+        text = tip("{what}; then check again. Locked groups stay as they are")
+        return text.format(what=tip(mending.ALL[given.how].description))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, manager = context.scene, context.window_manager
         obj = scene.objects.get(self.object)
         if obj is None:
-            self.report({"ERROR"}, f"{self.object} is not in this scene any more; press Check again")
+            text = tr("{name} is not in this scene any more; press Check again", name=self.object)
+            self.report({"ERROR"}, text)
             return {"CANCELLED"}
         most = scene.sinew_most_influences
         manager.progress_begin(0.0, 1.0)
@@ -133,7 +137,8 @@ class SINEW_OT_mend(bpy.types.Operator):
         finally:
             manager.progress_end()
         left = next((each.count for each in diagnose.of(obj).findings if each.name == self.finding), 0)
-        self.report({"INFO"}, f"Mended {done}. Checked again: {left:,} left")
+        text = tr("Mended {what}. Checked again: {count} left", what=done, count=f"{left:,}")
+        self.report({"INFO"}, text)
         return {"FINISHED"}
 
 
@@ -158,13 +163,15 @@ class SINEW_PT_diagnostics(Sidebar, bpy.types.Panel):
             if len(known) == 1 or obj.name not in clean:
                 _draw_check(layout.box(), context, obj, found)
         if clean and len(known) > 1:
-            draw_text(layout, context, f"Nothing found: {names_text(clean)}", icon="CHECKMARK")
+            text = tr("Nothing found: {names}", names=names_text(clean))
+            draw_text(layout, context, text, icon="CHECKMARK")
 
 
 def _draw_check(
     layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, found: diagnose.Check
 ) -> None:
-    layout.label(text=shortened(obj.name, characters(context) - 8), icon="OUTLINER_OB_MESH")
+    name = shortened(obj.name, characters(context) - 8)
+    layout.label(text=name, icon="OUTLINER_OB_MESH", translate=False)
     if found.stale:
         text = "Weights, groups or bones have changed since: press Check again"
         draw_text(layout, context, text, icon="FILE_REFRESH", alert=True)
@@ -174,23 +181,24 @@ def _draw_check(
         _draw_finding(column, context, obj, finding)
     if not found.findings:
         column.label(text="Nothing found", icon="CHECKMARK")
-    draw_text(column, context, f"Checked: weights, {found.frames}")
+    draw_text(column, context, tr("Checked: weights, {poses}", poses=found.frames))
     upstream = [modifier.name for modifier in stack.upstream_changes(obj)]
     if upstream:
         names = ", ".join(upstream)
-        text = f"What {names} in front makes of the mesh is not checked: it has no vertices to select"
+        what = "What {names} in front makes of the mesh is not checked: it has no vertices to select"
+        text = tr(what, names=names)
         draw_text(column, context, text, icon="INFO")
 
 
 def _draw_finding(
     layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, finding: Finding
 ) -> None:
-    draw_text(layout, context, f"{finding.title}: {finding.count:,}", icon="ERROR")
+    draw_text(layout, context, f"{tr(finding.title)}: {finding.count:,}", icon="ERROR")
     if finding.groups:
         draw_text(layout, context, names_text(finding.groups, NAMES_SHOWN))
     draw_text(layout, context, finding.advice)
     if len(finding.vertices):
-        text = f"Select {_vertices(len(finding.vertices)).title()}"
+        text = counted(len(finding.vertices), "Select {count} Vertex", "Select {count} Vertices")
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
         button.object, button.finding = obj.name, finding.name
     mends = mending.MENDS.get(finding.name, ())
@@ -200,10 +208,6 @@ def _draw_finding(
         button = grid.operator("sinew.mend", text=each.label)
         button.object, button.finding, button.how = obj.name, finding.name, each.name
     layout.separator(factor=0.5)
-
-
-def _vertices(count: int) -> str:
-    return f"{count:,} vert{'ices' if count != 1 else 'ex'}"
 
 
 CLASSES = (

@@ -14,6 +14,7 @@ from ...core.diagnostics import Finding
 from ...core.errors import SinewError
 from ...core.mend import Rows, WeightMender
 from ...io import mesh_io
+from ...ui.translations import counted, tr
 from . import diagnose
 
 # How far from the mirrored place a vertex may be, as a part of the mesh's diagonal.
@@ -74,7 +75,8 @@ def mend(obj: bpy.types.Object, finding: str, how: str, most_influences: int) ->
         raise SinewError(f"{obj.name}: {_NOTHING[how]}")
     mesh_io.write_group_weights(obj, rows)
     left = len(found.vertices) - len(rows)
-    return f"{len(rows):,} vertices" + (f"; {left:,} could not be" if left else "")
+    done = counted(len(rows), "{count} vertex", "{count} vertices")
+    return tr("{done}; {count} could not be", done=done, count=f"{left:,}") if left else done
 
 
 _NOTHING = {
@@ -93,7 +95,7 @@ def _remove(obj: bpy.types.Object, found: Finding) -> str:
         raise SinewError(f"{obj.name}: these groups are locked")
     for group in groups:
         obj.vertex_groups.remove(group)
-    return f"{len(groups)} group{'s' if len(groups) > 1 else ''}"
+    return counted(len(groups), "{count} group", "{count} groups")
 
 
 def _rows(

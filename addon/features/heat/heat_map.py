@@ -9,6 +9,7 @@ import numpy as np
 from ...attach import properties
 from ...core.heat import HeatScale
 from ...core.metrics import Measured
+from ...ui.translations import joined, tr
 from . import heat_legend, heat_nodes, live, measures
 from .measures import SinewMeasures
 
@@ -72,7 +73,7 @@ def _equal(inputs: tuple, last: tuple | None) -> bool:
 def _title(settings: SinewMeasures, shown: live.Pairs) -> str:
     """Of what, under which methods."""
     methods = list(dict.fromkeys(properties.method_label(properties.of(obj).method) for obj, _state in shown))
-    text = f"{settings.metric.label}, {' and '.join(methods)}"
-    if settings.quantity == "distance":
-        text += f" against {properties.method_label(settings.other)}"
-    return text
+    text = f"{tr(settings.metric.label)}, {joined(methods)}"
+    if settings.quantity != "distance":
+        return text
+    return tr("{text} against {method}", text=text, method=tr(properties.method_label(settings.other)))

@@ -11,6 +11,7 @@ from ...attach import properties
 from ...deform import evaluate
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
+from ...ui.translations import tr
 from . import measures, worst_frames
 
 
@@ -52,9 +53,11 @@ class SINEW_OT_worst_frames(_Scans, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         worst = worst_frames.scans[context.scene.session_uid].worst()
-        text = f"worst at {worst[0][0]:g}" if worst else "nothing at any frame"
+        text = tr("worst at {frame}", frame=f"{worst[0][0]:g}") if worst else tr("nothing at any frame")
         scan = worst_frames.scans[context.scene.session_uid]
-        self.report({"INFO"}, f"{scan.metric.label} over {len(scan.frames)} frames: {text}")
+        measure, count = tr(scan.metric.label), len(scan.frames)
+        text = tr("{measure} over {count} frames: {result}", measure=measure, count=count, result=text)
+        self.report({"INFO"}, text)
         return {"FINISHED"}
 
 

@@ -11,10 +11,11 @@ from ...deform import session
 from ...io import units
 from ...ui import operators
 from ...ui.sidebar import Sidebar, draw_text
+from ...ui.translations import joined, tr
 from . import heat_operators, live, measures, redraw, worst_frames
 
 # What the number is that a frame is bad by.
-_WORST = {"stretch_rms": "{} RMS", "area_rms": "{} RMS", "flipped_area": "{} of the area"}
+_WORST = {"stretch_rms": "{value} RMS", "area_rms": "{value} RMS", "flipped_area": "{value} of the area"}
 
 
 class SINEW_PT_measures(Sidebar, operators.OfSkinned, bpy.types.Panel):
@@ -72,14 +73,17 @@ def rows(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
     def entry(unit: str, name: str, signed: bool = False) -> str:
         return units.text(scene, unit, measured.entry(name), signed)
 
+    def between(low: str, high: str) -> str:
+        return tr("{low} to {high}", low=low, high=high)
+
     return [
         ("Volume", entry("share", "volume_change", signed=True)),
         ("Area", entry("share", "area_change", signed=True)),
-        ("Stretch", f"{entry('ratio', 'stretch_min')} to {entry('ratio', 'stretch_max')}"),
+        ("Stretch", between(entry("ratio", "stretch_min"), entry("ratio", "stretch_max"))),
         ("Stretch, RMS", entry("share", "stretch_rms")),
         ("Flipped faces", f"{measured.entry('flipped_faces'):,}"),
-        ("Bulge", f"{entry('length', 'bulge_min')} to {entry('length', 'bulge_max', signed=True)}"),
-        ("Distance", f"at most {entry('length', 'distance_max')}"),
+        ("Bulge", between(entry("length", "bulge_min"), entry("length", "bulge_max", signed=True))),
+        ("Distance", tr("at most {value}", value=entry("length", "distance_max"))),
         ("Distance, RMS", entry("length", "distance_rms")),
     ]
 
@@ -95,13 +99,17 @@ class SINEW_PT_worst_frames(Sidebar, bpy.types.Panel):
         scan = worst_frames.scans.get(context.scene.session_uid)
         if scan is None:
             return
-        methods = " and ".join(properties.METHODS[name].label for name in scan.methods)
-        draw_text(layout, context, f"{scan.metric.label}, {methods}, {len(scan.frames)} frames")
+        methods = joined(properties.METHODS[name].label for name in scan.methods)
+        measure, count = tr(scan.metric.label), len(scan.frames)
+        text = tr("{measure}, {methods}, {count} frames", measure=measure, methods=methods, count=count)
+        draw_text(layout, context, text)
         column = layout.column(align=True)
         unit = "length" if scan.metric.unit == "length" else "share"
         for frame, value in scan.worst():
-            number = _WORST.get(scan.metric.worst, "{}").format(units.text(context.scene, unit, value))
-            text = f"Frame {frame:g}:  {number}"
+            number = units.text(context.scene, unit, value)
+            if scan.metric.worst in _WORST:
+                number = tr(_WORST[scan.metric.worst], value=number)
+            text = tr("Frame {frame}:  {value}", frame=f"{frame:g}", value=number)
             is_here = frame == context.scene.frame_current
             column.operator("sinew.go_to_frame", text=text, depress=is_here).frame = frame
         if not scan.worst():

@@ -189,12 +189,12 @@ def _play(scene: bpy.types.Scene, acted: set[int] | None = None) -> None:
         except ReferenceError:
             raise
         except Exception as error:
-            text = (
+            message = (
                 f"{armature.name}: {type(error).__name__}: {error}; Blender's curves play until a method is "
                 "chosen anew"
             )
-            log.error("%s", text, exc_info=error)
-            session.errors[uid] = text
+            log.error("%s", message, exc_info=error)
+            session.errors[uid] = message
     if any(uid in session.errors for uid in session.players):
         _settle()
 

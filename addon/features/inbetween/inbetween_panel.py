@@ -9,6 +9,7 @@ from ...core import inbetween as core_inbetween
 from ...core.errors import SinewError
 from ...ui import operators
 from ...ui.sidebar import Sidebar, characters, draw_text, shortened
+from ...ui.translations import tr
 from . import inbetween, inbetween_bake, inbetween_handlers
 
 
@@ -29,7 +30,7 @@ class SINEW_OT_bake_inbetweens(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if any(inbetween.is_on(armature) for armature in operators.armatures(context)):
             return operators.can_change(cls)
-        cls.poll_message_set("Choose a method for the in-betweens of a selected armature")
+        cls.poll_message_set(tr("Choose a method for the in-betweens of a selected armature"))
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -46,8 +47,10 @@ class SINEW_OT_bake_inbetweens(bpy.types.Operator):
             manager.progress_end()
         if not baked:
             return {"CANCELLED"}
-        names = ", ".join(f"{one.bones} bones into {one.action.name}" for one in baked)
-        self.report({"INFO"}, f"Baked {names}")
+        names = (
+            tr("{count} bones into {action}", count=each.bones, action=each.action.name) for each in baked
+        )
+        self.report({"INFO"}, tr("Baked {names}", names=", ".join(names)))
         return {"FINISHED"}
 
 
@@ -65,7 +68,7 @@ class SINEW_PT_inbetweens(Sidebar, bpy.types.Panel):
         for armature in armatures:
             box = layout.box()
             name = shortened(armature.name, characters(context) - 4)
-            box.label(text=name, icon="OUTLINER_OB_ARMATURE")
+            box.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
             box.prop(armature, "sinew_inbetween", text="")
             if inbetween.is_on(armature):
                 box.row().prop(armature, "sinew_inbetween_path", expand=True)
@@ -83,15 +86,17 @@ def _draw_playing(layout: bpy.types.UILayout, context: bpy.types.Context, armatu
     elif player is None or not player.bones:
         draw_text(layout, context, "Key poses of bones: Sinew moves them between the keys", icon="INFO")
     else:
-        text = f"Plays {player.bones} of {len(armature.pose.bones)} bones; meanwhile their curves are muted"
+        what = "Plays {played} of {count} bones; meanwhile their curves are muted"
+        text = tr(what, played=player.bones, count=len(armature.pose.bones))
         draw_text(layout, context, text, icon="INFO")
     if player is not None:
         for bone, reason in sorted(player.left.items()):
-            draw_text(layout, context, f"{bone} {reason}: Blender's curves play", icon="ERROR")
+            text = tr("{bone} {reason}: Blender's curves play", bone=bone, reason=tr(reason))
+            draw_text(layout, context, text, icon="ERROR")
         if player.pose is not None and player.pose.far:
             names = ", ".join(player.pose.far)
             reason = core_inbetween.TOO_FAR[armature.sinew_inbetween_path]
-            draw_text(layout, context, f"{names} {reason}", icon="ERROR")
+            draw_text(layout, context, f"{names} {tr(reason)}", icon="ERROR")
 
 
 CLASSES = (SINEW_OT_bake_inbetweens, SINEW_PT_inbetweens)

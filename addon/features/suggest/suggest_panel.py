@@ -12,7 +12,8 @@ from ...core.suggestion import CRITERIA, Criterion, Worst
 from ...io import units
 from ...ui import operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
-from ...ui.sidebar import Sidebar, draw_text
+from ...ui.sidebar import Sidebar, characters, draw_text
+from ...ui.translations import counted, tr
 from . import suggest
 
 
@@ -48,28 +49,32 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if suggestion is None:
             return
         count = len(suggestion.frames)
-        draw_text(
-            layout, context, f"The worst of {count} frame{'s' if count > 1 else ''}, the best method marked"
-        )
+        one = "The worst of {count} frame, the best method marked"
+        many = "The worst of {count} frames, the best method marked"
+        draw_text(layout, context, counted(count, one, many))
         used = {properties.of(obj).method for obj in operators.sinew_targets(context)}
         best = {criterion.name: suggestion.best(criterion) for criterion in CRITERIA}
         for name in suggestion.rank():
             column = layout.column(align=True)
             button = column.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
             button.method = name
-            # Two columns: the sidebar is narrow.
-            values = column.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-            for criterion in CRITERIA:
-                value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
-                icon = "CHECKMARK" if name in best[criterion.name] else "BLANK1"
-                values.label(text=f"{criterion.label} {value}", icon=icon)
+            texts = {
+                criterion.name: f"{tr(criterion.label)} {value_text(context.scene, criterion, worst)}"
+                for criterion in CRITERIA
+                for worst in [suggestion.worst.get((name, criterion.name))]
+            }
+            # Two columns, where the sidebar has room for them beside their icons.
+            columns = 2 if max(map(len, texts.values())) <= characters(context) // 2 - 4 else 1
+            values = column.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
+            for criterion, text in texts.items():
+                values.label(text=text, icon="CHECKMARK" if name in best[criterion] else "BLANK1")
         for criterion in CRITERIA:
-            draw_text(layout, context, f"{criterion.label}: {criterion.text}")
+            draw_text(layout, context, f"{tr(criterion.label)}: {tr(criterion.text)}")
 
 
 def value_text(scene: bpy.types.Scene, criterion: Criterion, worst: Worst | None) -> str:
     if worst is None:
-        return "none"
+        return tr("none")
     if criterion.unit == "count":
         return f"{worst.value:,.0f}"
     return units.text(scene, criterion.unit, worst.value, signed=criterion.name == "volume")

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sentences with values in them that the panel can say in the user's language."""
+
+from __future__ import annotations
+
+
+class Phrase(str):
+    """A sentence in English that keeps what it was made of: where no panel shows it, it is plain text.
+
+    template  the sentence with names in braces
+    values    for those names; phrases among them are translated, too
+    """
+
+    __slots__ = ("template", "values")
+
+    template: str
+    values: dict[str, object]
+
+
+def phrase(template: str, /, **values: object) -> Phrase:
+    made = Phrase(template.format(**values))
+    made.template, made.values = template, values
+    return made

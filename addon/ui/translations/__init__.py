@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew's texts in other languages, by Blender's own mechanism (`bpy.app.translations`).
+
+Blender looks up every label, tooltip and choice itself, and what a layout is given as text. Only texts that
+are put together go through tr() and counted().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from ...core.phrases import Phrase
+from . import german
+
+# By the language alone, which Blender takes for all of its countries: de for de_DE.
+LANGUAGES = {"de": german.TEXTS}
+# Blender asks for an operator's label, and the text of its buttons, in a context of their own.
+CONTEXTS = (bpy.app.translations.contexts.default, bpy.app.translations.contexts.operator_default)
+
+
+def tr(text: str, /, **values: object) -> str:
+    """A text of the interface in the user's language.
+
+    values  for its names in braces
+    """
+    if isinstance(text, Phrase):
+        parts = {
+            name: tr(value) if isinstance(value, Phrase) else value for name, value in text.values.items()
+        }
+        return bpy.app.translations.pgettext_iface(text.template).format(**parts)
+    found = bpy.app.translations.pgettext_iface(text)
+    return found.format(**values) if values else found
+
+
+def counted(count: int, one: str, many: str) -> str:
+    """The text for one, or for another number, which is {count} in both."""
+    return tr(one if count == 1 else many, count=f"{count:,}")
+
+
+def joined(texts: Iterable[str]) -> str:
+    """Translated texts as one: "A and B"."""
+    return f" {tr('and')} ".join(tr(text) for text in texts)
+
+
+def tip(text: str) -> str:
+    """A tooltip, which the user can have in English apart from the interface."""
+    return bpy.app.translations.pgettext_tip(text)
+
+
+def register() -> None:
+    messages = {
+        language: {(context, text): translated for text, translated in texts.items() for context in CONTEXTS}
+        for language, texts in LANGUAGES.items()
+    }
+    bpy.app.translations.register(__name__, messages)
+
+
+def unregister() -> None:
+    bpy.app.translations.unregister(__name__)
