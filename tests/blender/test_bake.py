@@ -482,6 +482,37 @@ def test_several_moving_objects(arm, tmp_path, kind, stretched):
         assert scenes.worst(points, expected) <= 3e-6 * scenes.diagonal(first)
 
 
+@pytest.mark.parametrize("kind", core.EXPORTS)
+def test_what_hangs_on_bones_goes_along(arm, tmp_path, kind):
+    """A hat on a bone and a feather on the hat; not what hangs on the armature itself, nor what is hidden."""
+    obj, path = arm
+    armature, hung = obj.modifiers["Armature"].object, {}
+    for name in ("hat", "feather", "beside", "hidden"):
+        mesh = bpy.data.meshes.new(name)
+        points = np.random.default_rng(len(hung)).normal(size=(60, 3))
+        mesh.from_pydata(points.tolist(), [], np.arange(60).reshape(15, 4).tolist())
+        hung[name] = bpy.data.objects.new(name, mesh)
+        bpy.context.scene.collection.objects.link(hung[name])
+        hung[name].parent = hung["hat"] if name == "feather" else armature
+        if name not in ("feather", "beside"):
+            hung[name].parent_type, hung[name].parent_bone = "BONE", armature.data.bones[-1].name
+    hung["hidden"].hide_set(True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    frames = [1, 5, 11]
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([hung["hat"], hung["feather"]], frames)
+    run_sinew("bake", path, "--method", METHOD, "--to", kind, "--frames", "1-11", "--out", tmp_path / "out")
+    read = read_elsewhere(tmp_path / "out" / f"arm{SUFFIXES[kind]}", frames, tmp_path)
+    shapes = {name.lower(): points for name, points in read.items() if name not in ("uvs", "materials")}
+    assert len(shapes) == 3, list(shapes)
+    for name, wanted in zip(("feather", "hat"), expected, strict=True):
+        assert scenes.worst(wanted[0], wanted[-1]) > 0.5
+        (points,) = (found for known, found in shapes.items() if name in known)
+        nearest = np.linalg.norm(points[0][:, None] - wanted[0][None], axis=2).argmin(axis=1)
+        assert set(nearest) == set(range(60))
+        assert scenes.worst(points, wanted[:, nearest]) <= 3e-6 * scenes.diagonal(obj)
+
+
 @pytest.mark.parametrize("kind", core.KINDS)
 def test_frames_before_zero(arm, tmp_path, kind):
     obj, path = arm

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ...attach import properties
 from ...core import bake as core
 from ...core.errors import SinewError
 from ...core.output import remove, writing
@@ -63,10 +64,15 @@ SAMPLED = 0.5
 
 
 class _Export:
-    """What ends as one file: written at `unfinished` first, then moved to `path`."""
+    """What ends as one file: written at `unfinished` first, then moved to `path`.
+
+    meshes   that Sinew deforms
+    carried  that go along: carried_by()
+    """
 
     kind: str
     meshes: list[bpy.types.Object]
+    carried: list[bpy.types.Object]
     frames: Sequence[float]
     path: Path
     unfinished: Path
@@ -115,15 +121,17 @@ class SceneExport(_Export):
             raise SinewError(f"This Blender is built without {kind}; bake to another kind")
         core.check_frames(kind, frames)
         self.meshes, self.kind, self.frames, self.path = meshes, kind, frames, path
+        self.carried = carried_by(meshes)
         self.first, self.last = int(frames[0]), int(frames[-1])
-        self.textures = usd_textures.Textures(meshes if kind == "usd" else (), path, overwrite)
-        self.unfinished = _prepare(meshes, frames, path)
+        textured = [*meshes, *self.carried] if kind == "usd" else ()
+        self.textures = usd_textures.Textures(textured, path, overwrite)
+        self.unfinished = _prepare(self, path)
 
     def sample(self) -> Generator[float, None, None]:
         scene = bpy.context.scene
         before = scene.frame_float, scene.frame_start, scene.frame_end
         try:
-            with _selected(self.meshes), self.textures.on_disk():
+            with _selected([*self.meshes, *self.carried]), self.textures.on_disk():
                 scene.frame_start, scene.frame_end = self.first, self.last
                 with _told_frames(self, 0.0):
                     _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
@@ -156,9 +164,10 @@ class MorphExport(_Export):
     def __init__(self, meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> None:
         core.check_frames(GLTF, frames)
         self.meshes, self.kind, self.frames, self.path = meshes, GLTF, frames, path
-        self.unfinished = _prepare(meshes, frames, path)
+        self.carried = carried_by(meshes)
+        self.unfinished = _prepare(self, path)
         self.made: list[bpy.types.Object] = []
-        self.samples: dict[bpy.types.Object, list[np.ndarray]] = {obj: [] for obj in meshes}
+        self.samples: dict[bpy.types.Object, list[np.ndarray]] = {obj: [] for obj in (*meshes, *self.carried)}
         self.spaces: dict[bpy.types.Object, Matrix] = {}
 
     def sample(self) -> Generator[float, None, None]:
@@ -167,8 +176,9 @@ class MorphExport(_Export):
         try:
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
-                for obj, samples in self.samples.items():
+                for obj in self.meshes:
                     _check_driven(obj)
+                for obj, samples in self.samples.items():
                     points = self._in_first_space(obj)
                     if samples and len(points) != len(samples[0]):
                         raise SinewError(
@@ -256,13 +266,30 @@ class MorphExport(_Export):
         self.made.clear()
 
 
-def _prepare(meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> Path:
+def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The visible meshes that hang on a bone of an armature that deforms one of `meshes`, by themselves or by
+    a parent: eyes, armour, props."""
+    armatures = {armature for obj in meshes for armature in properties.of(obj).armatures}
+
+    def hangs_on_bone(obj: bpy.types.Object) -> bool:
+        if obj.parent is None or obj.parent in armatures:
+            return obj.parent is not None and obj.parent_type == "BONE"
+        return hangs_on_bone(obj.parent)
+
+    return [
+        obj
+        for obj in bpy.context.view_layer.objects
+        if obj.type == "MESH" and obj not in meshes and obj.visible_get() and hangs_on_bone(obj)
+    ]
+
+
+def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
     """Where the export goes at first; raises SinewError where there is no room for it."""
-    for obj in meshes:
+    for obj in export.meshes:
         _check_driven(obj)
-    vertices = sum(len(evaluate.final_points(obj)) for obj in meshes)
+    vertices = sum(len(evaluate.final_points(obj)) for obj in (*export.meshes, *export.carried))
     # Points and normals.
-    core.check_space(path.parent, 24 * vertices * len(frames))
+    core.check_space(path.parent, 24 * vertices * len(export.frames))
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     remove(unfinished)
     with writing(path):
