@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 import sinew
 import sinew_addon
+from bl_ui.utils import PresetPanel
 from sinew_addon import registration
 from sinew_addon.core import metrics, suggestion
 from sinew_addon.core.vertex_data import PROVIDERS
@@ -60,8 +61,10 @@ def _of_classes() -> Iterator[tuple[str, str]]:
             rna = getattr(bpy.ops.sinew, cls.bl_idname.partition(".")[2]).get_rna_type()
             yield rna.name, cls.__name__
             yield rna.description, cls.__name__
-        for attribute in ("bl_label", "bl_description"):
-            yield getattr(cls, attribute, None) or "", cls.__name__
+        # Of a panel of presets, Blender writes the name of the one chosen last into bl_label.
+        if not issubclass(cls, PresetPanel):
+            yield getattr(cls, "bl_label", ""), cls.__name__
+        yield getattr(cls, "bl_description", None) or "", cls.__name__
         for prop in rna.properties:
             if prop.identifier not in base.bl_rna.properties:
                 yield from _of_property(prop, f"{cls.__name__}.{prop.identifier}")
