@@ -25,9 +25,8 @@ from ..core.phrases import phrase
 from ..core.precompute import Precomputation, precomputations
 from ..core.spaces import SAME_SPACE
 from ..core.vertex_data import PROVIDERS, VertexData
-from ..io import armature_io
+from ..io import addon_preferences, armature_io
 from .method_needs import is_method_animated, methods_of
-from .safe_mode import ADDON
 from .skinned_object import SkinnedObject
 
 VARIABLE = "SINEW_CACHE"
@@ -155,6 +154,11 @@ def forget_stopped() -> None:
 def begin() -> None:
     """On registration."""
     precomputations.waits = bpy.app.background
+    open_cache()
+
+
+def open_cache() -> None:
+    """In the folder that the environment, or else the preferences name."""
     folder = _cache_folder()
     precomputations.cache = None if folder is None else FileCache(folder, CACHE_BYTES)
 
@@ -199,12 +203,16 @@ def _request(
 
 
 def _cache_folder() -> Path | None:
-    """Of the extension, or of the user where Sinew is a package of Python's; None for none."""
+    """That of the extension where nobody names one, or of the user where Sinew is a package of Python's; None
+    for none."""
     given = os.environ.get(VARIABLE)
     if given is not None:
         return Path(given) if given not in ("", "0") else None
+    chosen = addon_preferences.value("cache_folder", default="")
+    if chosen:
+        return Path(bpy.path.abspath(chosen))
     with contextlib.suppress(ValueError, OSError):
-        return Path(bpy.utils.extension_path_user(ADDON, path="cache"))
+        return Path(bpy.utils.extension_path_user(addon_preferences.ADDON, path="cache"))
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA")
     elif sys.platform == "darwin":

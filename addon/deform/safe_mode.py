@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import os
 
-import bpy
+from ..io import addon_preferences
 
 VARIABLE = "SINEW_SAFE"
-ADDON = __package__.rpartition(".")[0]
 
 _forced: bool | None = None
 
@@ -20,8 +19,7 @@ def is_on() -> bool:
     wanted = os.environ.get(VARIABLE)
     if wanted is not None:
         return wanted not in ("", "0")
-    preferences = getattr(bpy.context.preferences.addons.get(ADDON), "preferences", None)
-    return preferences is not None and preferences.safe_mode
+    return addon_preferences.value("safe_mode", default=False)
 
 
 def set_forced(on: bool | None) -> None:

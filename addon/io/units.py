@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured values as people read them, in the units of the scene."""
+"""Measured values as people read them, in the units that the preferences choose."""
 
 from __future__ import annotations
 
 import bpy
 
+from . import addon_preferences
+
+# Of lengths.
+OF_SCENE, MILLIMETRES, NONE = "SCENE", "MILLIMETRES", "NONE"
 # Below this part of a unit a length is none.
 LEAST_LENGTH = 1e-6
 
@@ -23,9 +27,12 @@ def text(scene: bpy.types.Scene, unit: str, value: float, signed: bool = False) 
 
 
 def _length(settings: bpy.types.UnitSettings, value: float) -> str:
-    if settings.system == "NONE":
+    chosen = addon_preferences.value("units", default=OF_SCENE)
+    if chosen == NONE or settings.system == "NONE":
         return f"{value:.3g} units"
     value *= settings.scale_length
     if abs(value) < LEAST_LENGTH:
         value = 0.0
+    if chosen == MILLIMETRES:
+        return f"{1000.0 * value:.3g} mm"
     return bpy.utils.units.to_string(settings.system, "LENGTH", value, precision=3)

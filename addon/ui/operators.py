@@ -12,6 +12,7 @@ from ..attach.method_items import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..core.errors import SinewError
 from ..deform import session
+from ..io import addon_preferences
 from .translations import counted, tr
 
 
@@ -149,6 +150,16 @@ class _OfOneMesh:
 
 
 AS_BEFORE = "AS_BEFORE"
+# What Add Sinew starts with.
+FIRST_METHODS = [
+    (
+        AS_BEFORE,
+        "As the Armature modifier is set",
+        "Each mesh keeps its shape; one that joins others has their settings",
+        0,
+    ),
+    *method_items(1),
+]
 
 
 class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
@@ -163,15 +174,7 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
     method: bpy.props.EnumProperty(
         name="Method",
         description="What to start with",
-        items=[
-            (
-                AS_BEFORE,
-                "As the Armature modifier is set",
-                "Each mesh keeps its shape; one that joins others has their settings",
-                0,
-            ),
-            *method_items(1),
-        ],
+        items=FIRST_METHODS,
         default=AS_BEFORE,
         options={"SKIP_SAVE"},
     )
@@ -188,6 +191,12 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
             text = tr("Select a mesh with an Armature modifier, or an armature that deforms one")
             cls.poll_message_set(text)
         return False
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        # Of a click; what a script leaves out does not depend on somebody's preferences.
+        if not self.properties.is_property_set("method"):
+            self.method = addon_preferences.value("first_method", default=AS_BEFORE)
+        return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         method = None if self.method == AS_BEFORE else self.method

@@ -7,34 +7,77 @@ import os
 
 import bpy
 
-from ..deform import safe_mode, session
-from . import menus
+from ..deform import precomputing, safe_mode, session
+from ..io import addon_preferences, units
+from . import menus, operators
 from .sidebar import draw_text
 from .translations import tr
 
 
-def _changed(_preferences: SinewPreferences, context: bpy.types.Context) -> None:
+def _safe_mode_changed(_preferences: SinewPreferences, context: bpy.types.Context) -> None:
     session.refresh(context)
 
 
-class SinewPreferences(bpy.types.AddonPreferences):
-    bl_idname = safe_mode.ADDON
+def _cache_changed(_preferences: SinewPreferences, _context: bpy.types.Context) -> None:
+    precomputing.open_cache()
 
+
+class SinewPreferences(bpy.types.AddonPreferences):
+    bl_idname = addon_preferences.ADDON
+
+    first_method: bpy.props.EnumProperty(
+        name="Add Sinew With",
+        description="The method that a click on Add Sinew starts with",
+        items=operators.FIRST_METHODS,
+        default=operators.AS_BEFORE,
+        options=set(),
+    )
+    units: bpy.props.EnumProperty(
+        name="Lengths",
+        description="How measured lengths are shown in panels and heat maps",
+        items=[
+            (units.OF_SCENE, "As the Scene", "In the units of the scene"),
+            (units.MILLIMETRES, "Millimetres", "Always, where the scene has units"),
+            (units.NONE, "Plain Numbers", "As Blender stores them, whatever the scene's units"),
+        ],
+        default=units.OF_SCENE,
+        options=set(),
+    )
+    cache_folder: bpy.props.StringProperty(
+        name="Cache Folder",
+        description="Where numbers of vertices are kept that methods take long to compute; empty: the "
+        "extension's own folder",
+        subtype="DIR_PATH",
+        options=set(),
+        update=_cache_changed,
+    )
     safe_mode: bpy.props.BoolProperty(
         name="Safe Mode",
         description="Run nothing of Sinew within Blender's own evaluation: meshes are deformed after it, and "
         "Blender evaluates what stands behind once more. Slower; for scenes in which Blender crashes",
         options=set(),
-        update=_changed,
+        update=_safe_mode_changed,
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.layout.prop(self, "safe_mode")
-        if os.environ.get(safe_mode.VARIABLE) is not None:
-            name, value = safe_mode.VARIABLE, repr(os.environ[safe_mode.VARIABLE])
-            text = tr("The environment variable {name} decides: it is {value}", name=name, value=value)
-            draw_text(self.layout, context, text, icon="INFO")
+        layout = self.layout.column()
+        layout.use_property_split = True
+        layout.prop(self, "first_method")
+        layout.prop(self, "units")
+        layout.prop(self, "cache_folder")
+        _draw_variable(layout, context, precomputing.VARIABLE)
+        layout.prop(self, "safe_mode")
+        _draw_variable(layout, context, safe_mode.VARIABLE)
         menus.draw_shortcuts(self.layout, context)
+
+
+def _draw_variable(layout: bpy.types.UILayout, context: bpy.types.Context, name: str) -> None:
+    """Says so where an environment variable decides instead."""
+    if os.environ.get(name) is not None:
+        text = tr(
+            "The environment variable {name} decides: it is {value}", name=name, value=repr(os.environ[name])
+        )
+        draw_text(layout, context, text, icon="INFO")
 
 
 CLASSES = (SinewPreferences,)

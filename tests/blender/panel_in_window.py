@@ -104,6 +104,14 @@ def one_click_for_a_method() -> Iterator[None]:
     yield
     yield
     facts["added undone"] = methods()
+    preferences = bpy.context.preferences.addons["bl_ext.user_default.sinew"].preferences
+    preferences.first_method = "qv"
+    yield from window.click(ADD)
+    facts["added as preferred"] = methods()
+    preferences.first_method = "AS_BEFORE"
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
 
 
 def by_search_and_keys() -> Iterator[None]:

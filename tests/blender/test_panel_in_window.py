@@ -17,6 +17,10 @@ def test_five_meshes_need_one_click_for_a_method(facts):
     assert facts["chosen"] == ["dq"] * 5
 
 
+def test_a_click_starts_with_the_method_of_the_preferences(facts):
+    assert facts["added as preferred"] == ["qv"] * 5
+
+
 def test_each_click_is_one_step_of_undo(facts):
     assert facts["switched off"] == [False] * 5
     assert facts["on again"] == [True] * 5

@@ -225,6 +225,28 @@ TEXTS = {
         "Lässt den Skelett-Modifikator diese Masche verformen, wo er die gleiche Form ergibt und, weil "
         "sie klein ist, weniger Zeit braucht"
     ),
+    "Add Sinew With": "Sinew hinzufügen mit",
+    "The method that a click on Add Sinew starts with": (
+        "Die Methode, mit der ein Klick auf Sinew hinzufügen beginnt"
+    ),
+    "Lengths": "Längen",
+    "How measured lengths are shown in panels and heat maps": (
+        "Wie gemessene Längen in Feldern und Wärmekarten gezeigt werden"
+    ),
+    "As the Scene": "Wie die Szene",
+    "In the units of the scene": "In den Einheiten der Szene",
+    "Millimetres": "Millimeter",
+    "Always, where the scene has units": "Immer, wo die Szene Einheiten hat",
+    "Plain Numbers": "Bloße Zahlen",
+    "As Blender stores them, whatever the scene's units": (
+        "Wie Blender sie speichert, gleich welche Einheiten die Szene hat"
+    ),
+    "Cache Folder": "Ordner für Zwischenspeicher",
+    "Where numbers of vertices are kept that methods take long to compute; empty: the "
+    "extension's own folder": (
+        "Wo Zahlen der Punkte bleiben, an denen Methoden lange rechnen; leer: der eigene Ordner der "
+        "Erweiterung"
+    ),
     "Safe Mode": "Sicherer Modus",
     "Run nothing of Sinew within Blender's own evaluation: meshes are deformed after it, and Blender "
     "evaluates what stands behind once more. Slower; for scenes in which Blender crashes": (

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension's page in Blender's preferences, with Sinew registered as an add-on. What clicks make of it:
+test_panel_in_window.py."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+import scenes
+from sinew_addon.attach import properties
+from sinew_addon.core import precompute
+from sinew_addon.core.precompute import precomputations
+from sinew_addon.deform import precomputing, session
+from sinew_addon.io import addon_preferences, units
+
+
+@pytest.fixture
+def preferences():
+    addons = bpy.context.preferences.addons
+    entry = addons.new()
+    entry.module = addon_preferences.ADDON
+    yield entry.preferences
+    addons.remove(entry)
+    precomputing.open_cache()
+
+
+@pytest.fixture
+def selected():
+    obj, _armature = scenes.make_arm()
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    return obj
+
+
+def test_scripts_do_not_depend_on_it(preferences, selected):
+    preferences.first_method = "cor"
+    bpy.ops.sinew.add()
+    assert properties.of(selected).method == "lbs"
+
+
+@pytest.mark.parametrize(
+    ("chosen", "system", "text"),
+    [
+        ("SCENE", "METRIC", "2.5 cm"),
+        ("MILLIMETRES", "METRIC", "25 mm"),
+        ("MILLIMETRES", "NONE", "0.25 units"),
+        ("NONE", "METRIC", "0.25 units"),
+        ("NONE", "NONE", "0.25 units"),
+    ],
+)
+def test_lengths_are_in_the_chosen_units(preferences, chosen, system, text):
+    scene = bpy.context.scene
+    scene.unit_settings.system, scene.unit_settings.scale_length = system, 0.1
+    preferences.units = chosen
+    assert units.text(scene, "length", 0.25) == text
+
+
+def test_numbers_of_methods_go_to_the_chosen_folder(preferences, selected, tmp_path, monkeypatch):
+    monkeypatch.delenv(precomputing.VARIABLE)
+    monkeypatch.setattr(precompute, "SECONDS_WORTH_A_FILE", 0.0)
+    preferences.cache_folder = str(tmp_path / "numbers")
+    assert precomputations.cache is not None
+    scenes.add_sinew(selected, "cor")
+    assert session.state_of(selected) is not None
+    assert list((tmp_path / "numbers").iterdir())
+    # Who starts Blender decides, whatever the preferences say.
+    monkeypatch.setenv(precomputing.VARIABLE, "0")
+    preferences.cache_folder = str(tmp_path / "others")
+    assert precomputations.cache is None
+
+
+def test_safe_mode_takes_effect_at_once(preferences, selected):
+    scenes.add_sinew(selected, "dq")
+    assert session.state_of(selected).plan.is_in_depsgraph
+    preferences.safe_mode = True
+    assert session.state_of(selected).plan.after_update
+    preferences.safe_mode = False
+    assert session.state_of(selected).plan.is_in_depsgraph
