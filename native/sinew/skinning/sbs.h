@@ -22,7 +22,7 @@ template <class To, class From>
     return {{cast<To>(bone.rigid), cast<To>(bone.scale), bone.has_scale}, Vec3<To>(bone.head)};
 }
 
-/// Spherical blend skinning (Kavan, Zara 2005; Smith 2013, section 5.1 names it): vertices rotate by the blended
+/// Spherical blend skinning (Kavan, Zara 2005; Smith 2013, section 3.6.2): vertices rotate by the blended
 /// quaternion about the point that the bones of their set move most alike. With two bones that share a joint this is
 /// the joint, and the shape that of dual quaternions.
 ///
