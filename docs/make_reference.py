@@ -127,11 +127,11 @@ def _options(parser: argparse.ArgumentParser) -> str:
 
 def python_api() -> str:
     """What `sinew` and its modules name in `__all__`, from their docstrings and types."""
-    package, native = _parsed("__init__.py"), _parsed("_native.pyi")
+    package, native = parsed("__init__.py"), parsed("_native.pyi")
     known = _definitions(native)
     pages = ["# Python", said(_docstring(package))]
     modules = []
-    for name in _exported(package):
+    for name in exported(package):
         if name in known:
             pages += _described(name, known[name], "##")
         elif (PACKAGE / f"{name}.py").exists():
@@ -139,13 +139,14 @@ def python_api() -> str:
     for name in modules:
         pages += _module(name)
     pages += ["## Results", "Named tuples that functions of these modules return."]
-    for name, found in _definitions(_parsed("_types.py")).items():
+    for name, found in _definitions(parsed("_types.py")).items():
         if isinstance(found[0], ast.ClassDef):
             pages += _described(name, found, "###")
     return "\n\n".join(pages) + "\n"
 
 
-def _parsed(name: str) -> ast.Module:
+def parsed(name: str) -> ast.Module:
+    """A file of the package."""
     return ast.parse((PACKAGE / name).read_text(encoding="utf-8"))
 
 
@@ -153,7 +154,8 @@ def _docstring(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> str:
     return ast.get_docstring(node) or ""
 
 
-def _exported(module: ast.Module) -> list[str]:
+def exported(module: ast.Module) -> list[str]:
+    """`__all__`."""
     for node in module.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             return ast.literal_eval(node.value)
@@ -180,12 +182,12 @@ def _assigned(module: ast.Module) -> dict[str, ast.expr]:
 
 
 def _module(name: str) -> list[str]:
-    module = _parsed(f"{name}.py")
+    module = parsed(f"{name}.py")
     own, assigned = _definitions(module), _assigned(module)
     # The functions that all representations have are methods of one class.
-    shared = _definitions(_definitions(_parsed("_representation.py"))["Representation"][0])
+    shared = _definitions(_definitions(parsed("_representation.py"))["Representation"][0])
     pages = [f"## sinew.{name}", said(_docstring(module))]
-    for function in _exported(module):
+    for function in exported(module):
         title = f"{name}.{function}"
         if function in own:
             pages += _described(title, own[function], "###")

@@ -413,10 +413,10 @@ def undecided_by(binding: core_session.Binding) -> np.ndarray:
     points = frame.rest_points @ space[:3, :3].T + space[:3, 3]
     influences = binding.weighting.influences_over_joints(points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(binding.bones.rest.astype(np.float64))
-    rest_axes = binding.bones.rest_axes.astype(np.float64)[:, :3, :3]
+    rest_axes = binding.bones.rest_axes.astype(np.float64)
     quaternions = np.array(
         [
-            reference.quaternion(reference.axes_keeping_y(motion[:3, :3] @ rest) @ rest.T)
+            reference.quaternion(reference.rotation_of_bone(motion, rest))
             for motion, rest in zip(motions, rest_axes, strict=True)
         ]
     )

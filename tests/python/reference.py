@@ -51,19 +51,20 @@ def quaternion_by_blender(matrix):
     """The unit quaternion that Blender's mat3_normalized_to_quat_fast() reads from a 3x3 matrix whose columns
     it has made of unit length: one component by the diagonal, the others divided by it."""
     m = matrix / np.linalg.norm(matrix, axis=0)
+    # 4 w (x, y, z), and off its diagonal 4 (x, y, z)^T (x, y, z).
+    by_w = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+    by_each = m + m.T
+    first = None
     if m[2, 2] < 0.0:
-        signs = (1, -1, -1) if m[0, 0] > m[1, 1] else (-1, 1, -1)
+        first = 0 if m[0, 0] > m[1, 1] else 1
+    elif m[0, 0] < -m[1, 1]:
+        first = 2
+    if first is None:
+        multiple = np.array([1.0 + np.trace(m), *by_w])
     else:
-        signs = (-1, -1, 1) if m[0, 0] < -m[1, 1] else (1, 1, 1)
-    w, x, y, z = m[2, 1] - m[1, 2], m[2, 1] + m[1, 2], m[0, 2] + m[2, 0], m[1, 0] + m[0, 1]
-    trace = 1.0 + np.diag(m) @ signs
-    row = {
-        (1, 1, 1): [trace, w, m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-        (1, -1, -1): [w, trace, z, y],
-        (-1, 1, -1): [m[0, 2] - m[2, 0], z, trace, x],
-        (-1, -1, 1): [m[1, 0] - m[0, 1], y, x, trace],
-    }[signs]
-    return np.array(row) / np.linalg.norm(row)
+        by_each[first, first] = 1.0 + 2.0 * m[first, first] - np.trace(m)
+        multiple = np.array([by_w[first], *by_each[first]])
+    return multiple / np.linalg.norm(multiple)
 
 
 def quaternion(rotation):

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "report.md"
 TEXT = PAGE.read_text(encoding="utf-8")
-PACKAGE = ROOT / "native" / "python" / "sinew"
+
+sys.path.insert(0, str(ROOT / "docs"))
+make_reference = importlib.import_module("make_reference")
+sys.path.remove(str(ROOT / "docs"))
 
 # What Smith 2013 numbers. Its equations have no numbers.
 SECTIONS = [
@@ -162,32 +167,24 @@ def assigned(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     return found
 
 
-def module(path: Path) -> dict[str, ast.stmt]:
-    return assigned(ast.parse(path.read_text(encoding="utf-8")).body)
-
-
-def listed(names: dict[str, ast.stmt]) -> list[str]:
-    """`__all__` of a module."""
-    node = names["__all__"]
-    assert isinstance(node, ast.Assign)
-    return ast.literal_eval(node.value)
+def public(file: str) -> set[str]:
+    """What a file of the package defines and lists."""
+    tree = make_reference.parsed(file)
+    return set(make_reference.exported(tree)) & assigned(tree.body).keys()
 
 
 def is_of_sinew(name: str) -> bool:
     """Whether sinew.NAME is public."""
     first, *rest = name.split(".")
-    package = module(PACKAGE / "__init__.py")
-    if first not in package or first not in listed(package):
+    if first not in public("__init__.py"):
         return False
     if not rest:
         return True
     if len(rest) > 1:
         return False
-    source = PACKAGE / f"{first}.py"
-    if source.exists():
-        names = module(source)
-        return rest[0] in names and rest[0] in listed(names)
-    known = module(PACKAGE / "_native.pyi").get(first)
+    if (make_reference.PACKAGE / f"{first}.py").exists():
+        return rest[0] in public(f"{first}.py")
+    known = assigned(make_reference.parsed("_native.pyi").body).get(first)
     return isinstance(known, ast.ClassDef) and rest[0] in assigned(known.body)
 
 
