@@ -99,8 +99,10 @@ def _show() -> None:
     share = min((run.progress for run in runs), default=1.0)
     for window in bpy.context.window_manager.windows:
         if _watcher_of(window) is not None:
-            text = tr("Sinew computes what its methods need: {share} (Esc stops)", share=f"{share:.0%}")
-            window.workspace.status_text_set(text if runs else None)
+            text = None
+            if runs:
+                text = tr("Sinew computes what its methods need: {share} (Esc stops)", share=f"{share:.0%}")
+            window.workspace.status_text_set(text)
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 for region in area.regions:

@@ -272,9 +272,9 @@ def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
     armatures = {armature for obj in meshes for armature in properties.of(obj).armatures}
 
     def hangs_on_bone(obj: bpy.types.Object) -> bool:
-        if obj.parent is None or obj.parent in armatures:
-            return obj.parent is not None and obj.parent_type == "BONE"
-        return hangs_on_bone(obj.parent)
+        if obj.parent in armatures:
+            return obj.parent_type == "BONE"
+        return obj.parent is not None and hangs_on_bone(obj.parent)
 
     return [
         obj

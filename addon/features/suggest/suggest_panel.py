@@ -58,11 +58,10 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
             column = layout.column(align=True)
             button = column.operator("sinew.use_method", text=suggestion.methods[name], depress=name in used)
             button.method = name
-            texts = {
-                criterion.name: f"{tr(criterion.label)} {value_text(context.scene, criterion, worst)}"
-                for criterion in CRITERIA
-                for worst in [suggestion.worst.get((name, criterion.name))]
-            }
+            texts = {}
+            for criterion in CRITERIA:
+                value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
+                texts[criterion.name] = f"{tr(criterion.label)} {value}"
             # Two columns, where the sidebar has room for them beside their icons.
             columns = 2 if max(map(len, texts.values())) <= characters(context) // 2 - 4 else 1
             values = column.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
