@@ -120,6 +120,11 @@ class Walker:
         own = action(obj)
         return own is not None and any(o != obj and action(o) == own for o in self.objects())
 
+    def may_lose_sinew(self, obj: bpy.types.Object) -> bool:
+        """Not one that plays keys of the method with a linked duplicate: Sinew leaves them to that one, and on
+        the other side they are keys of Preserve Volume, which count without Sinew, too."""
+        return not (self.side.is_method_keyed(obj) and self.shares_action(obj))
+
     def new_name(self, kind: str) -> str:
         self.number += 1
         return f"{kind} {self.number}"
@@ -331,7 +336,7 @@ def add(w: Walker, r: random.Random) -> str | None:
 
 @operation(2)
 def remove(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None)
+    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
     if obj is None:
         return None
     w.object_mode()
@@ -538,7 +543,7 @@ def restart(w: Walker, r: random.Random) -> str | None:
 @operation(0.3)
 def delete_sinew_modifier(w: Walker, r: random.Random) -> str | None:
     # Blender's own button does not take what comes from a library off an override.
-    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None)
+    obj = w.mesh(r, lambda o: w.side.has_sinew(o) and o.override_library is None and w.may_lose_sinew(o))
     if obj is None or not w.side.is_on(obj):
         return None
     w.side.delete_part(obj, "modifier")
@@ -1236,7 +1241,7 @@ def move_modifier(w: Walker, r: random.Random) -> str | None:
 
 @operation(1)
 def delete_modifier(w: Walker, r: random.Random) -> str | None:
-    obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None)
+    obj = w.mesh(r, lambda o: bool(w.modifiers(o)) and o.override_library is None and w.may_lose_sinew(o))
     if obj is None:
         return None
     # Seldom the last Armature modifier, as few operations are left for what has none.
@@ -1395,6 +1400,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
             and o.data.shape_keys is None
             and o.override_library is None
             and w.side.is_on(o)
+            and w.may_lose_sinew(o)
             and not w.side.has_other_shape(o)
         ),
     )
@@ -1413,8 +1419,8 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
 
 @operation(0.4)
 def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
-    obj = w.editable(r)
-    if obj is None or obj.data.library is not None or w.side.has_other_shape(obj) or not w.select(obj):
+    obj = w.mesh(r, lambda o: w.is_editable(o) and w.may_lose_sinew(o))
+    if obj is None or w.side.has_other_shape(obj) or not w.select(obj):
         return None
     w.before_evaluation()
     bpy.ops.object.convert(target="MESH")
