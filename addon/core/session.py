@@ -18,7 +18,7 @@ from .scale_rule import BLENDER_4, IGNORED
 from .spaces import is_same_space, transformed
 from .stage_mesh import StageMesh
 from .stages import StagesAfter, StageValues
-from .vertex_data import VertexData
+from .vertex_data import PROVIDERS, VertexData
 
 LINEAR = "lbs"
 # The purpose of the deformer that gives a mesh its shape, where it is one alone.
@@ -48,6 +48,19 @@ class Frame:
     parameters: dict[str, Value] = field(default_factory=dict)
 
 
+@dataclass(slots=True)
+class _Bound:
+    """A deformer, what it was made for, and the rest points that it has.
+
+    method, mix  as in Frame: a deformer's own take longer to ask for
+    """
+
+    deformer: sinew.Deformer
+    method: str
+    mix: str
+    rest_points: np.ndarray
+
+
 class Binding:
     """A mesh bound to bones. It computes only frames that differ from the last.
 
@@ -66,10 +79,10 @@ class Binding:
         self.vertex_data = vertex_data
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # The packed mesh for each purpose and the methods that keep numbers of vertices; the deformer for
-        # each purpose. Each with the rest points that it has.
+        # The packed mesh for each purpose and the methods that keep numbers of vertices, with the rest points
+        # that it has; the deformer for each purpose.
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
-        self._bound: dict[str, tuple[sinew.Deformer, np.ndarray]] = {}
+        self._bound: dict[str, _Bound] = {}
         # Normals that move with the skin, with the deformer and the normals that they were made for.
         self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
         self._last: Frame | None = None
@@ -127,7 +140,7 @@ class Binding:
         frame = self._last
         if frame is None or frame.scale_rule != BLENDER_4.name:
             return None
-        deformer, _points = self._bound[MOTION]
+        deformer = self._bound[MOTION].deformer
         if self._skinned is None or not (self._skinned[1] is deformer and self._skinned[2] is rest_normals):
             packed, _points = self._packed[MOTION, frozenset(self._vertex_data_of(frame))]
             mixed = deformer.mixed_method
@@ -152,15 +165,15 @@ class Binding:
         weights = self.mix_weights
         if frame.mix and (weights is None or frame.mix == frame.method):
             frame = replace(frame, mix="")
-        are_of_two_kinds = (frame.method == LINEAR) != (frame.mix == LINEAR)
-        if weights is not None and frame.mix and frame.scale_rule != BLENDER_4.name and are_of_two_kinds:
-            # Under these rules linear blending takes other bone matrices than the other methods.
-            self._shape_with_one_kind(replace(frame, mix=""), out, MOTION)
-            second = np.empty_like(out)
-            self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
-            out += weights[:, None] * (second - out)
-        else:
+        are_of_two_kinds = frame.scale_rule != BLENDER_4.name and LINEAR in (frame.method, frame.mix)
+        if weights is None or not (frame.mix and are_of_two_kinds):
             self._shape_with_one_kind(frame, out, MOTION)
+            return
+        # Under these rules linear blending takes other bone matrices than the other methods.
+        self._shape_with_one_kind(replace(frame, mix=""), out, MOTION)
+        second = np.empty_like(out)
+        self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
+        out += weights[:, None] * (second - out)
 
     def _shape_with_one_kind(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
         """Writes the shape by methods that take the same kind of bone matrices."""
@@ -189,8 +202,8 @@ class Binding:
         out: np.ndarray,
     ) -> None:
         """Deforms `rest_points` with the deformer of `purpose`, which is made again where it does not fit."""
-        deformer, points = self._bound.get(purpose, (None, None))
-        if deformer is None or (deformer.method, deformer.mixed_method or "") != (frame.method, frame.mix):
+        bound = self._bound.get(purpose)
+        if bound is None or bound.method != frame.method or bound.mix != frame.mix:
             data = self._vertex_data_of(frame)
             key = (purpose, frozenset(data))
             if key not in self._packed:
@@ -198,11 +211,12 @@ class Binding:
             packed, points = self._packed[key]
             mix = (frame.mix, self.mix_weights) if frame.mix and self.mix_weights is not None else None
             deformer = sinew.Deformer(packed, frame.method, mix=mix)
-        if points is not rest_points:
-            deformer.set_rest_points(rest_points)
-        self._bound[purpose] = (deformer, rest_points)
+            bound = self._bound[purpose] = _Bound(deformer, frame.method, frame.mix, points)
+        if bound.rest_points is not rest_points:
+            bound.deformer.set_rest_points(rest_points)
+            bound.rest_points = rest_points
         same_space = is_same_space(frame.bones_from_model)
-        deformer.deform(
+        bound.deformer.deform(
             bones,
             out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
@@ -214,7 +228,8 @@ class Binding:
         """Whether methods keep other numbers of vertices since: then meshes are packed anew."""
         if self.vertex_data is None:
             return False
-        self._vertex_data_of(frame)
+        if frame.method in PROVIDERS or frame.mix in PROVIDERS:
+            self._vertex_data_of(frame)
         version, known = self.vertex_data.version, self._data_version
         if version == known:
             return False
@@ -306,7 +321,7 @@ class SkinStack:
         self._end: Binding | None = None
         self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
-        self._active: tuple[bool, ...] = ()
+        self._active: list[int] = []
         self._frames: Sequence[SkinStageFrame | None] = ()
         self._values = NO_STAGES
         # The shape of the last frame after the stages; None where they are off, or it was not needed yet.
@@ -375,10 +390,10 @@ class SkinStack:
         self, rest_points: np.ndarray, frames: Sequence[SkinStageFrame | None], out: np.ndarray | None
     ) -> bool:
         """The links alone."""
-        active = tuple(frame is not None for frame in frames)
+        active = [number for number, frame in enumerate(frames) if frame is not None]
         changed = self._rest_points is None or active != self._active
-        if any(active):
-            changed |= self._run(rest_points, frames, out)
+        if active:
+            changed |= self._run(rest_points, frames, active, out)
         else:
             changed = changed or not are_equal(rest_points, self._rest_points)
             self._end, self._points = None, rest_points
@@ -388,15 +403,20 @@ class SkinStack:
         return changed
 
     def _run(
-        self, rest_points: np.ndarray, frames: Sequence[SkinStageFrame | None], out: np.ndarray | None
+        self,
+        rest_points: np.ndarray,
+        frames: Sequence[SkinStageFrame | None],
+        active: list[int],
+        out: np.ndarray | None,
     ) -> bool:
+        """active  the numbers of the links that have a frame, at least one"""
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
-        last = self.skin_stages[max(number for number, frame in enumerate(frames) if frame is not None)]
+        last = self.skin_stages[active[-1]]
         self._end = last.binding if last.mask is None else None
-        for number, (skin_stage, frame) in enumerate(zip(self.skin_stages, frames, strict=True)):
-            if frame is None:
-                continue
+        for number in active:
+            skin_stage, frame = self.skin_stages[number], frames[number]
+            assert frame is not None
             # The Multi Modifiers right behind this link start from the same shape as it does.
             for behind in range(number + 1, len(self.skin_stages)):
                 if not self.skin_stages[behind].multi or behind in starts:
@@ -404,9 +424,16 @@ class SkinStack:
                 starts[behind] = result
             start = starts.get(number, result)
             is_end = skin_stage.binding is self._end
-            own = (frame.scale_rule, frame.mix, frame.parameters)
             changed |= skin_stage.binding.deform(
-                Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
+                Frame(
+                    frame.method,
+                    frame.pose,
+                    frame.bones_from_model,
+                    start,
+                    frame.scale_rule,
+                    frame.mix,
+                    frame.parameters,
+                ),
                 out if is_end else None,
             )
             if skin_stage.mask is not None:

@@ -65,7 +65,8 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
         # Sinew was put on, or modifiers moved, since Blender evaluated it: what animation makes of the
         # settings comes with the next time.
         settings = properties.of(obj)
-    frames = pose.read(evaluated, settings, armatures, skinned, depsgraph.mode)
+    modifiers = list(zip(settings.replaced_modifiers, armatures, strict=False))
+    frames = pose.read(evaluated, settings, modifiers, skinned, depsgraph.mode)
     if frames is None or not pose.is_finite(frames):
         return None
     shown = skinned.shown

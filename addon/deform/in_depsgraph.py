@@ -85,17 +85,17 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     """Why it is for update() to see to; empty where the points are written."""
     started, settings, bound = time.perf_counter(), evaluated.sinew, skinned.bound
     # Evaluated ones, as the driver reads them.
-    armatures = [replaced.armature for replaced in settings.replaced_modifiers]
+    modifiers = [(replaced, replaced.armature) for replaced in settings.replaced_modifiers]
     if skinned.mode != evaluated.mode or not (skinned.is_only_user or skinned.plan.in_buffer):
         return "its mode, or the users of its mesh, changed"
-    if [armature is None for armature in armatures] != [not uid for uid in bound.armatures]:
+    if [armature is None for _replaced, armature in modifiers] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
     memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
         return "its mesh changed"
     out, normals = memory
     _note_unannounced_change(out, skinned)
-    frames = pose.read(evaluated, settings, armatures, skinned, "VIEWPORT")
+    frames = pose.read(evaluated, settings, modifiers, skinned, "VIEWPORT")
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
     if rest_points is None:
         return "what modifiers in front make of its mesh changed"
@@ -135,12 +135,12 @@ def _memory_to_write(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Of the points and of the normals, none where Blender computes these: in the evaluated mesh, or in the
     evaluated point buffer. None where it is not there, or not for as many."""
-    points, count = len(skinned.bound.source.points), skinned.normal_count
+    points, domain = len(skinned.bound.source.points), skinned.plan.normals.domain
+    count = skinned.normal_count if domain else 0
     if not skinned.plan.in_buffer:
         to_points = mesh_io.vectors_in(mesh, skinned.attribute)
         to_normals = _NO_NORMALS
         if count:
-            domain = skinned.plan.normals.domain
             to_normals = mesh_io.vectors_in(mesh, skinned.normals_attribute, domain)
         if to_points is None or to_normals is None:
             return None

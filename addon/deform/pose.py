@@ -15,6 +15,9 @@ from ..io import armature_io
 from .bound import Bound
 from .skinned_object import SkinnedObject
 
+Modifiers = list[tuple[properties.SinewReplacedModifier, bpy.types.Object | None]]
+"""What is kept of each Armature modifier, and its armature."""
+
 Frames = list[SkinStageFrame | None]
 """One for each Armature modifier, None for one that takes no part."""
 
@@ -22,14 +25,14 @@ Frames = list[SkinStageFrame | None]
 def read(
     evaluated: bpy.types.Object,
     settings: properties.SinewSettings,
-    armatures: list[bpy.types.Object | None],
+    modifiers: Modifiers,
     skinned: SkinnedObject,
     mode: str,
 ) -> Frames | None:
     """None where it is unknown, and the last shape stays.
 
     settings   the object's, evaluated
-    armatures  of each Armature modifier, evaluated
+    modifiers  evaluated
     mode       the depsgraph's
     Raises SinewError where a driver sets a method or a scale rule that there is not.
     """
@@ -40,12 +43,8 @@ def read(
             f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
         )
     frames: Frames = []
-    for stage, replaced, armature, is_keyed in zip(
-        skinned.bound.skin_stack.skin_stages,
-        settings.replaced_modifiers,
-        armatures,
-        skinned.visibility_keyed,
-        strict=False,
+    for stage, (replaced, armature), is_keyed in zip(
+        skinned.bound.skin_stack.skin_stages, modifiers, skinned.visibility_keyed, strict=False
     ):
         flags = evaluated.modifiers[replaced.name] if is_keyed or skinned.uses_builtin else replaced
         if armature is None or armature.data.is_editmode or not _takes_part(flags, mode):
@@ -56,7 +55,7 @@ def read(
             # An armature scaled to nothing for a moment.
             return None
         pose = armature_io.read_pose(armature, stage.binding.bones)
-        own = properties.method_of_modifier(method, replaced.method, is_first=not frames)
+        own = method if not frames else properties.method_of_modifier(method, replaced.method, is_first=False)
         is_mixed = stage.binding.mix_weights is not None and own == method
         mix = settings.mixed_method if is_mixed else ""
         data = stage.binding.vertex_data
@@ -73,6 +72,8 @@ def read(
 def _parameters(
     evaluated: bpy.types.Object, settings: properties.SinewSettings, method: str, mix: str
 ) -> dict[str, parameters.Value]:
+    if method not in stage_settings.METHODS and mix not in stage_settings.METHODS:
+        return {}
     values = stage_settings.method_values(settings, (method, mix))
     for name, value in values.items():
         if value == "":
@@ -86,7 +87,7 @@ def lacks_data(bound: Bound, frames: Frames | None) -> bool:
     """Whether one of the methods was asked for numbers of vertices that it does not have."""
     for stage, frame in zip(bound.skin_stack.skin_stages, frames or (), strict=False):
         data = stage.binding.vertex_data
-        if data is not None and frame is not None and not all(map(data.has, data.missed)):
+        if data is not None and data.missed and frame is not None and not all(map(data.has, data.missed)):
             return True
     return False
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Mapping
 from itertools import chain
 from operator import itemgetter
@@ -306,8 +307,13 @@ def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT")
     first, last = values[0].as_pointer(), values[count - 1].as_pointer()
     if last - first != (count - 1) * _VECTOR_BYTES:
         return None
-    numbers = (ctypes.c_float * (3 * count)).from_address(first)
-    return np.frombuffer(numbers, dtype=np.float32).reshape(count, 3)
+    return np.ndarray((count, 3), np.float32, _memory_type(count).from_address(first))
+
+
+@functools.lru_cache(maxsize=256)
+def _memory_type(vectors: int) -> type[ctypes.Array]:
+    """Looked up faster than it is made."""
+    return ctypes.c_float * (3 * vectors)
 
 
 def remove_attribute(mesh: bpy.types.Mesh, name: str) -> None:

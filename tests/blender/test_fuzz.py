@@ -13,10 +13,10 @@ import scenes
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session, small_meshes
 
-# The newest Blender runs the first 150 rigs, each other one 60 of its own: all of them have the same shapes
+# The newest Blender runs the first 100 rigs, each other one 40 of its own: all of them have the same shapes
 # (docs/parity.md), and together they check more rigs.
 IS_NEWEST = not os.environ.get("SINEW_NOT_NEWEST")
-RIGS = 150 if IS_NEWEST else 60
+RIGS = 100 if IS_NEWEST else 40
 FIRST = 0 if IS_NEWEST else RIGS * (10 * bpy.app.version[0] + bpy.app.version[1])
 
 

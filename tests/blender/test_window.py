@@ -88,7 +88,8 @@ def _run(program: str, folder: Path, groups: tuple[str, ...], found: Results) ->
             stderr=subprocess.STDOUT,
             timeout=1200,
             check=False,
-            env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"},
+            # A small screen, as to draw takes most of the time.
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1000x640"},
         ).returncode
     text = output.read_text(errors="replace")
     step = ""

@@ -121,7 +121,7 @@ class Walker:
         return own is not None and any(o != obj and action(o) == own for o in self.objects())
 
     def may_lose_sinew(self, obj: bpy.types.Object) -> bool:
-        """Not one that plays keys of the method with a linked duplicate: Sinew leaves them to that one, and on
+        """Not one that plays keys of the method with a linked duplicate: Sinew leaves them to that one, on
         the other side they are keys of Preserve Volume, which count without Sinew, too."""
         return not (self.side.is_method_keyed(obj) and self.shares_action(obj))
 
