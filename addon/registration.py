@@ -25,6 +25,7 @@ def register() -> None:
     from .deform import exporters, handlers
     from .features.bake import feature as bake
     from .features.compare import feature as compare
+    from .features.corrective import feature as corrective
     from .features.diagnose import feature as diagnose
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
@@ -48,7 +49,7 @@ def register() -> None:
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
         *(character_operators, presets, menus, main_panel, meshes_panel),
-        *(suggest, inbetween, bake, compare, heat, diagnose),
+        *(suggest, inbetween, bake, corrective, compare, heat, diagnose),
     ):
         _register_classes(owner.CLASSES)
     translations.register()

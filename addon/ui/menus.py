@@ -25,7 +25,7 @@ class Entry:
     operator: str
     text: str = ""
     icon: str = "NONE"
-    values: dict[str, str] = field(default_factory=dict)
+    values: dict[str, str | bool] = field(default_factory=dict)
 
 
 def _over(operator: str, text: str) -> tuple[Entry, ...]:
@@ -63,6 +63,8 @@ ENTRIES: tuple[Entry | None, ...] = (
     None,
     Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
     Entry("sinew.bake_inbetweens"),
+    Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
+    Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
     None,
     Entry("sinew.open_tab"),
 )

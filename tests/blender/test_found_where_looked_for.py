@@ -63,7 +63,10 @@ def test_entries_of_the_menu_have_values_that_the_operators_take():
         rna = getattr(bpy.ops.sinew, entry.operator.partition(".")[2]).get_rna_type()
         for name, value in entry.values.items():
             prop = rna.properties[name]
-            assert prop.type == "STRING" or value in [item.identifier for item in prop.enum_items]
+            if prop.type == "ENUM":
+                assert value in [item.identifier for item in prop.enum_items]
+            else:
+                assert isinstance(value, {"STRING": str, "BOOLEAN": bool}[prop.type])
             if name == "stage":
                 assert value in properties.STAGE_GROUPS
 

@@ -1726,6 +1726,10 @@ def scene(w: Walker, r: random.Random) -> str | None:
     if r.random() < 0.3:
         other.frame_set(r.randint(*FRAMES))
         return f"frame {other.frame_current} in scene {other.name}"
+    # At the first edit Blender copies an object anew, with what the other scene's frame has set of it; and
+    # Sinew edits another object than who puts Preserve Volume on.
+    if any(len(obj.users_scene) > 1 and "location" in animated_paths(obj) for obj in w.objects()):
+        return None
     w.before_evaluation()
     bpy.context.view_layer.update()
     bpy.context.window.scene = other

@@ -629,6 +629,23 @@ TEXTS = {
         "oder wähle eine Methode, die auf Splines weich ist"
     ),
     "{count} bones into {action}": "{count} Knochen in {action}",
+    # Corrective shape keys
+    "Corrective Shape Key": "Korrigierender Formschlüssel",
+    "Corrective Shape Key Driven by the Bone": "Korrigierender Formschlüssel, vom Knochen getrieben",
+    "Add a shape key by which the Armature modifier alone has the shape that Sinew shows in this pose. "
+    "It is muted, as Sinew's shape has it already": (
+        "Einen Formschlüssel hinzufügen, mit dem der Skelettmodifikator allein die Form hat, die Sinew in "
+        "dieser Pose zeigt. Er ist stummgeschaltet, da Sinews Form ihn schon enthält"
+    ),
+    "Driven by the Active Bone": "Vom aktiven Knochen getrieben",
+    "The key grows as the active pose bone turns against its parent, from rest to this pose": (
+        "Der Schlüssel wächst, wie sich der aktive Posenknochen gegen seinen Elternknochen dreht, von der "
+        "Ruhestellung bis zu dieser Pose"
+    ),
+    "{name}: {key} is there, and muted; the Armature modifier is {before} off without it, {after} with it": (
+        "{name}: {key} ist da und stummgeschaltet; der Skelettmodifikator liegt ohne ihn {before} daneben, "
+        "mit ihm {after}"
+    ),
     # Bake
     "Baked {names}": "Gebacken: {names}",
     "Bake": "Backen",

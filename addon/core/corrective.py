@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Corrective shapes: what to add to rest points so that a skinning gives another shape in one pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+# Skinning is affine in each rest point, but where envelopes make weights of it.
+STEPS = 4
+# Of the mesh's diagonal: how far rest points are moved to see what becomes of it, and what is near enough.
+PROBE, NEAR = 1e-2, 1e-6
+# A point whose surroundings the skinning flattens to less than this part could be reached from far away only.
+LEAST_WIDTH = 0.05
+
+
+def offsets(
+    rest_points: np.ndarray, wanted: np.ndarray, skin: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The offsets of rest points, float64 [vertices, 3], and how far from `wanted` each then is, [vertices].
+    One that can not be brought there has no offset.
+
+    rest_points  float32 [vertices, 3]
+    wanted       float32 [vertices, 3], the shape
+    skin         makes the shape of rest points, [vertices, 3] each; each vertex of its own point alone
+    """
+    rest, goal = rest_points.astype(np.float64), wanted.astype(np.float64)
+    found = np.zeros_like(rest)
+    if not len(rest):
+        return found, np.zeros(0)
+
+    def shape(moved: np.ndarray) -> np.ndarray:
+        return skin((rest + moved).astype(np.float32)).astype(np.float64)
+
+    diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) or 1.0
+    now = shape(found)
+    start = distances(goal, now)
+    for _step in range(STEPS):
+        if distances(goal, now).max() <= NEAR * diagonal:
+            break
+        axes = [
+            (shape(found + PROBE * diagonal * axis) - now) / (PROBE * diagonal) for axis in np.identity(3)
+        ]
+        found += _solve(np.stack(axes, axis=-1), goal - now)
+        now = shape(found)
+    # Not one that came no nearer.
+    found[distances(goal, now) > start] = 0.0
+    return found, distances(goal, shape(found))
+
+
+def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(a - b, axis=1)
+
+
+def _solve(matrices: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """[n, 3]: zero where a matrix, [n, 3, 3], is flatter than LEAST_WIDTH."""
+    left, widths, right = np.linalg.svd(matrices)
+    reached = widths[:, -1] >= LEAST_WIDTH
+    inverse = np.divide(1.0, widths, out=np.zeros_like(widths), where=reached[:, None])
+    turned = np.einsum("nji,nj->ni", left, sides) * inverse
+    return np.einsum("nji,nj->ni", right, turned)
