@@ -301,8 +301,9 @@ def needs_first_evaluations() -> bool:
     with contextlib.suppress(ReferenceError):
         return any(
             (state := state_of(obj)) is None or state.plan.after_update
-            for obj in current.objects or ()
-            if properties.of(obj).enabled
+            # After undo and redo they have to be found out.
+            for obj in (bpy.data.objects if current.objects is None else current.objects)
+            if properties.has_sinew(obj) and properties.of(obj).enabled
         )
     # Deleted since the objects were listed: an event comes.
     return False

@@ -77,6 +77,32 @@ def test_a_view_layer_is_shown_for_the_first_time(route):
 
 
 @pytest.mark.parametrize("route", routes.ROUTES)
+def test_a_scene_that_redo_brings_back(route):
+    """Blender tells nobody of its first evaluation, and Sinew has just forgotten all objects."""
+    scenes.make_arm()
+    bpy.ops.ed.undo_push(message="before")
+    routes.force(route)
+    try:
+        bpy.context.scene.frame_set(8)
+        expected = scenes.final_points(bpy.data.objects["Arm"])
+        scenes.add_sinew(bpy.data.objects["Arm"], "lbs")
+        properties.of(bpy.data.objects["Arm"]).leave_small = False
+        bpy.ops.scene.new(type="LINK_COPY")
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="a copy of the scene")
+        bpy.ops.ed.undo()
+        bpy.ops.ed.redo()
+        bpy.context.view_layer.update()
+        handlers.check_unannounced()
+        bpy.context.view_layer.update()
+        assert len(bpy.data.scenes) == 2
+        assert scenes.worst(scenes.final_points(bpy.data.objects["Arm"]), expected) <= 1e-5
+    finally:
+        bpy.ops.ed.undo()
+        routes.release()
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
 def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_path, route):
     obj, armature = scenes.make_arm()
     obj.modifiers.new("Front", "SUBSURF").levels = 1

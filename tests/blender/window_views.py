@@ -122,6 +122,24 @@ def undo_while_it_plays(run: Run) -> Steps:
     yield from run.check_frames()
 
 
+@step("undo")
+def scene_that_redo_brings_back(run: Run) -> Steps:
+    """Blender tells nobody of its first evaluation."""
+    click("scene.new", type="LINK_COPY")
+    yield from wait()
+    run.check_shapes("in a copy of the scene")
+    for turn in range(2):
+        press("Z", ctrl=True)
+        yield from wait(4)
+        run.check_shapes(f"undone, turn {turn}")
+        press("Z", ctrl=True, shift=True)
+        # Sinew looks four times a second.
+        yield from wait(20)
+        run.check_shapes(f"redone, turn {turn}")
+    press("Z", ctrl=True)
+    yield from wait(4)
+
+
 @step("windows")
 def two_windows_and_scenes(run: Run) -> Steps:
     with window.in_view3d("WINDOW"):
