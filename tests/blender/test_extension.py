@@ -292,9 +292,10 @@ def photographed(package, tmp_path, real_rig):
 
 def test_the_panel_in_a_window(photographed):
     """Installs the zip, opens a real rig, presses the panel's buttons, plays, and photographs the window."""
-    facts = photographed("docs/photograph_panel.py", "panel.png")
+    facts = photographed("docs/photograph_panel.py", "panel.png", "inbetween.png")
     assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
     assert facts["error"] == ""
+    assert facts["moved in between"] > 1e-3 * facts["diagonal"]
 
 
 def test_a_comparison_in_a_window(photographed):
