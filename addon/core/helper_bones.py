@@ -9,12 +9,14 @@ than there, the rig's bones keep their motions, and a helper bone begins where t
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
 from . import simplex
 from .influences import Influences
+from .phrases import phrase
 
 # At most so many of the rig's bones, and of the helper bones, are tried for a vertex.
 OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
@@ -44,6 +46,11 @@ class Motion:
     bones: np.ndarray
     influences: Influences
     segments: np.ndarray
+
+    @property
+    def diagonal(self) -> float:
+        """Of the bounding box at rest."""
+        return float(np.linalg.norm(np.ptp(self.rest[0], axis=0))) if self.rest.shape[1] else 0.0
 
 
 @dataclass(frozen=True)
@@ -87,6 +94,86 @@ class Solution:
     after: Errors
 
 
+@dataclass(frozen=True)
+class HelperOptions:
+    """What the user chooses.
+
+    helpers     for each armature, at most; 0 for two a joint
+    error       the rms error, in percent of the diagonal, that as few as possible are to reach; 0 for all
+    influences  of a vertex, at most
+    """
+
+    helpers: int = 0
+    error: float = 0.0
+    influences: int = 4
+
+    def of(self, motion: Motion, parents: np.ndarray) -> Wanted:
+        """
+        parents  int [bones], the bone above each, -1 for none; it comes before them
+        """
+        weighted = np.zeros(len(parents), dtype=bool)
+        weighted[motion.influences.bones] = True
+        helpers = self.helpers or 2 * joints(parents, weighted)
+        return Wanted(helpers, self.error / 100.0 * motion.diagonal, self.influences)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What came of it; lengths in scene units.
+
+    diagonal  of the meshes' bounding box at rest
+    """
+
+    armature: str
+    helpers: int
+    influences: int
+    diagonal: float
+    before: Errors
+    after: Errors
+
+    @classmethod
+    def of(cls, armature: str, solution: Solution, unit: float, diagonal: float) -> Report:
+        """
+        unit  of armature space, in scene units
+        """
+        before, after = (
+            Errors(unit * errors.rms, unit * errors.worst) for errors in (solution.before, solution.after)
+        )
+        most = int((solution.weights > 0.0).sum(axis=1).max(initial=0))
+        return cls(armature, len(solution.parents), most, diagonal, before, after)
+
+    def as_json(self) -> dict[str, Any]:
+        """With each error as a share of the diagonal, too."""
+        size = self.diagonal or 1.0
+        return asdict(self) | {
+            name: {
+                "rms": errors.rms,
+                "worst": errors.worst,
+                "rms_share": errors.rms / size,
+                "worst_share": errors.worst / size,
+            }
+            for name, errors in (("before", self.before), ("after", self.after))
+        }
+
+    def sentence(self, unit: str) -> str:
+        """
+        unit  what a scene unit is called
+        """
+        return phrase(
+            "{name}: {count} helper bones; error {rms} {unit} rms, {worst} worst ({share} and {worst_share} of "
+            "the diagonal); linear blend without them {rms_before} and {worst_before}",
+            name=self.armature,
+            count=self.helpers,
+            unit=unit,
+            rms=f"{self.after.rms:.2g}",
+            worst=f"{self.after.worst:.2g}",
+            share=f"{self.after.rms / (self.diagonal or 1.0):.2g}",
+            worst_share=f"{self.after.worst / (self.diagonal or 1.0):.2g}",
+            rms_before=f"{self.before.rms:.2g}",
+            worst_before=f"{self.before.worst:.2g}",
+        )
+
+
 def joints(parents: np.ndarray, weighted: np.ndarray) -> int:
     """How many weighted bones have a weighted bone above them.
 
@@ -106,7 +193,8 @@ def solve(motion: Motion, wanted: Wanted) -> Generator[float, None, Solution]:
     """How much is done, 0 to 1; returns the helper bones and the weights of all bones."""
     solver = _Solver(motion, wanted.influences)
     before = solver.errors()
-    solver.weigh()
+    for _part in solver.weigh():
+        yield 0.0
     rounds = _rounds(wanted.helpers)
     steps = len(rounds) + _LAST_SWEEPS
     for number, count in enumerate(rounds):
@@ -116,8 +204,8 @@ def solve(motion: Motion, wanted: Wanted) -> Generator[float, None, Solution]:
             solver.add_helper()
             yield (number + 0.3) / steps
         solver.move()
-        solver.weigh()
-        yield (number + 1) / steps
+        for share in solver.weigh():
+            yield (number + 0.3 + 0.7 * share) / steps
     if solver.helpers:
         for share in solver.refine():
             yield (len(rounds) + share * _LAST_SWEEPS) / steps
@@ -193,8 +281,8 @@ class _Solver:
             self.move()
             if sweep:
                 self._go_on(before[0], further)
-            self.weigh()
-            yield (sweep + 1) / _LAST_SWEEPS
+            for share in self.weigh():
+                yield (sweep + share) / _LAST_SWEEPS
             errors.append(self.errors().rms)
             if errors[-1] > errors[-2]:
                 self._state, further, errors[-1] = before, 0.0, errors[-2]
@@ -323,12 +411,13 @@ class _Solver:
 
     # --- Weights
 
-    def weigh(self) -> None:
-        """The best weights of each vertex while all motions stay."""
-        parts = [
-            self._weigh(np.arange(start, min(start + _CHUNK, len(self.own))))
-            for start in range(0, len(self.own), _CHUNK)
-        ]
+    def weigh(self) -> Generator[float, None, None]:
+        """The best weights of each vertex while all motions stay; how much is done, 0 to 1."""
+        parts = []
+        for start in range(0, len(self.own), _CHUNK):
+            end = min(start + _CHUNK, len(self.own))
+            parts.append(self._weigh(np.arange(start, end)))
+            yield end / len(self.own)
         if parts:
             self.bones = np.concatenate([bones for bones, _weights in parts])
             self.weights = np.concatenate([weights for _bones, weights in parts])

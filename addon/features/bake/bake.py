@@ -17,11 +17,13 @@ import numpy as np
 from ...attach import attach, properties, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
+from ...core.helper_bones import HelperOptions
 from ...deform import evaluate, session
 from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, shape_animation
+from .bake_bones import BoneBake
 
 SHAPE_KEYS = "shape-keys"
 
@@ -215,7 +217,7 @@ class Bake:
             self.folder.rmdir()
 
 
-Started = Bake | bake_export.SceneExport | bake_export.MorphExport
+Started = Bake | BoneBake | bake_export.SceneExport | bake_export.MorphExport
 
 
 def suffix_of(kind: str) -> str:
@@ -224,14 +226,22 @@ def suffix_of(kind: str) -> str:
 
 
 def start(
-    meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], target: Path, overwrite: bool
+    meshes: list[bpy.types.Object],
+    kind: str,
+    frames: Sequence[float],
+    target: Path,
+    overwrite: bool,
+    helpers: HelperOptions = HelperOptions(),
 ) -> Started:
     """A bake of skinned meshes; caches go to a folder beside `target`, exports to itself.
 
     frames     in rising order
     overwrite  whether files that are there already may be replaced
+    helpers    of a bake to bones
     Raises SinewError where it can not be done.
     """
+    if kind == bake.BONES:
+        return BoneBake(meshes, frames, helpers)
     if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
     if kind in bake_export.SCENES:
