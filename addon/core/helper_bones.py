@@ -16,7 +16,7 @@ import numpy as np
 
 from . import simplex
 from .influences import Influences
-from .phrases import phrase
+from .phrases import Phrase, phrase
 
 # At most so many of the rig's bones, and of the helper bones, are tried for a vertex.
 OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
@@ -155,20 +155,21 @@ class Report:
             for name, errors in (("before", self.before), ("after", self.after))
         }
 
-    def sentence(self, unit: str) -> str:
+    def sentence(self, unit: str) -> Phrase:
         """
         unit  what a scene unit is called
         """
+        size = self.diagonal or 1.0
+        shares = (f"{100.0 * each / size:.2g}%" for each in (self.after.rms, self.after.worst))
         return phrase(
-            "{name}: {count} helper bones; error {rms} {unit} rms, {worst} worst ({share} and {worst_share} of "
-            "the diagonal); linear blend without them {rms_before} and {worst_before}",
+            "{name}: {count} helper bones; error {rms} {unit} rms, {worst} at most ({shares} of the diagonal); "
+            "linear blending had {rms_before} and {worst_before}",
             name=self.armature,
             count=self.helpers,
             unit=unit,
             rms=f"{self.after.rms:.2g}",
             worst=f"{self.after.worst:.2g}",
-            share=f"{self.after.rms / (self.diagonal or 1.0):.2g}",
-            worst_share=f"{self.after.worst / (self.diagonal or 1.0):.2g}",
+            shares=" / ".join(shares),
             rms_before=f"{self.before.rms:.2g}",
             worst_before=f"{self.before.worst:.2g}",
         )
