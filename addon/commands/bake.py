@@ -36,8 +36,8 @@ gltf        a .glb of the same, the frames as morph targets
 bones       a .blend whose armatures have helper bones with keys, and meshes with weights of all bones: linear
             blending, as every engine and glTF and FBX files have it, comes as near as the errors say
 
-In a .blend the Armature modifiers stay, switched off (bones: on). Between frames that are not neighbours shapes move in
-straight lines."""
+In a .blend the Armature modifiers stay, switched off (bones: on). Between frames that are not neighbours
+shapes move in straight lines."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:

@@ -108,13 +108,14 @@ class HelperOptions:
     influences: int = 4
 
     def of(self, motion: Motion, parents: np.ndarray) -> Wanted:
-        """
-        parents  int [bones], the bone above each, -1 for none; it comes before them
-        """
+        """parents  int [bones], the bone above each, -1 for none; it comes before them"""
         weighted = np.zeros(len(parents), dtype=bool)
         weighted[motion.influences.bones] = True
         helpers = self.helpers or 2 * joints(parents, weighted)
         return Wanted(helpers, self.error / 100.0 * motion.diagonal, self.influences)
+
+
+DEFAULT_HELPERS = HelperOptions()
 
 
 @dataclass(frozen=True)
@@ -133,9 +134,7 @@ class Report:
 
     @classmethod
     def of(cls, armature: str, solution: Solution, unit: float, diagonal: float) -> Report:
-        """
-        unit  of armature space, in scene units
-        """
+        """unit  of armature space, in scene units"""
         before, after = (
             Errors(unit * errors.rms, unit * errors.worst) for errors in (solution.before, solution.after)
         )
@@ -156,14 +155,12 @@ class Report:
         }
 
     def sentence(self, unit: str) -> Phrase:
-        """
-        unit  what a scene unit is called
-        """
+        """unit  what a scene unit is called"""
         size = self.diagonal or 1.0
         shares = (f"{100.0 * each / size:.2g}%" for each in (self.after.rms, self.after.worst))
         return phrase(
-            "{name}: {count} helper bones; error {rms} {unit} rms, {worst} at most ({shares} of the diagonal); "
-            "linear blending had {rms_before} and {worst_before}",
+            "{name}: {count} helper bones; error {rms} {unit} rms, {worst} at most ({shares} of the diagonal)"
+            "; linear blending had {rms_before} and {worst_before}",
             name=self.armature,
             count=self.helpers,
             unit=unit,
@@ -356,7 +353,9 @@ class _Solver:
 
     def _share_bones(self, seed: int) -> np.ndarray:
         """bool [vertices]: those that have one of the rig's bones in common with this one."""
-        return np.isin(self.own, self.own[seed][self.own[seed] >= 0]).any(axis=1)
+        bones = self.own[seed]
+        shared = np.isin(self.own, bones[bones >= 0])
+        return np.asarray(shared.any(axis=1))
 
     def _nearest_bone(self, point: np.ndarray, bones: np.ndarray) -> int:
         heads, tails = self.motion.segments[bones, 0], self.motion.segments[bones, 1]
@@ -533,7 +532,7 @@ def _share(residual: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _padded(influences: Influences) -> tuple[np.ndarray, np.ndarray]:
-    """int and float64 [vertices, slots]: bones and weights of each vertex, the heaviest first; -1 and 0 behind."""
+    """int and float64 [vertices, slots]: each vertex's bones and weights, the heaviest first; -1 and 0 behind."""
     counts = influences.counts
     vertices = np.repeat(np.arange(len(counts)), counts)
     order = np.lexsort((-influences.weights, vertices))

@@ -81,7 +81,9 @@ def test_the_error_never_grows_with_more_helper_bones():
     motion = motion_by("dq")
     errors = [solved(motion, Wanted(count)) for count in range(5)]
     lbs = np.array([TUBE.deformed("lbs", *pose)[0] for pose in POSES])
-    assert np.allclose((errors[0].before.rms, errors[0].before.worst), errors_of(lbs, motion.targets), rtol=1e-4)
+    assert np.allclose(
+        (errors[0].before.rms, errors[0].before.worst), errors_of(lbs, motion.targets), rtol=1e-4
+    )
     rms = [errors[0].before.rms, *(solution.after.rms for solution in errors)]
     assert rms == sorted(rms, reverse=True)
 

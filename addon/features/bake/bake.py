@@ -17,7 +17,7 @@ import numpy as np
 from ...attach import attach, properties, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
-from ...core.helper_bones import HelperOptions
+from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...deform import evaluate, session
 from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...io import files
@@ -231,7 +231,7 @@ def start(
     frames: Sequence[float],
     target: Path,
     overwrite: bool,
-    helpers: HelperOptions = HelperOptions(),
+    helpers: HelperOptions = DEFAULT_HELPERS,
 ) -> Started:
     """A bake of skinned meshes; caches go to a folder beside `target`, exports to itself.
 

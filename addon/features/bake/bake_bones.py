@@ -190,7 +190,9 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
     """The armature object that deforms a mesh. Raises SinewError where bones can not reproduce it."""
     replaced = properties.of(obj).replaced_modifiers
     if len(replaced) != 1:
-        raise SinewError(f"{obj.name}: has several Armature modifiers; bones reproduce one: bake to mdd or pc2")
+        raise SinewError(
+            f"{obj.name}: has several Armature modifiers; bones reproduce one: bake to mdd or pc2"
+        )
     rig = replaced[0].armature
     for each in (obj, rig):
         if each.override_library is not None or each.library is not None:
