@@ -532,7 +532,7 @@ def _share(residual: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _padded(influences: Influences) -> tuple[np.ndarray, np.ndarray]:
-    """int and float64 [vertices, slots]: each vertex's bones and weights, the heaviest first; -1 and 0 behind."""
+    """int and float64 [vertices, slots]: bones and weights, the heaviest first; -1 and 0 behind."""
     counts = influences.counts
     vertices = np.repeat(np.arange(len(counts)), counts)
     order = np.lexsort((-influences.weights, vertices))

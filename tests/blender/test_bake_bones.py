@@ -164,6 +164,7 @@ def skinned_by_gltf(glb, frames, rate):
     # By columns.
     from_rest = read(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2).astype(np.float64)
     nodes = [dict(node) for node in header["nodes"]]
+    parents = {child: node for node in nodes for child in node.get("children", ())}
     # The action without helper bones stays in the file, and is exported, too.
     (animation,) = (each for each in header["animations"] if each["name"].endswith("Helpers"))
     homogeneous = np.column_stack([rest, np.ones(len(rest))])
@@ -177,7 +178,8 @@ def skinned_by_gltf(glb, frames, rate):
             at = [np.interp(frame / rate, times, column) for column in values.T]
             nodes[channel["target"]["node"]][channel["target"]["path"]] = at
         for joint in skin["joints"]:
-            scene.graph.update(frame_to=nodes[joint]["name"], matrix=local_matrix(nodes[joint]))
+            name, above = nodes[joint]["name"], parents[joint]["name"]
+            scene.graph.update(frame_to=name, frame_from=above, matrix=local_matrix(nodes[joint]))
         joints = np.array([scene.graph.get(nodes[joint]["name"])[0] for joint in skin["joints"]])
         blended = np.einsum("vs,vsij->vij", weights, (joints @ from_rest)[slots])
         x, y, z = np.einsum("vij,vj->vi", blended, homogeneous)[:, :3].T

@@ -68,8 +68,8 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     )
     error: bpy.props.FloatProperty(
         name="Error",
-        description="No more helper bones are added once the rms error is this much of the meshes' diagonal; 0: "
-        "all of them",
+        description="No more helper bones are added once the rms error is this much of the meshes' diagonal; "
+        "0: all of them",
         default=0.0,
         min=0.0,
         max=100.0,
