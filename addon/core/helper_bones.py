@@ -20,8 +20,10 @@ from .phrases import Phrase, phrase
 
 # At most so many of the rig's bones, and of the helper bones, are tried for a vertex.
 OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
-# Vertices that are weighted at once: what bounds the memory.
-_CHUNK = 1024
+# Of as many errors of candidates vertices are weighted at once: what bounds the memory.
+_NUMBERS_AT_ONCE = 2**21
+# A bone that is scaled to nothing has helper bones of this size.
+_SMALLEST_SCALE = 1e-3
 _SEED_STEPS = 4
 _SEED_VERTICES = 24
 _LAST_SWEEPS = 24
@@ -83,6 +85,7 @@ class Solution:
     bones    int [vertices, influences]: helpers follow the rig's bones; -1 for none
     weights  float64 [vertices, influences], of sum 1 where there are any
     before   of linear blend skinning by the rig's bones with the weights that there were
+    errors   float32 [vertices]: the rms error of each after it, over all frames
     """
 
     motions: np.ndarray
@@ -92,6 +95,7 @@ class Solution:
     weights: np.ndarray
     before: Errors
     after: Errors
+    errors: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -321,7 +325,7 @@ class _Solver:
         middle = np.average(self.middle[near], axis=0, weights=energy[near] + 1e-30)
         parent = self._nearest_bone(middle, np.unique(self.own[seed][self.own[seed] >= 0]))
         own = self.motion.bones[:, parent]
-        scale = np.cbrt(np.abs(np.linalg.det(own[:, :, :3])))
+        scale = np.maximum(np.cbrt(np.abs(np.linalg.det(own[:, :, :3]))), _SMALLEST_SCALE)
         helper = _Helper(own, parent, scale, may_move)
         # At first it moves the vertices about the seed alone, as one piece.
         helper.motion = self._fitted(helper, near, np.ones(len(near)), self.targets[near].astype(np.float64))
@@ -413,9 +417,10 @@ class _Solver:
 
     def weigh(self) -> Generator[float, None, None]:
         """The best weights of each vertex while all motions stay; how much is done, 0 to 1."""
-        parts = []
-        for start in range(0, len(self.own), _CHUNK):
-            end = min(start + _CHUNK, len(self.own))
+        parts, width = [], self.targets.shape[1] * (OWN_CANDIDATES + HELPER_CANDIDATES)
+        chunk = max(_NUMBERS_AT_ONCE // max(width, 1), 32)
+        for start in range(0, len(self.own), chunk):
+            end = min(start + chunk, len(self.own))
             parts.append(self._weigh(np.arange(start, end)))
             yield end / len(self.own)
         if parts:
@@ -501,6 +506,8 @@ class _Solver:
         bones[self.deformed, slots] = np.where(self.bones >= 0, numbers[self.bones], -1)
         weights[self.deformed, slots] = self.weights
         frames = len(self.motion.targets)
+        errors = np.zeros(vertices, dtype=np.float32)
+        errors[self.deformed] = np.sqrt(np.square(self.residual).sum(axis=1) / max(frames, 1))
         return Solution(
             np.array([helper.motion for helper in helpers]).reshape(-1, frames, 3, 4).swapaxes(0, 1),
             np.array([helper.parent for helper in helpers], dtype=int),
@@ -509,6 +516,7 @@ class _Solver:
             weights,
             before,
             self.errors(),
+            errors,
         )
 
     def _head(self, bone: int) -> np.ndarray:

@@ -14,6 +14,7 @@ from ..core.rig import Bones
 from . import actions, mesh_io
 
 COLLECTION = "Sinew helpers"
+ERRORS = "Sinew bake error"
 # What Blender takes for a bone's name, in bytes.
 _LONGEST_NAME = 63
 # Of the length of the bone that it hangs under.
@@ -161,6 +162,17 @@ def write_weights(
         row.update({int(group_of[bone]): float(v) for bone, v in zip(own, values, strict=True) if bone >= 0})
         rows[vertex] = row
     mesh_io.write_group_weights(obj, rows)
+
+
+def write_errors(mesh: bpy.types.Mesh, errors: np.ndarray) -> None:
+    """Stores float32 [vertices] as an attribute, which overlays and materials can show."""
+    active = mesh.attributes.active_index
+    attribute = mesh.attributes.get(ERRORS)
+    if attribute is not None:
+        mesh.attributes.remove(attribute)
+    mesh.attributes.new(ERRORS, "FLOAT", "POINT").data.foreach_set("value", errors)
+    # A new attribute becomes the active one, which is the artist's choice.
+    mesh.attributes.active_index = active
 
 
 def _used(names: Sequence[str], slots: np.ndarray) -> list[str]:

@@ -96,7 +96,7 @@ def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
 def start(kind: str, frames: str) -> Iterator[None]:
     """By the dialog that the panel's button opens."""
     with window.in_view3d():
-        bpy.ops.sinew.bake("INVOKE_DEFAULT", kind=kind, frames=frames, folder=str(FOLDER))
+        bpy.ops.sinew.bake("INVOKE_DEFAULT", kind=kind, frames=frames, folder=str(FOLDER), helpers=6)
     yield
     press("RET")
 

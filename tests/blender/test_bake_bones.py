@@ -81,6 +81,9 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
         weights = [entry.weight for entry in vertex.groups if entry.weight > 0.0]
         assert len(weights) <= 4
         assert abs(sum(weights) - 1.0) < 1e-5
+    errors = np.empty(len(obj.data.vertices), dtype=np.float32)
+    obj.data.attributes["Sinew bake error"].data.foreach_get("value", errors)
+    assert np.isclose(np.sqrt(np.square(errors).mean()), report["after"]["rms"], rtol=1e-4)
     # What was there is there for the way back.
     kept = {"Arm": bpy.data.meshes, "Arm Rig": bpy.data.armatures, "Arm RigAction": bpy.data.actions}
     assert all(data[name].use_fake_user for name, data in kept.items())

@@ -163,6 +163,7 @@ class _Rig:
             helper_bones_io.write_weights(
                 obj, bones, [*bones.names, *names], solution.bones[rows], solution.weights[rows]
             )
+            helper_bones_io.write_errors(obj.data, self._unit * solution.errors[rows])
 
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:
