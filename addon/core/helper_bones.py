@@ -111,12 +111,10 @@ class HelperOptions:
     error: float = 0.0
     influences: int = 4
 
-    def of(self, motion: Motion, parents: np.ndarray) -> Wanted:
-        """parents  int [bones], the bone above each, -1 for none; it comes before them"""
-        weighted = np.zeros(len(parents), dtype=bool)
-        weighted[motion.influences.bones] = True
-        helpers = self.helpers or 2 * joints(parents, weighted)
-        return Wanted(helpers, self.error / 100.0 * motion.diagonal, self.influences)
+    def of(self, motion: Motion) -> Wanted:
+        # Each weighted bone but the first is jointed to others.
+        joints = max(len(np.unique(motion.influences.bones)) - 1, 0)
+        return Wanted(self.helpers or 2 * joints, self.error / 100.0 * motion.diagonal, self.influences)
 
 
 DEFAULT_HELPERS = HelperOptions()
@@ -174,21 +172,6 @@ class Report:
             rms_before=f"{self.before.rms:.2g}",
             worst_before=f"{self.before.worst:.2g}",
         )
-
-
-def joints(parents: np.ndarray, weighted: np.ndarray) -> int:
-    """How many weighted bones have a weighted bone above them.
-
-    parents   int [bones], -1 for none; a parent comes before its children
-    weighted  bool [bones]
-    """
-    below = np.zeros(len(parents), dtype=bool)
-    count = 0
-    for bone, parent in enumerate(parents):
-        above = parent >= 0 and bool(below[parent] or weighted[parent])
-        below[bone] = above
-        count += above and bool(weighted[bone])
-    return count
 
 
 def solve(motion: Motion, wanted: Wanted) -> Generator[float, None, Solution]:

@@ -148,6 +148,8 @@ def write_weights(
     group_of = np.array([index.get(name, -1) for name in names])
     before = mesh_io.read_group_weights(obj.data)
     is_of_bone = bones.of_groups([group.name for group in obj.vertex_groups]) >= 0
+    # Also what an earlier bake left under the name of a new bone.
+    is_of_bone[list(index.values())] = True
     ends = np.cumsum(before.counts)
     rows = {}
     for vertex, (own, values) in enumerate(zip(slots, weights, strict=True)):

@@ -90,9 +90,10 @@ def test_the_error_never_grows_with_more_helper_bones():
 
 def test_no_more_helper_bones_than_the_error_needs():
     motion = motion_by("dq")
-    few = solved(motion, HelperOptions(20, error=0.5).of(motion, np.array([-1, 0])))
+    few = solved(motion, HelperOptions(20, error=0.5).of(motion))
     assert few.after.rms <= 0.005 * motion.diagonal
     assert 0 < len(few.parents) < 6
+    assert HelperOptions().of(motion).helpers == 2
 
 
 @pytest.mark.parametrize("most", [1, 2, 4])
@@ -185,8 +186,3 @@ def test_sparse_weights_against_all_subsets():
         # With a limit the search is none of all sets.
         assert (found <= best * (1.0 + slack)).mean() > 0.95
         assert (found >= best * (1.0 - 1e-6)).all()
-
-
-def test_joints_are_bones_below_weighted_ones():
-    parents = np.array([-1, 0, 1, 2, 1, -1])
-    assert helper_bones.joints(parents, np.array([False, True, False, True, True, True])) == 2

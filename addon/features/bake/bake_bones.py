@@ -8,6 +8,7 @@ Like bake.Bake it goes in steps: sample(), place(), publish(), discard().
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import bpy
@@ -117,6 +118,10 @@ class _Rig:
         self._poses.append(frames[0].pose.astype(np.float64))
         self._targets.append(np.concatenate(targets).astype(np.float32))
         together = np.concatenate(rest).astype(np.float32)
+        if not np.isfinite(self._targets[-1]).all() or not np.isfinite(self._poses[-1]).all():
+            raise SinewError(
+                f"{self.rig.name}: frame {bpy.context.scene.frame_current} has points that are none"
+            )
         if len(together) != len(self._targets[0]):
             raise SinewError(f"{self.rig.name}: the number of vertices changes; bake to alembic or usd")
         # Where nothing but the armature moves them, one array stands for all.
@@ -134,15 +139,9 @@ class _Rig:
             np.stack([self._bones.envelopes.heads, self._bones.envelopes.tails], axis=1).astype(np.float64),
         )
         self._targets.clear()
-        parents = self._bone_parents()
-        self._solution = yield from helper_bones.solve(motion, options.of(motion, parents))
+        self._solution = yield from helper_bones.solve(motion, options.of(motion))
         diagonal = self._unit * motion.diagonal
         self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
-
-    def _bone_parents(self) -> np.ndarray:
-        index = {name: number for number, name in enumerate(self._bones.names)}
-        bones = self.rig.data.bones
-        return np.array([index[b.parent.name] if b.parent is not None else -1 for b in bones])
 
     def place(self, frames: Sequence[float]) -> None:
         solution, bones = self._solution, self._bones
@@ -151,7 +150,8 @@ class _Rig:
         motions[:, :, :3], motions[:, :, 3, 3] = solution.motions, 1.0
         parents = np.array(self._poses)[:, solution.parents]
         times = shape_animation.key_times(frames)
-        with evaluate.shown([self.rig]):
+        # Only what is visible can be edited.
+        with nullcontext() if self.rig.visible_get() else evaluate.shown([self.rig]):
             names = helper_bones_io.add_bones(self.rig, own, solution.heads)
         helper_bones_io.write_keys(self.rig, names, motions, parents, times)
         first = 0
