@@ -24,6 +24,7 @@ from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, shape_animation
 from .bake_bones import BoneBake
+from .take_off import take_off
 
 SHAPE_KEYS = "shape-keys"
 
@@ -253,10 +254,8 @@ def start(
 
 def _take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off; the Armature modifiers stay, switched off, with their armatures for the way back."""
-    # A parent that deforms would do so on top of the bake.
-    properties.of(obj).parent_type = ""
     run = [modifier.name for modifier in stack.armature_modifiers(obj)]
-    attach.take_off(obj)
+    take_off(obj)
     for name in run:
         modifier = obj.modifiers[name]
         modifier.show_viewport = modifier.show_render = False

@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...attach import attach, corrective_smooth, properties, stack, upstream_proxy
+from ...attach import properties, stack, upstream_proxy
 from ...core import helper_bones
 from ...core.errors import SinewError
 from ...core.helper_bones import HelperOptions, Motion, Report
@@ -25,6 +25,7 @@ from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io
 from . import shape_animation
+from .take_off import take_off
 
 # Of the time that a bake takes, until the frames are read.
 _SAMPLING = 0.2
@@ -168,13 +169,7 @@ class _Rig:
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:
     """Takes Sinew off; the Armature modifier blends linearly by vertex groups."""
-    # A parent that deforms has none of the modifier's options.
-    properties.of(obj).parent_type = ""
-    # What it smooths is in the bake.
-    smooth = corrective_smooth.replaced_modifier(obj)
-    attach.take_off(obj)
-    if smooth is not None:
-        smooth.show_viewport = smooth.show_render = False
+    take_off(obj)
     modifier = stack.armature_modifier(obj)
     modifier.object = rig
     modifier.use_deform_preserve_volume = modifier.use_bone_envelopes = False
