@@ -21,6 +21,13 @@ def count(text: str) -> int:
     return number
 
 
+def percent(text: str) -> float:
+    number = float(text)
+    if not 0.0 < number <= 100.0:
+        raise argparse.ArgumentTypeError(f"expected more than 0 and at most 100, got {text}")
+    return number
+
+
 def frame_step(text: str) -> int:
     number = int(text)
     if number < 1:

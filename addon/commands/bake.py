@@ -4,18 +4,20 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
+from ..core.helper_bones import HelperOptions, Report
 from ..jobs.inputs import Job, plan_jobs
-from .arguments import add_copies, add_set, frame_step
+from .arguments import add_copies, add_set, count, frame_step, percent
 from .console import Console
 from .outcome import Outcome
 
@@ -31,15 +33,17 @@ mdd, pc2    a .blend with a Mesh Cache modifier for each mesh, and its caches in
 alembic     an .abc of the final meshes, with UVs and materials
 usd         a .usdc of the same
 gltf        a .glb of the same, the frames as morph targets
+bones       a .blend whose armatures have helper bones with keys, and meshes with weights of all bones: linear
+            blending, as every engine and glTF and FBX files have it, comes as near as the errors say
 
-In a .blend the Armature modifiers stay, switched off. Between frames that are not neighbours shapes move in
-straight lines."""
+In a .blend the Armature modifiers stay, switched off (bones: on). Between frames that are not neighbours
+shapes move in straight lines."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         "bake",
-        help="write what Sinew deforms as shape keys, point caches, Alembic, USD or glTF",
+        help="write what Sinew deforms as shape keys, point caches, Alembic, USD, glTF or helper bones",
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -48,6 +52,23 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument("--to", required=True, choices=KINDS, help="what to write")
     parser.add_argument("--frames", help="such as 1,12,40-48 (default: the scene's frames)")
     parser.add_argument("--step", type=frame_step, default=1, metavar="N", help="every Nth of the frames")
+    parser.add_argument(
+        "--helpers",
+        type=count,
+        metavar="N",
+        help="bones: helper bones of each armature, at most (default: two a joint)",
+    )
+    parser.add_argument(
+        "--error",
+        type=percent,
+        default=0.0,
+        metavar="PERCENT",
+        help="bones: add no more once the rms error is this much of the meshes' diagonal",
+    )
+    parser.add_argument(
+        "--influences", type=count, default=4, metavar="N", help="bones: of a vertex, at most (default: 4)"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)
     return parser
 
@@ -56,6 +77,18 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 class Baked(Outcome):
     meshes: int = 0
     frames: int = 0
+    bones: list[Report] = field(default_factory=list)
+    unit: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "source": str(self.job.source),
+            "file": None if self.error is not None else str(self.job.target),
+            "meshes": self.meshes,
+            "frames": self.frames,
+            "errors": [self.error] if self.error is not None else self.left_out,
+            "bones": [report.as_json() for report in self.bones],
+        }
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -77,11 +110,17 @@ def run(args: argparse.Namespace, console: Console) -> int:
             outcome.error = str(error)
         outcome.complain(console)
         outcomes.append(outcome)
+    failures = sum(outcome.failed for outcome in outcomes)
+    if args.json:
+        console.say(json.dumps([outcome.as_json() for outcome in outcomes], indent=2, ensure_ascii=False))
+        return 1 if failures else 0
     console.table(
         ("file", "meshes", "frames", "result"),
         [(str(o.job.source), str(o.meshes), str(o.frames), o.result) for o in outcomes],
     )
-    failures = sum(outcome.failed for outcome in outcomes)
+    for outcome in outcomes:
+        for report in outcome.bones:
+            console.say(f"{outcome.job.target}: {report.sentence(outcome.unit)}")
     console.say(f"{len(outcomes) - failures} of {len(outcomes)} files baked with {args.method}")
     return 1 if failures else 0
 
@@ -93,7 +132,7 @@ def _bake(
 
     from ..attach import attach
     from ..deform import evaluate
-    from ..features.bake import bake, bake_apart
+    from ..features.bake import bake, bake_apart, bake_bones
     from ..io import files
 
     source, target = outcome.job.source, outcome.job.target
@@ -118,12 +157,13 @@ def _bake(
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:
-            started = bake.start(taken, args.to, chosen, target, args.overwrite)
+            helpers = HelperOptions(args.helpers or 0, args.error, args.influences)
+            started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers)
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
         # An exporter writes all frames in one call, which can not be interrupted and can crash on a full
         # disk: it runs in a process of its own.
-        shares = started.sample() if isinstance(started, bake.Bake) else bake_apart.sample(started)
+        shares = bake_apart.sample(started) if isinstance(started, bake_apart.Export) else started.sample()
         with (
             _whole_or_nothing(started, source),
             console.bar(what, len(chosen)) as show,
@@ -135,11 +175,13 @@ def _bake(
             show(1.0)
     with _whole_or_nothing(started, source):
         started.place()
-        if isinstance(started, bake.Bake):
-            files.save_copy(source, target, started.publish)
-        else:
+        if args.to in EXPORTS:
             started.publish()
+        else:
+            files.save_copy(source, target, started.publish)
     outcome.meshes, outcome.frames = len(taken), len(chosen)
+    if isinstance(started, bake_bones.BoneBake):
+        outcome.bones, outcome.unit = started.reports, evaluate.length_unit(scene)
 
 
 @contextmanager

@@ -16,7 +16,8 @@ from .errors import SinewError, WrongUse
 from .output import remove, writing
 
 # Bakes that play in a .blend, and bakes that are files for other programs.
-IN_FILE = ("shape-keys", "mdd", "pc2")
+BONES = "bones"
+IN_FILE = ("shape-keys", "mdd", "pc2", BONES)
 EXPORTS = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
 KINDS = (*IN_FILE, *EXPORTS)
 BAKED = ".baked.blend"

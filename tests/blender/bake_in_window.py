@@ -25,7 +25,7 @@ FOLDER = PICTURE.parent / "baked"
 USER = PICTURE.parent / "user"
 FRAME = 16
 # Long enough to be stopped; glTF's exporter takes minutes for as many.
-LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 500}
+LONG = {"shape-keys": 2000, "mdd": 3000, "alembic": 3000, "usd": 3000, "gltf": 500, "bones": 2000}
 # Some distributions' Blenders lack the others.
 KINDS = [kind for kind in LONG if kind not in ("alembic", "usd") or getattr(bpy.app, kind).supported]
 TICK = 0.1
@@ -43,12 +43,12 @@ def is_baking() -> bool:
     return any(operator.bl_idname == "SINEW_OT_bake" for operator in running)
 
 
-def is_done_since(files: list[str]) -> Callable[[], bool]:
-    """Whether a bake is at its end that starts with these files."""
+def is_done_since(files: list[str], bones: int) -> Callable[[], bool]:
+    """Whether a bake is at its end that starts with these files and so many bones."""
 
     def is_done() -> bool:
         now = state()
-        return not is_baking() and (now["keys"] or now["files"] != files)
+        return not is_baking() and (now["keys"] or now["bones"] != bones or now["files"] != files)
 
     return is_done
 
@@ -75,6 +75,8 @@ def state() -> dict[str, object]:
         "keys": obj.data.shape_keys is not None,
         "meshes": len(bpy.data.meshes),
         "actions": len(bpy.data.actions),
+        "bones": sum(len(o.data.bones) for o in bpy.data.objects if o.type == "ARMATURE"),
+        "armatures": len(bpy.data.armatures),
         "method": obj.sinew.method,
         "points": hashlib.sha256(window.final_points(obj)).hexdigest(),
         "files": sorted(str(p.relative_to(PICTURE.parent)) for p in FOLDER.rglob("*")),
@@ -94,7 +96,7 @@ def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
 def start(kind: str, frames: str) -> Iterator[None]:
     """By the dialog that the panel's button opens."""
     with window.in_view3d():
-        bpy.ops.sinew.bake("INVOKE_DEFAULT", kind=kind, frames=frames, folder=str(FOLDER))
+        bpy.ops.sinew.bake("INVOKE_DEFAULT", kind=kind, frames=frames, folder=str(FOLDER), helpers=6)
     yield
     press("RET")
 
@@ -131,7 +133,7 @@ def steps() -> Iterator[None]:
             "changed": {k: [before[k], after[k]] for k in before if before[k] != after[k]},
         }
     for kind in KINDS:
-        is_done = is_done_since(state()["files"])
+        is_done = is_done_since(state()["files"], state()["bones"])
         yield from start(kind, "1-24")
         yield from until(is_done, f"the end of a bake to {kind}")
         ended = state()

@@ -333,6 +333,7 @@ def test_bakes_in_a_window(photographed):
     assert not any(one["not undone"] for one in ended.values()), ended
     assert (ended["shape-keys"]["keys"], ended["shape-keys"]["modifiers"]) == (True, ["ARMATURE"])
     assert ended["mdd"]["modifiers"] == ["MESH_CACHE", "ARMATURE"]
+    assert ended["bones"]["modifiers"] == ["ARMATURE"]
     assert stopped.keys() | facts["refused"].keys() == set(KINDS) - {"pc2"}
     assert all("built without" in error for error in facts["refused"].values())
     assert not any(".unfinished" in name for one in ended.values() for name in one["files"])

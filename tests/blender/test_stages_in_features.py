@@ -21,6 +21,7 @@ from sinew_addon.attach import properties
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS, Measured
 from sinew_addon.deform import evaluate, session
+from sinew_addon.features.bake import bake
 from sinew_addon.features.heat import live, worst_frames
 from sinew_addon.features.pages import measure
 
@@ -153,6 +154,24 @@ def test_copies_have_a_corrective_smooth_that_was_taken_over_once(arm):
     assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
     assert properties.of(obj).delta_mush.enabled
     assert_copy_shows(obj, behind)
+
+
+@pytest.mark.parametrize("kind", ["mdd", "bones"])
+def test_a_bake_has_a_corrective_smooth_that_was_taken_over_once(arm, kind, tmp_path):
+    obj, _path = arm
+    obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH").iterations = 20
+    scenes.add_sinew(obj, "dq")
+    expected = scenes.shapes(obj, FRAMES)
+    bpy.context.view_layer.objects.active = obj
+    assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
+    started = bake.start([obj], kind, FRAMES, tmp_path / "arm.blend", overwrite=False)
+    for _share in started.sample():
+        pass
+    started.publish()
+    started.place()
+    distances = np.linalg.norm(scenes.shapes(obj, FRAMES) - expected, axis=2)
+    stated = started.reports[0].after.worst if kind == "bones" else 0.0
+    assert distances.max() <= 1.001 * stated + 1e-5 * scenes.diagonal(obj)
 
 
 def assert_copy_shows(obj: bpy.types.Object, shapes: np.ndarray) -> None:

@@ -17,11 +17,14 @@ import numpy as np
 from ...attach import attach, properties, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
+from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...deform import evaluate, session
 from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...io import files
 from ...io.animation_paths import curves_of
 from . import bake_export, shape_animation
+from .bake_bones import BoneBake
+from .take_off import take_off
 
 SHAPE_KEYS = "shape-keys"
 
@@ -215,7 +218,7 @@ class Bake:
             self.folder.rmdir()
 
 
-Started = Bake | bake_export.SceneExport | bake_export.MorphExport
+Started = Bake | BoneBake | bake_export.SceneExport | bake_export.MorphExport
 
 
 def suffix_of(kind: str) -> str:
@@ -224,14 +227,22 @@ def suffix_of(kind: str) -> str:
 
 
 def start(
-    meshes: list[bpy.types.Object], kind: str, frames: Sequence[float], target: Path, overwrite: bool
+    meshes: list[bpy.types.Object],
+    kind: str,
+    frames: Sequence[float],
+    target: Path,
+    overwrite: bool,
+    helpers: HelperOptions = DEFAULT_HELPERS,
 ) -> Started:
     """A bake of skinned meshes; caches go to a folder beside `target`, exports to itself.
 
     frames     in rising order
     overwrite  whether files that are there already may be replaced
+    helpers    of a bake to bones
     Raises SinewError where it can not be done.
     """
+    if kind == bake.BONES:
+        return BoneBake(meshes, frames, helpers)
     if kind in bake.EXPORTS:
         files.check_free(target, overwrite)
     if kind in bake_export.SCENES:
@@ -243,10 +254,8 @@ def start(
 
 def _take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off; the Armature modifiers stay, switched off, with their armatures for the way back."""
-    # A parent that deforms would do so on top of the bake.
-    properties.of(obj).parent_type = ""
     run = [modifier.name for modifier in stack.armature_modifiers(obj)]
-    attach.take_off(obj)
+    take_off(obj)
     for name in run:
         modifier = obj.modifiers[name]
         modifier.show_viewport = modifier.show_render = False

@@ -15,6 +15,7 @@ from ...core.names import fits
 from ...deform import evaluate
 from ...io import files
 from . import bake
+from .bake_bones import BoneBake
 
 
 def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
@@ -49,6 +50,8 @@ def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
                 _check_free(one.files, task)
                 for _part in one.sample():
                     pass
+                if isinstance(one, BoneBake):
+                    bakes[-1]["bones"] = [report.as_json() for report in one.reports]
                 beside += one.files
                 if kind not in EXPORTS:
                     in_file.append(one)

@@ -8,13 +8,17 @@ from pathlib import Path
 
 import bpy
 
-from ...core.bake import EXPORTS
+from ...core.bake import BONES, EXPORTS
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
+from ...core.helper_bones import HelperOptions
+from ...deform import evaluate
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.translations import tr
-from . import bake, bake_apart
+from . import bake, bake_apart, bake_bones
+
+WITHOUT_FILES = (bake.SHAPE_KEYS, BONES)
 
 
 class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
@@ -32,6 +36,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
             ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
             ("pc2", "PC2 Cache", "A point cache and a Mesh Cache modifier, in this file"),
+            (BONES, "Bones", "Helper bones with keys, and weights, in this file: what engines play"),
             ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
             ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
             ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),
@@ -54,6 +59,30 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     overwrite: bpy.props.BoolProperty(
         name="Overwrite", description="Replace files that are there already", default=False
     )
+    helpers: bpy.props.IntProperty(
+        name="Helper Bones",
+        description="How many each armature gets at most; 0: two a joint",
+        default=0,
+        min=0,
+        soft_max=200,
+    )
+    error: bpy.props.FloatProperty(
+        name="Error",
+        description="No more helper bones are added once the rms error is this much of the meshes' diagonal; "
+        "0: all of them",
+        default=0.0,
+        min=0.0,
+        max=100.0,
+        precision=3,
+        subtype="PERCENTAGE",
+    )
+    influences: bpy.props.IntProperty(
+        name="Influences",
+        description="How many bones move a vertex at most; most engines take four",
+        default=4,
+        min=1,
+        soft_max=8,
+    )
     in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -65,8 +94,10 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        writes_files = self.kind != bake.SHAPE_KEYS
-        for name in ("kind", "frames", "step", *(("folder", "overwrite") if writes_files else ())):
+        of_kind = ("helpers", "error", "influences") if self.kind == BONES else ()
+        if self.kind not in WITHOUT_FILES:
+            of_kind = ("folder", "overwrite")
+        for name in ("kind", "frames", "step", *of_kind):
             layout.prop(self, name)
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -77,7 +108,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "asked", False):
             # A dialog's operator can not go on in steps itself.
-            names = ("kind", "frames", "step", "folder", "overwrite")
+            names = ("kind", "frames", "step", "folder", "overwrite", "helpers", "error", "influences")
             bpy.ops.sinew.bake(
                 "INVOKE_DEFAULT", in_steps=True, **{name: getattr(self, name) for name in names}
             )
@@ -98,17 +129,23 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             self.started.discard()
             raise
         self.report({"INFO"}, tr("Baked {names}", names=self.started.what))
+        if isinstance(self.started, bake_bones.BoneBake):
+            for report in self.started.reports:
+                sentence = report.sentence(evaluate.length_unit(context.scene))
+                self.report({"INFO"}, tr(sentence))
         return {"FINISHED"}
 
     def _start(self, context: bpy.types.Context) -> bake.Started:
         scene, name = context.scene, Path(bpy.data.filepath).stem
-        if self.kind != bake.SHAPE_KEYS and self.folder.startswith("//") and not name:
+        if self.kind not in WITHOUT_FILES and self.folder.startswith("//") and not name:
             raise SinewError("Save the file first, or choose a folder that is not beside it")
         frames = sorted(set(parse_frames(self.frames))) if self.frames.strip() else None
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
         suffix = bake.suffix_of(self.kind)
         target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
-        return bake.start(sinew_targets(context), self.kind, frames[:: self.step], target, self.overwrite)
+        helpers = HelperOptions(self.helpers, self.error, self.influences)
+        meshes, frames = sinew_targets(context), frames[:: self.step]
+        return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers)
 
 
 CLASSES = (SINEW_OT_bake,)

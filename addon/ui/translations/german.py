@@ -683,6 +683,27 @@ TEXTS = {
     "Where files go; // is beside this file": "Wohin Dateien kommen; // ist neben dieser Datei",
     "Overwrite": "Überschreiben",
     "Replace files that are there already": "Dateien ersetzen, die schon da sind",
+    "Helper bones with keys, and weights, in this file: what engines play": (
+        "Hilfsknochen mit Schlüsselbildern, und Gewichte, in dieser Datei: was Spiele abspielen"
+    ),
+    "Helper Bones": "Hilfsknochen",
+    "How many each armature gets at most; 0: two a joint": (
+        "Wie viele jede Armatur höchstens bekommt; 0: zwei je Gelenk"
+    ),
+    "Error": "Fehler",
+    "No more helper bones are added once the rms error is this much of the meshes' diagonal; "
+    "0: all of them": (
+        "Sobald der mittlere Fehler so viel der Diagonale der Maschen ist, kommen keine Hilfsknochen mehr "
+        "hinzu; 0: alle"
+    ),
+    "How many bones move a vertex at most; most engines take four": (
+        "Wie viele Knochen einen Punkt höchstens bewegen; die meisten Spiele nehmen vier"
+    ),
+    "{name}: {count} helper bones; error {rms} {unit} rms, {worst} at most ({shares} of the diagonal)"
+    "; linear blending had {rms_before} and {worst_before}": (
+        "{name}: {count} Hilfsknochen; Fehler im Mittel {rms} {unit}, höchstens {worst} ({shares} der "
+        "Diagonale); lineares Überblenden hatte {rms_before} und {worst_before}"
+    ),
     "Sinew bakes": "Sinew backt",
     "Bake stopped; nothing was written": "Backen angehalten; nichts wurde geschrieben",
     # Compare

@@ -1,0 +1,534 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Any deformation as linear blend skinning: helper bones beside a rig's own, their motions and all weights.
+
+After B. H. Le and Z. Deng, *Smooth skinning decomposition with rigid bones* (2012): motions and weights are
+solved in turns, each exactly while the other stands still, so that the error falls with every step. Other
+than there, the rig's bones keep their motions, and a helper bone begins where the error is largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import simplex
+from .influences import Influences
+from .phrases import Phrase, phrase
+
+# At most so many of the rig's bones, and of the helper bones, are tried for a vertex.
+OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
+# Of as many errors of candidates vertices are weighted at once: what bounds the memory.
+_NUMBERS_AT_ONCE = 2**21
+# A bone that is scaled to nothing has helper bones of this size.
+_SMALLEST_SCALE = 1e-3
+_SEED_STEPS = 4
+_SEED_VERTICES = 24
+_LAST_SWEEPS = 24
+# The last sweeps end where so many gain less than this share of the error.
+_SWEEPS_WITHOUT_GAIN, _SMALL_GAIN = 4, 0.01
+_SMALLEST_WEIGHT = 1e-4
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is to be reproduced, in armature space.
+
+    rest        float32 [frames or 1, vertices, 3]: what the armature deforms
+    targets     float32 [frames, vertices, 3]: what it is to become
+    bones       float64 [frames, bones, 3, 4]: each bone's motion from rest
+    influences  of bones; vertices without any stay as they are
+    segments    float64 [bones, 2, 3], heads and tails at rest
+    """
+
+    rest: np.ndarray
+    targets: np.ndarray
+    bones: np.ndarray
+    influences: Influences
+    segments: np.ndarray
+
+    @property
+    def diagonal(self) -> float:
+        """Of the bounding box at rest."""
+        return float(np.linalg.norm(np.ptp(self.rest[0], axis=0))) if self.rest.shape[1] else 0.0
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """
+    helpers     how many there may be
+    error       the rms error in scene units from which on no more are added
+    influences  of a vertex, at most
+    """
+
+    helpers: int
+    error: float = 0.0
+    influences: int = 4
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Over all vertices with weights and all frames, in scene units."""
+
+    rms: float
+    worst: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """
+    motions  float64 [frames, helpers, 3, 4]: rigid but for the scale of the parent
+    parents  int [helpers], bones
+    heads    float64 [helpers, 3]: the middle of what each moves
+    bones    int [vertices, influences]: helpers follow the rig's bones; -1 for none
+    weights  float64 [vertices, influences], of sum 1 where there are any
+    before   of linear blend skinning by the rig's bones with the weights that there were
+    errors   float32 [vertices]: the rms error of each after it, over all frames
+    """
+
+    motions: np.ndarray
+    parents: np.ndarray
+    heads: np.ndarray
+    bones: np.ndarray
+    weights: np.ndarray
+    before: Errors
+    after: Errors
+    errors: np.ndarray
+
+
+@dataclass(frozen=True)
+class HelperOptions:
+    """What the user chooses.
+
+    helpers     for each armature, at most; 0 for two a joint
+    error       the rms error, in percent of the diagonal, that as few as possible are to reach; 0 for all
+    influences  of a vertex, at most
+    """
+
+    helpers: int = 0
+    error: float = 0.0
+    influences: int = 4
+
+    def of(self, motion: Motion) -> Wanted:
+        # Each weighted bone but the first is jointed to others.
+        joints = max(len(np.unique(motion.influences.bones)) - 1, 0)
+        return Wanted(self.helpers or 2 * joints, self.error / 100.0 * motion.diagonal, self.influences)
+
+
+DEFAULT_HELPERS = HelperOptions()
+
+
+@dataclass(frozen=True)
+class Report:
+    """What came of it; lengths in scene units.
+
+    diagonal  of the meshes' bounding box at rest
+    """
+
+    armature: str
+    helpers: int
+    influences: int
+    diagonal: float
+    before: Errors
+    after: Errors
+
+    @classmethod
+    def of(cls, armature: str, solution: Solution, unit: float, diagonal: float) -> Report:
+        """unit  of armature space, in scene units"""
+        before, after = (
+            Errors(unit * errors.rms, unit * errors.worst) for errors in (solution.before, solution.after)
+        )
+        most = int((solution.weights > 0.0).sum(axis=1).max(initial=0))
+        return cls(armature, len(solution.parents), most, diagonal, before, after)
+
+    def as_json(self) -> dict[str, Any]:
+        """With each error as a share of the diagonal, too."""
+        size = self.diagonal or 1.0
+        return asdict(self) | {
+            name: {
+                "rms": errors.rms,
+                "worst": errors.worst,
+                "rms_share": errors.rms / size,
+                "worst_share": errors.worst / size,
+            }
+            for name, errors in (("before", self.before), ("after", self.after))
+        }
+
+    def sentence(self, unit: str) -> Phrase:
+        """unit  what a scene unit is called"""
+        size = self.diagonal or 1.0
+        shares = (f"{100.0 * each / size:.2g}%" for each in (self.after.rms, self.after.worst))
+        return phrase(
+            "{name}: {count} helper bones; error {rms} {unit} rms, {worst} at most ({shares} of the diagonal)"
+            "; linear blending had {rms_before} and {worst_before}",
+            name=self.armature,
+            count=self.helpers,
+            unit=unit,
+            rms=f"{self.after.rms:.2g}",
+            worst=f"{self.after.worst:.2g}",
+            shares=" / ".join(shares),
+            rms_before=f"{self.before.rms:.2g}",
+            worst_before=f"{self.before.worst:.2g}",
+        )
+
+
+def solve(motion: Motion, wanted: Wanted) -> Generator[float, None, Solution]:
+    """How much is done, 0 to 1; returns the helper bones and the weights of all bones."""
+    solver = _Solver(motion, wanted.influences)
+    before = solver.errors()
+    for _part in solver.weigh():
+        yield 0.0
+    rounds = _rounds(wanted.helpers)
+    steps = len(rounds) + _LAST_SWEEPS
+    for number, count in enumerate(rounds):
+        if solver.errors().rms <= wanted.error:
+            break
+        for _helper in range(count):
+            solver.add_helper()
+            yield (number + 0.3) / steps
+        solver.move()
+        for share in solver.weigh():
+            yield (number + 0.3 + 0.7 * share) / steps
+    if solver.helpers:
+        for share in solver.refine():
+            yield (len(rounds) + share * _LAST_SWEEPS) / steps
+    yield 1.0
+    return solver.solution(before)
+
+
+def _rounds(helpers: int) -> list[int]:
+    """How many are added at a time: half of those that there are."""
+    rounds, count = [], 0
+    while count < helpers:
+        rounds.append(min(max(2, count // 2), helpers - count))
+        count += rounds[-1]
+    return rounds
+
+
+@dataclass
+class _Helper:
+    """
+    motion    float64 [frames, 3, 4]
+    scale     float64 [frames], of its parent
+    may_move  bool [vertices]
+    """
+
+    motion: np.ndarray
+    parent: int
+    scale: np.ndarray
+    may_move: np.ndarray
+
+
+@dataclass
+class _Solver:
+    """Vertices here are those with weights.
+
+    targets   float32 [vertices, frames * 3]
+    residual  float32 [vertices, frames * 3]: what the present blend lacks of being 0
+    bones, weights  [vertices, slots] of the present blend; -1 and 0 for none
+    """
+
+    motion: Motion
+    most: int
+    helpers: list[_Helper] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        influences = self.motion.influences
+        self.deformed = np.flatnonzero(influences.counts > 0)
+        own, weights = _padded(influences)
+        self.own, self.own_weights = own[self.deformed], weights[self.deformed]
+        self.own_weights /= self.own_weights.sum(axis=1, keepdims=True)
+        self.rest = np.ascontiguousarray(self.motion.rest[:, self.deformed].transpose(1, 0, 2), np.float64)
+        frames = len(self.motion.targets)
+        self.targets = np.ascontiguousarray(self.motion.targets[:, self.deformed].transpose(1, 0, 2))
+        self.targets = self.targets.reshape(len(self.deformed), 3 * frames)
+        self.middle = self.rest.mean(axis=1)
+        self.bones, self.weights = self.own, self.own_weights
+        self.residual = self._residual_of(self.bones, self.weights)
+
+    def errors(self) -> Errors:
+        if not len(self.residual):
+            return Errors(0.0, 0.0)
+        squares = np.square(self.residual).reshape(-1, 3).sum(axis=1)
+        return Errors(float(np.sqrt(squares.mean(dtype=np.float64))), float(np.sqrt(squares.max())))
+
+    def refine(self) -> Generator[float, None, None]:
+        """Motions and weights in turns, until little is gained; how much is done, 0 to 1.
+
+        Alone they take hundreds of turns for what far fewer reach that go on in the direction of the last:
+        the further, the longer that helps.
+        """
+        further, errors = 1.0, [self.errors().rms]
+        for sweep in range(_LAST_SWEEPS):
+            before = self._state
+            self.move()
+            if sweep:
+                self._go_on(before[0], further)
+            for share in self.weigh():
+                yield (sweep + share) / _LAST_SWEEPS
+            errors.append(self.errors().rms)
+            if errors[-1] > errors[-2]:
+                self._state, further, errors[-1] = before, 0.0, errors[-2]
+            else:
+                further += 0.5
+            long_ago = errors[-1 - _SWEEPS_WITHOUT_GAIN :][0]
+            if sweep >= _SWEEPS_WITHOUT_GAIN and errors[-1] > (1.0 - _SMALL_GAIN) * long_ago:
+                break
+
+    @property
+    def _state(self) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
+        return [helper.motion for helper in self.helpers], self.bones, self.weights, self.residual.copy()
+
+    @_state.setter
+    def _state(self, state: tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]) -> None:
+        motions, self.bones, self.weights, self.residual = state
+        for helper, motion in zip(self.helpers, motions, strict=True):
+            helper.motion = motion
+
+    def _go_on(self, before: list[np.ndarray], further: float) -> None:
+        """Moves each helper bone on from what it was `before`, by that much more of its way."""
+        for helper, old in zip(self.helpers, before, strict=True):
+            ahead = helper.motion + further * (helper.motion - old)
+            helper.motion = np.concatenate(
+                [helper.scale[:, None, None] * _rotation_near(ahead[:, :, :3]), ahead[:, :, 3:]], axis=2
+            )
+
+    # --- Motions
+
+    def add_helper(self) -> None:
+        """Where the error is largest; its weights are provisional until weigh()."""
+        energy = np.square(self.residual).sum(axis=1)
+        seed = int(energy.argmax())
+        may_move = self._share_bones(seed)
+        eligible = np.flatnonzero(may_move)
+        distances = np.square(self.middle[eligible] - self.middle[seed]).sum(axis=1)
+        near = eligible[np.argsort(distances, kind="stable")[:_SEED_VERTICES]]
+        middle = np.average(self.middle[near], axis=0, weights=energy[near] + 1e-30)
+        parent = self._nearest_bone(middle, np.unique(self.own[seed][self.own[seed] >= 0]))
+        own = self.motion.bones[:, parent]
+        scale = np.maximum(np.cbrt(np.abs(np.linalg.det(own[:, :, :3]))), _SMALLEST_SCALE)
+        helper = _Helper(own, parent, scale, may_move)
+        # At first it moves the vertices about the seed alone, as one piece.
+        helper.motion = self._fitted(helper, near, np.ones(len(near)), self.targets[near].astype(np.float64))
+        for _step in range(_SEED_STEPS):
+            shares = self._best_shares(helper, eligible)
+            taken = shares > _SMALLEST_WEIGHT
+            if taken.sum() < 3:
+                break
+            vertices, weights = eligible[taken], shares[taken]
+            others = (1.0 - weights)[:, None] * (self.residual[vertices] + self.targets[vertices])
+            helper.motion = self._fitted(helper, vertices, weights, self.targets[vertices] - others)
+        shares = self._best_shares(helper, eligible)
+        change = self._moved(helper.motion, eligible) - self.targets[eligible] - self.residual[eligible]
+        self.residual[eligible] += (shares[:, None] * change).astype(np.float32)
+        self.helpers.append(helper)
+
+    def move(self) -> None:
+        """The best motion of each helper bone, one after another, while weights and all others stay."""
+        first = self.motion.bones.shape[1]
+        for number, helper in enumerate(self.helpers):
+            vertices, slots = np.nonzero(self.bones == first + number)
+            if len(vertices) < 3:
+                continue
+            weights = self.weights[vertices, slots]
+            was = weights[:, None] * self._moved(helper.motion, vertices)
+            helper.motion = self._fitted(helper, vertices, weights, was - self.residual[vertices])
+            now = weights[:, None] * self._moved(helper.motion, vertices)
+            self.residual[vertices] += (now - was).astype(np.float32)
+
+    def _share_bones(self, seed: int) -> np.ndarray:
+        """bool [vertices]: those that have one of the rig's bones in common with this one."""
+        bones = self.own[seed]
+        shared = np.isin(self.own, bones[bones >= 0])
+        return np.asarray(shared.any(axis=1))
+
+    def _nearest_bone(self, point: np.ndarray, bones: np.ndarray) -> int:
+        heads, tails = self.motion.segments[bones, 0], self.motion.segments[bones, 1]
+        along = tails - heads
+        length = np.maximum(np.square(along).sum(axis=1), 1e-30)
+        share = np.clip(((point - heads) * along).sum(axis=1) / length, 0.0, 1.0)
+        return int(bones[np.linalg.norm(heads + share[:, None] * along - point, axis=1).argmin()])
+
+    def _best_shares(self, helper: _Helper, vertices: np.ndarray) -> np.ndarray:
+        """float64 [vertices]: how much of it each takes best, of 1, the rest of the blend that much less."""
+        residual = self.residual[vertices]
+        change = self._moved(helper.motion, vertices) - self.targets[vertices] - residual
+        return _share(residual, change)[0]
+
+    def _fitted(
+        self, helper: _Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
+    ) -> np.ndarray:
+        """float64 [frames, 3, 4]: the motion whose share of the vertices, `weights` times it, is nearest to
+        `wanted` [vertices, frames * 3]; Le and Deng's equation 9, with the scale given."""
+        rest = self.rest[vertices]
+        frames = len(helper.scale)
+        wanted = wanted.reshape(len(vertices), frames, 3)
+        total = np.square(weights).sum()
+        rest_middle = np.einsum("v,vfi->fi", np.square(weights), rest) / total
+        middle = np.einsum("v,vfi->fi", weights, wanted) / total
+        from_middle = (rest - rest_middle) * weights[:, None, None]
+        aside = wanted - weights[:, None, None] * middle
+        # cross[f, i, k]: of what is wanted along i and the rest point along k.
+        if rest.shape[1] == 1:
+            cross = np.tensordot(aside, from_middle[:, 0], axes=(0, 0))
+        else:
+            cross = np.einsum("vfi,vfk->fik", aside, from_middle)
+        # As its motion was, where the vertices leave it open.
+        linear = helper.motion[:, :, :3] / helper.scale[:, None, None]
+        cross += 1e-7 * np.square(from_middle).sum() * linear
+        linear = helper.scale[:, None, None] * _rotation_near(cross)
+        translation = middle - np.einsum("fik,fk->fi", linear, np.broadcast_to(rest_middle, (frames, 3)))
+        return np.concatenate([linear, translation[:, :, None]], axis=2)
+
+    def _moved(self, motion: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+        """float64 [vertices, frames * 3]: by one bone's motion [frames, 3, 4]."""
+        rest = self.rest[vertices]
+        if rest.shape[1] == 1:
+            # Not by numpy's product: see spaces.transformed().
+            x, y, z = motion[:, :, :3].reshape(-1, 3).T
+            moved = rest[:, 0, :1] * x
+            moved += rest[:, 0, 1:2] * y
+            moved += rest[:, 0, 2:] * z
+        else:
+            moved = np.einsum("vfk,fik->vfi", rest, motion[:, :, :3]).reshape(len(vertices), -1)
+        moved += motion[:, :, 3].ravel()
+        return moved
+
+    # --- Weights
+
+    def weigh(self) -> Generator[float, None, None]:
+        """The best weights of each vertex while all motions stay; how much is done, 0 to 1."""
+        parts, width = [], self.targets.shape[1] * (OWN_CANDIDATES + HELPER_CANDIDATES)
+        chunk = max(_NUMBERS_AT_ONCE // max(width, 1), 32)
+        for start in range(0, len(self.own), chunk):
+            end = min(start + chunk, len(self.own))
+            parts.append(self._weigh(np.arange(start, end)))
+            yield end / len(self.own)
+        if parts:
+            self.bones = np.concatenate([bones for bones, _weights in parts])
+            self.weights = np.concatenate([weights for _bones, weights in parts])
+
+    def _weigh(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """[vertices, most] bones and weights; puts right their residual."""
+        candidates = self._candidates(vertices)
+        errors = np.zeros((len(vertices), candidates.shape[1], self.targets.shape[1]))
+        for bone in np.unique(candidates[candidates >= 0]):
+            rows, slots = np.nonzero(candidates == bone)
+            at = vertices[rows]
+            errors[rows, slots] = self._moved(self._motion_of(int(bone)), at) - self.targets[at]
+        grams = errors @ errors.transpose(0, 2, 1)
+        weights = simplex.sparse_weights(grams, candidates >= 0, self.most)
+        before = self._weights_of(vertices, candidates)
+        # What a limit cuts can be worse than what the last round had.
+        is_better = simplex.objective(grams, before) < simplex.objective(grams, weights)
+        is_better &= ((before > 0.0).sum(axis=1) <= self.most) & (before.sum(axis=1) > 0.999)
+        weights = np.where(is_better[:, None], before, weights)
+        weights[weights < _SMALLEST_WEIGHT] = 0.0
+        weights /= weights.sum(axis=1, keepdims=True)
+        self.residual[vertices] = (weights[:, None] @ errors)[:, 0]
+        order = np.argsort(-weights, axis=1, kind="stable")[:, : self.most]
+        weights = np.take_along_axis(weights, order, axis=1)
+        return np.where(weights > 0.0, np.take_along_axis(candidates, order, axis=1), -1), weights
+
+    def _candidates(self, vertices: np.ndarray) -> np.ndarray:
+        """int [vertices, candidates], -1 for none: the rig's bones of each, helper bones that it has, and
+        those that lessen its error most."""
+        own = self.own[vertices, :OWN_CANDIDATES]
+        if not self.helpers:
+            return own
+        first = self.motion.bones.shape[1]
+        gains = np.zeros((len(vertices), len(self.helpers)))
+        for number, helper in enumerate(self.helpers):
+            rows = np.flatnonzero(helper.may_move[vertices])
+            at = vertices[rows]
+            residual = self.residual[at]
+            gains[rows, number] = _share(
+                residual, self._moved(helper.motion, at) - self.targets[at] - residual
+            )[1]
+        present = self.bones[vertices]
+        rows, slots = np.nonzero(present >= first)
+        gains[rows, present[rows, slots] - first] = np.inf
+        count = min(max(HELPER_CANDIDATES, self.most), len(self.helpers))
+        best = np.argpartition(-gains, count - 1, axis=1)[:, :count]
+        is_of_use = np.take_along_axis(gains, best, axis=1) > 0.0
+        return np.concatenate([own, np.where(is_of_use, first + best, -1)], axis=1)
+
+    def _weights_of(self, vertices: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+        """float64 [vertices, candidates]: the present ones, of those bones that are candidates."""
+        weights = np.zeros(candidates.shape)
+        for bones, own in zip(self.bones[vertices].T, self.weights[vertices].T, strict=True):
+            is_it = (candidates == bones[:, None]) & (bones >= 0)[:, None]
+            weights += np.where(is_it, own[:, None], 0.0)
+        return weights
+
+    def _motion_of(self, bone: int) -> np.ndarray:
+        count = self.motion.bones.shape[1]
+        return self.motion.bones[:, bone] if bone < count else self.helpers[bone - count].motion
+
+    def _residual_of(self, bones: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        residual = -self.targets.astype(np.float64)
+        for bone in np.unique(bones[bones >= 0]):
+            rows, slots = np.nonzero(bones == bone)
+            residual[rows] += weights[rows, slots][:, None] * self._moved(self._motion_of(int(bone)), rows)
+        return residual.astype(np.float32)
+
+    # --- The result
+
+    def solution(self, before: Errors) -> Solution:
+        first = self.motion.bones.shape[1]
+        used = np.unique(self.bones[self.bones >= first]) - first
+        numbers = np.full(first + len(self.helpers), -1)
+        numbers[:first] = np.arange(first)
+        numbers[first + used] = first + np.arange(len(used))
+        helpers = [self.helpers[number] for number in used]
+        vertices = len(self.motion.influences.counts)
+        bones, weights = np.full((vertices, self.most), -1), np.zeros((vertices, self.most))
+        slots = slice(0, self.bones.shape[1])
+        bones[self.deformed, slots] = np.where(self.bones >= 0, numbers[self.bones], -1)
+        weights[self.deformed, slots] = self.weights
+        frames = len(self.motion.targets)
+        errors = np.zeros(vertices, dtype=np.float32)
+        errors[self.deformed] = np.sqrt(np.square(self.residual).sum(axis=1) / max(frames, 1))
+        return Solution(
+            np.array([helper.motion for helper in helpers]).reshape(-1, frames, 3, 4).swapaxes(0, 1),
+            np.array([helper.parent for helper in helpers], dtype=int),
+            np.array([self._head(first + number) for number in used]).reshape(-1, 3),
+            bones,
+            weights,
+            before,
+            self.errors(),
+            errors,
+        )
+
+    def _head(self, bone: int) -> np.ndarray:
+        vertices, slots = np.nonzero(self.bones == bone)
+        return np.average(self.middle[vertices], axis=0, weights=self.weights[vertices, slots])
+
+
+def _rotation_near(matrices: np.ndarray) -> np.ndarray:
+    """float64 [n, 3, 3]: the rotation R with the largest trace of R^T M, of each matrix M."""
+    u, _sizes, v = np.linalg.svd(matrices)
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
+    return u @ v
+
+
+def _share(residual: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """float64 [rows]: how much of a change, 0 to 1, makes a residual smallest, and by how much its square."""
+    toward = -np.einsum("vx,vx->v", residual, change)
+    length = np.einsum("vx,vx->v", change, change)
+    share = np.clip(toward / np.maximum(length, 1e-30), 0.0, 1.0)
+    return share, share * (2.0 * toward - share * length)
+
+
+def _padded(influences: Influences) -> tuple[np.ndarray, np.ndarray]:
+    """int and float64 [vertices, slots]: bones and weights, the heaviest first; -1 and 0 behind."""
+    counts = influences.counts
+    vertices = np.repeat(np.arange(len(counts)), counts)
+    order = np.lexsort((-influences.weights, vertices))
+    slots = np.arange(len(vertices)) - np.repeat(influences.offsets[:-1], counts)
+    bones = np.full((len(counts), counts.max(initial=1)), -1)
+    weights = np.zeros(bones.shape)
+    bones[vertices, slots], weights[vertices, slots] = influences.bones[order], influences.weights[order]
+    return bones, weights

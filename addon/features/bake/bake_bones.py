@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake to bones: helper bones with plain keys beside a rig's own, and weights, which Blender's Armature
+modifier and every engine play.
+
+Like bake.Bake it goes in steps: sample(), place(), publish(), discard().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...attach import properties, stack, upstream_proxy
+from ...core import helper_bones
+from ...core.errors import SinewError
+from ...core.helper_bones import HelperOptions, Motion, Report
+from ...core.influences import Influences, joined
+from ...core.spaces import transformed
+from ...deform import evaluate, session
+from ...deform.plan import MODES_OF_THE_MODIFIER
+from ...deform.skinned_object import SkinnedObject
+from ...io import helper_bones_io
+from . import shape_animation
+from .take_off import take_off
+
+# Of the time that a bake takes, until the frames are read.
+_SAMPLING = 0.2
+
+
+class BoneBake:
+    """The meshes of each armature share its helper bones.
+
+    reports  after sample(), of each armature
+    """
+
+    def __init__(
+        self, meshes: list[bpy.types.Object], frames: Sequence[float], options: HelperOptions
+    ) -> None:
+        scene = bpy.context.scene
+        before = scene.frame_float
+        evaluate.set_frame(scene, frames[0])
+        try:
+            rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+            for obj in meshes:
+                _check_bones(obj, _state_of(obj))
+                rigs.setdefault(_rig_of(obj), []).append(obj)
+        finally:
+            evaluate.set_frame(scene, before)
+        self.frames, self.options = frames, options
+        self._rigs = [_Rig(rig, own) for rig, own in rigs.items()]
+        self.reports: list[Report] = []
+
+    @property
+    def what(self) -> str:
+        return ", ".join(obj.name for rig in self._rigs for obj in rig.meshes)
+
+    @property
+    def files(self) -> list[tuple[Path, Path]]:
+        """None."""
+        return []
+
+    def sample(self) -> Generator[float, None, None]:
+        """Goes through the frames, and solves; how much is done, 0 to 1."""
+        scene = bpy.context.scene
+        before = scene.frame_float
+        try:
+            for number, frame in enumerate(self.frames):
+                evaluate.set_frame(scene, frame)
+                for rig in self._rigs:
+                    rig.take()
+                yield _SAMPLING * (number + 1) / len(self.frames)
+        finally:
+            evaluate.set_frame(scene, before)
+        for number, rig in enumerate(self._rigs):
+            for share in rig.solve(self.options):
+                yield _SAMPLING + (1.0 - _SAMPLING) * (number + share) / len(self._rigs)
+        self.reports = [rig.report for rig in self._rigs]
+
+    def place(self) -> None:
+        for rig in self._rigs:
+            rig.place(self.frames)
+        session.forget()
+
+    def publish(self) -> None:
+        """Nothing is in files."""
+
+    def discard(self) -> None:
+        self._rigs.clear()
+
+
+class _Rig:
+    """An armature, and those of its meshes that are baked."""
+
+    def __init__(self, rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> None:
+        self.rig, self.meshes = rig, meshes
+        self._targets: list[np.ndarray] = []
+        self._rest: list[np.ndarray] = []
+        self._poses: list[np.ndarray] = []
+        self._influences: list[Influences] = []
+
+    def take(self) -> None:
+        """The frame as it is evaluated."""
+        states = [_state_of(obj) for obj in self.meshes]
+        frames = [state.shown.frames[0] for state in states]
+        bindings = [state.bound.binding for state in states]
+        targets, rest = [], []
+        for state, frame in zip(states, frames, strict=True):
+            targets.append(transformed(state.points, frame.bones_from_model))
+            rest.append(transformed(state.shown.rest_points, frame.bones_from_model))
+        if not self._poses:
+            self._bones = bindings[0].bones
+            self._influences = [b.weighting.influences(p) for b, p in zip(bindings, rest, strict=True)]
+            scale = np.array(self.rig.matrix_world, dtype=np.float64)[:3, :3]
+            self._unit = float(np.cbrt(abs(np.linalg.det(scale))))
+        self._poses.append(frames[0].pose.astype(np.float64))
+        self._targets.append(np.concatenate(targets).astype(np.float32))
+        together = np.concatenate(rest).astype(np.float32)
+        if not np.isfinite(self._targets[-1]).all() or not np.isfinite(self._poses[-1]).all():
+            raise SinewError(
+                f"{self.rig.name}: frame {bpy.context.scene.frame_current} has points that are none"
+            )
+        if len(together) != len(self._targets[0]):
+            raise SinewError(f"{self.rig.name}: the number of vertices changes; bake to alembic or usd")
+        # Where nothing but the armature moves them, one array stands for all.
+        is_same = bool(self._rest) and np.array_equal(together, self._rest[-1])
+        self._rest.append(self._rest[-1] if is_same else together)
+
+    def solve(self, options: HelperOptions) -> Generator[float, None, None]:
+        moves = any(rest is not self._rest[0] for rest in self._rest)
+        from_rest = np.linalg.inv(self._bones.rest.astype(np.float64))
+        motion = Motion(
+            np.array(self._rest if moves else self._rest[:1]),
+            np.array(self._targets),
+            np.array([(pose @ from_rest)[:, :3] for pose in self._poses]),
+            joined(self._influences, [0] * len(self._influences)),
+            np.stack([self._bones.envelopes.heads, self._bones.envelopes.tails], axis=1).astype(np.float64),
+        )
+        self._targets.clear()
+        self._solution = yield from helper_bones.solve(motion, options.of(motion))
+        diagonal = self._unit * motion.diagonal
+        self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
+
+    def place(self, frames: Sequence[float]) -> None:
+        solution, bones = self._solution, self._bones
+        own = [bones.names[bone] for bone in solution.parents]
+        motions = np.zeros((*solution.motions.shape[:2], 4, 4))
+        motions[:, :, :3], motions[:, :, 3, 3] = solution.motions, 1.0
+        parents = np.array(self._poses)[:, solution.parents]
+        times = shape_animation.key_times(frames)
+        # Only what is visible can be edited.
+        with nullcontext() if self.rig.visible_get() else evaluate.shown([self.rig]):
+            names = helper_bones_io.add_bones(self.rig, own, solution.heads)
+        helper_bones_io.write_keys(self.rig, names, motions, parents, times)
+        first = 0
+        for obj in self.meshes:
+            count = len(obj.data.vertices)
+            rows = slice(first, first + count)
+            first += count
+            _use_armature_modifier(obj, self.rig)
+            helper_bones_io.write_weights(
+                obj, bones, [*bones.names, *names], solution.bones[rows], solution.weights[rows]
+            )
+            helper_bones_io.write_errors(obj.data, self._unit * solution.errors[rows])
+
+
+def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:
+    """Takes Sinew off; the Armature modifier blends linearly by vertex groups."""
+    take_off(obj)
+    modifier = stack.armature_modifier(obj)
+    modifier.object = rig
+    modifier.use_deform_preserve_volume = modifier.use_bone_envelopes = False
+    modifier.use_multi_modifier = modifier.invert_vertex_group = False
+    modifier.use_vertex_groups, modifier.vertex_group = True, ""
+    mesh = obj.data.copy()
+    # The mesh without the bake stays in the file for the way back.
+    if obj.data.is_editable:
+        obj.data.use_fake_user = True
+    obj.data = mesh
+
+
+def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
+    """The armature object that deforms a mesh. Raises SinewError where bones can not reproduce it."""
+    replaced = properties.of(obj).replaced_modifiers
+    if len(replaced) != 1:
+        raise SinewError(
+            f"{obj.name}: has several Armature modifiers; bones reproduce one: bake to mdd or pc2"
+        )
+    rig = replaced[0].armature
+    for each in (obj, rig):
+        if each.override_library is not None or each.library is not None:
+            raise SinewError(f"{each.name}: is linked, and can not have bones of its own; make it local")
+    if upstream_proxy.is_needed(obj):
+        names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
+        raise SinewError(
+            f"{obj.name}: {names} changes the mesh ahead of the armature, which has no weights of its own; "
+            "bake to mdd or pc2"
+        )
+    animation = rig.animation_data
+    if animation is not None and animation.use_tweak_mode:
+        raise SinewError(f"{rig.name}: a strip of its NLA is being edited; leave tweak mode first")
+    if animation is not None and animation.action is not None and animation.action.sinew_holds:
+        raise SinewError(f"{rig.name}: Sinew makes its in-betweens; bake these first")
+    if rig.name not in bpy.context.view_layer.objects:
+        raise SinewError(f"{rig.name}: is not in this view layer, where bones could be added")
+    return rig
+
+
+def _check_bones(obj: bpy.types.Object, state: SkinnedObject) -> None:
+    """Raises SinewError for bendy bones: no engine has them."""
+    binding = state.bound.binding
+    bendy = [name for name, n in zip(binding.bones.names, binding.bones.segments, strict=True) if n > 1]
+    found = [name for name in bendy if name in binding.moving_bones]
+    if found:
+        raise SinewError(f"{obj.name}: {', '.join(found)} bends in segments; bake to mdd or pc2")
+
+
+def _state_of(obj: bpy.types.Object) -> SkinnedObject:
+    pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
+    if not pairs or obj.mode in MODES_OF_THE_MODIFIER or pairs[0][1].shown.frames[0] is None:
+        raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
+    return pairs[0][1]

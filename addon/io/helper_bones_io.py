@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Helper bones in an armature of their own copy, their keys, and the weights of a mesh that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.rig import Bones
+from . import actions, mesh_io
+
+COLLECTION = "Sinew helpers"
+ERRORS = "Sinew bake error"
+# What Blender takes for a bone's name, in bytes.
+_LONGEST_NAME = 63
+# Of the length of the bone that it hangs under.
+_LENGTH = 0.25
+
+
+def add_bones(rig: bpy.types.Object, parents: Sequence[str], heads: np.ndarray) -> list[str]:
+    """Gives an armature object a copy of its armature with a helper bone under each of the `parents`; the one
+    without them stays in the file.
+
+    heads  float [helpers, 3], armature space
+    Returns their names.
+    """
+    if rig.data.library is None:
+        rig.data.use_fake_user = True
+    rig.data = rig.data.copy()
+    names = []
+    with _editing(rig) as armature:
+        collection = armature.collections.get(COLLECTION) or armature.collections.new(COLLECTION)
+        for parent_name, head in zip(parents, heads, strict=True):
+            parent = armature.edit_bones[parent_name]
+            bone = armature.edit_bones.new(_free_name(armature, parent_name))
+            bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, _LENGTH * parent.length, 0.0)
+            placed = parent.matrix.to_3x3().to_4x4()
+            placed.translation = head
+            bone.matrix = placed
+            bone.parent, bone.use_connect, bone.use_deform = parent, False, True
+            # A motion that is rigid but for the parent's size.
+            bone.inherit_scale = "AVERAGE"
+            collection.assign(bone)
+            names.append(bone.name)
+    for name in names:
+        rig.pose.bones[name].rotation_mode = "QUATERNION"
+    return names
+
+
+def _free_name(armature: bpy.types.Armature, parent: str) -> str:
+    number = 1
+    while True:
+        end = f"_{number}"
+        start = f"Helper_{parent}".encode()[: _LONGEST_NAME - len(end)].decode(errors="ignore")
+        if start + end not in armature.edit_bones:
+            return start + end
+        number += 1
+
+
+def write_keys(
+    rig: bpy.types.Object,
+    names: Sequence[str],
+    motions: np.ndarray,
+    parent_poses: np.ndarray,
+    times: Sequence[float],
+) -> None:
+    """Keys of the helper bones, with straight lines between them, in a copy of the armature's action or in a
+    new one; the action without them stays in the file.
+
+    motions       float64 [times, helpers, 4, 4], armature space: from rest to posed
+    parent_poses  float64 [times, helpers, 4, 4], armature space: of the bone above each
+    """
+    _use_copy_of_action(rig)
+    for number, name in enumerate(names):
+        channels = _channels(rig.data.bones[name], motions[:, number], parent_poses[:, number])
+        _write_curves(rig, name, channels, times)
+
+
+def _use_copy_of_action(rig: bpy.types.Object) -> None:
+    animation = rig.animation_data
+    action = animation.action if animation is not None else None
+    if action is None:
+        return
+    slot = actions.slot_of(animation)
+    if action.library is None:
+        action.use_fake_user = True
+    copy = action.copy()
+    copy.name = f"{action.name} Helpers"
+    animation.action = copy
+    if slot is not None:
+        handle = actions.handle_of(slot)
+        animation.action_slot = next(each for each in copy.slots if each.handle == handle)
+
+
+def _channels(bone: bpy.types.Bone, motions: np.ndarray, parent_poses: np.ndarray) -> np.ndarray:
+    """float64 [times, 10]: location, quaternion and scale, as in pose_io.read_channels()."""
+    rest = np.array(bone.matrix_local, dtype=np.float64)
+    channels = np.empty((len(motions), 10))
+    for number, (motion, parent) in enumerate(zip(motions, parent_poses, strict=True)):
+        basis = bone.convert_local_to_pose(
+            Matrix(motion @ rest),
+            bone.matrix_local,
+            parent_matrix=Matrix(parent),
+            parent_matrix_local=bone.parent.matrix_local,
+            invert=True,
+        )
+        location, rotation, scale = basis.decompose()
+        channels[number] = (*location, *rotation, *scale)
+        # The shorter way from key to key.
+        if number and channels[number, 3:7] @ channels[number - 1, 3:7] < 0.0:
+            channels[number, 3:7] *= -1.0
+    return channels
+
+
+def _write_curves(rig: bpy.types.Object, name: str, channels: np.ndarray, times: Sequence[float]) -> None:
+    bone = rig.pose.bones[name]
+    has_scale = np.abs(channels[:, 7:] - 1.0).max() > 1e-5
+    for path in ("location", "rotation_quaternion", *(("scale",) if has_scale else ())):
+        # Makes the action, its slot and the curves, as each version has them.
+        bone.keyframe_insert(path, frame=times[0], group=name)
+    animation = rig.animation_data
+    for curve, channel in actions.bone_curves(animation.action, actions.slot_of(animation))[name]:
+        points = curve.keyframe_points
+        points.clear()
+        points.add(len(times))
+        keys = np.column_stack([times, channels[:, channel.column]])
+        points.foreach_set("co", keys.astype(np.float32).ravel())
+        linear = actions.key_value("interpolation", "LINEAR")
+        points.foreach_set("interpolation", np.full(len(times), linear, np.int32))
+        curve.update()
+
+
+def write_weights(
+    obj: bpy.types.Object, bones: Bones, names: Sequence[str], slots: np.ndarray, weights: np.ndarray
+) -> None:
+    """Gives a mesh object these weights of bones in the place of those that it has; groups of no bone stay.
+
+    bones           whose groups' weights go
+    names           of all bones
+    slots, weights  [vertices, n]: numbers of `names`, -1 for none, and their weights
+    """
+    new = [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in _used(names, slots)]
+    index = {group.name: group.index for group in new}
+    group_of = np.array([index.get(name, -1) for name in names])
+    before = mesh_io.read_group_weights(obj.data)
+    is_of_bone = bones.of_groups([group.name for group in obj.vertex_groups]) >= 0
+    # Also what an earlier bake left under the name of a new bone.
+    is_of_bone[list(index.values())] = True
+    ends = np.cumsum(before.counts)
+    rows = {}
+    for vertex, (own, values) in enumerate(zip(slots, weights, strict=True)):
+        if own[0] < 0:
+            continue
+        kept = range(ends[vertex] - before.counts[vertex], ends[vertex])
+        row = {
+            int(before.groups[entry]): float(before.weights[entry])
+            for entry in kept
+            if before.groups[entry] < len(is_of_bone) and not is_of_bone[before.groups[entry]]
+        }
+        row.update({int(group_of[bone]): float(v) for bone, v in zip(own, values, strict=True) if bone >= 0})
+        rows[vertex] = row
+    mesh_io.write_group_weights(obj, rows)
+
+
+def write_errors(mesh: bpy.types.Mesh, errors: np.ndarray) -> None:
+    """Stores float32 [vertices] as an attribute, which overlays and materials can show."""
+    active = mesh.attributes.active_index
+    attribute = mesh.attributes.get(ERRORS)
+    if attribute is not None:
+        mesh.attributes.remove(attribute)
+    mesh.attributes.new(ERRORS, "FLOAT", "POINT").data.foreach_set("value", errors)
+    # A new attribute becomes the active one, which is the artist's choice.
+    mesh.attributes.active_index = active
+
+
+def _used(names: Sequence[str], slots: np.ndarray) -> list[str]:
+    return [names[bone] for bone in np.unique(slots[slots >= 0])]
+
+
+@contextmanager
+def _editing(rig: bpy.types.Object) -> Iterator[bpy.types.Armature]:
+    """Inside, an armature object alone is in edit mode; modes and selection are as they were afterwards."""
+    layer = bpy.context.view_layer
+    active, mode = layer.objects.active, bpy.context.mode
+    of_active = active.mode if active is not None else "OBJECT"
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    selected = [obj for obj in layer.objects if obj.select_get()]
+    for obj in selected:
+        obj.select_set(False)
+    layer.objects.active = rig
+    rig.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        yield rig.data
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+        rig.select_set(False)
+        for obj in selected:
+            obj.select_set(True)
+        layer.objects.active = active
+        if of_active != "OBJECT":
+            bpy.ops.object.mode_set(mode=of_active)
