@@ -32,7 +32,7 @@ MISSING = (
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
 IN_RENDERS_SOCKET = (
     "NodeSocketBool",
-    "Off where a modifier behind that is on in renders alone needs Blender's",
+    "Off where a modifier that is on in renders alone needs Blender's",
 )
 PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
 
@@ -44,7 +44,7 @@ def find(kind: int) -> bpy.types.NodeTree | None:
 def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
     """The group that takes points from an ATTRIBUTE or from a POINT_BUFFER.
 
-    normals  the domain of those that it takes too, POINT, CORNER or FACE; empty for none. Blender 4.5 and later
+    normals  the domain of those that it takes too, POINT, CORNER or FACE; empty for none; from Blender 4.5 on
     """
     make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
     return find(kind + _WITH_NORMALS[normals]) or make(normals)

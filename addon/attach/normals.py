@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether Sinew can give an object its normals with the points, and which: changes nothing.
 
-In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they stay, or
-are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so what they make is
-not known.
+In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they
+stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so what they
+make is not known.
 
 Blender then has them as free custom normals of the evaluated mesh and computes none. They draw it as
 Blender's own do. But modifiers behind would move points and keep the normals, and what takes over the mesh
@@ -87,8 +87,8 @@ def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
 
 
 def domain_of(mesh: bpy.types.Mesh) -> str:
-    """Which normals draw the mesh, POINT, CORNER or FACE; empty where Blender is to compute them: where custom
-    normals are free already, which it keeps as they are, and without faces."""
+    """Which normals draw the mesh, POINT, CORNER or FACE; empty where Blender is to compute them: without faces,
+    and where custom normals are free already, which it keeps as they are."""
     if not ARE_SUPPORTED or mesh.is_editmode:
         return ""
     attribute = mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
@@ -126,7 +126,7 @@ def _known_in_front(obj: bpy.types.Object) -> set[str]:
 
 
 def _needing(obj: bpy.types.Object, in_renders: bool) -> list[bpy.types.Modifier]:
-    """The modifiers behind that need or change normals, as far as they can be on, there or in the viewport."""
+    """The modifiers behind that need or change normals, as far as they can be on."""
     return [
         modifier
         for modifier in stack.downstream(obj)

@@ -80,7 +80,7 @@ class ObjectFacts:
     waits_for            what its method needs and is not computed yet, as a clause; empty where nothing is
     gives_normals        the user chose that Sinew computes normals
     skins_normals        and that they move with the skin
-    normals_domain       POINT, CORNER or FACE: which draw the mesh; empty where Blender computes them in any case
+    normals_domain       POINT, CORNER or FACE: which draw the mesh; empty where Blender has to compute them
     normals_obstacle     why Blender has to, as a clause; empty where it need not
     normals_for_viewport_alone  a modifier that is on in renders alone needs Blender's
     """
