@@ -89,9 +89,7 @@ class Bound:
         if given.are_skinned:
             vertices = None if given.domain == "POINT" else source.topology.corner_vertices
             rest_normals = source.rest_normals(rest_points, given.domain)
-            moved = self.skin_stack.skinned_normals(rest_normals, vertices)
-            if moved is not None:
-                out[:] = moved
+            if self.skin_stack.write_skinned_normals(points, rest_normals, vertices, out):
                 return
         source.normals.write(points, given.domain, out)
 
