@@ -45,7 +45,7 @@ template <class D>
 HWY_INLINE Points<D> column(D d, const SkinnedNormalFrame& frame, std::size_t axis, const Points<D>& points,
                             std::size_t i) {
     const Points<D> moved = load(d, frame.moved[axis] + i);
-    const Vec<D> by = hn::LoadU(d, frame.inverse_steps[axis] + i);
+    const Vec<D> by = hn::Set(d, frame.inverse_step);
     return {hn::Mul(by, hn::Sub(moved.x, points.x)), hn::Mul(by, hn::Sub(moved.y, points.y)),
             hn::Mul(by, hn::Sub(moved.z, points.z))};
 }

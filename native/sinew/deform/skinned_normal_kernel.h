@@ -11,13 +11,13 @@ namespace sinew {
 
 /// What normals of one frame are made of.
 struct SkinnedNormalFrame {
-    const Vec3<float>* points;                  // [vertices] deformed
-    std::array<const Vec3<float>*, 3> moved;    // [vertices] deformed, of points a step along each axis away
-    std::array<const float*, 3> inverse_steps;  // [vertices]
-    std::array<Float4*, 3> cofactors;           // [vertices] of each vertex's blend, by axis
-    const Vec3<float>* rest_normals;            // [normals]
-    const std::int32_t* vertices;               // [normals] the vertex of each
-    Vec3<float>* normals;                       // [normals]
+    const Vec3<float>* points;                // [vertices] deformed
+    std::array<const Vec3<float>*, 3> moved;  // [vertices] deformed, of points a step along each axis away
+    float inverse_step;                       // of all three
+    std::array<Float4*, 3> cofactors;         // [vertices] of each vertex's blend, by axis
+    const Vec3<float>* rest_normals;          // [normals]
+    const std::int32_t* vertices;             // [normals] the vertex of each
+    Vec3<float>* normals;                     // [normals]
 };
 
 /// Each for elements [begin, end); no result depends on how they are divided.

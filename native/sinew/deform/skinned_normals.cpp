@@ -85,15 +85,10 @@ struct SkinnedNormals::State {
           vertices(rest.vertices.begin(), rest.vertices.end()) {
         const std::vector<Vec3<float>> points = binding.unpack().rest_points;
         const float step = step_of(points);
+        inverse_step = 1.0f / step;
         for (int axis = 0; axis < 3; ++axis) {
             std::vector<Vec3<float>> stepped = points;
-            std::vector<float>& scale = inverse_steps[static_cast<std::size_t>(axis)];
-            for (Vec3<float>& point : stepped) {
-                const float before = point[axis];
-                point[axis] += step;
-                // How far it is after rounding.
-                scale.push_back(1.0f / (point[axis] - before));
-            }
+            for (Vec3<float>& point : stepped) point[axis] += step;
             const auto i = static_cast<std::size_t>(axis);
             deformers[1 + i].set_rest_points(stepped);
             moved[i].resize(points.size());
@@ -113,9 +108,9 @@ struct SkinnedNormals::State {
                       std::size_t threads) const noexcept {
         SkinnedNormalFrame frame{};
         frame.points = points.data();
+        frame.inverse_step = inverse_step;
         for (std::size_t axis = 0; axis < 3; ++axis) {
             frame.moved[axis] = moved[axis].data();
-            frame.inverse_steps[axis] = inverse_steps[axis].data();
             frame.cofactors[axis] = cofactors[axis].data();
         }
         frame.rest_normals = normals.data();
@@ -139,7 +134,7 @@ struct SkinnedNormals::State {
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t vertex = vertices.empty() ? i : static_cast<std::size_t>(vertices[i]);
             const auto column = [&](std::size_t axis) {
-                return inverse_steps[axis][vertex] * (moved[axis][vertex] - points[vertex]);
+                return inverse_step * (moved[axis][vertex] - points[vertex]);
             };
             const Vec3<float>& t = tangents[i];
             to[i] = unit(t.x * column(0) + t.y * column(1) + t.z * column(2));
@@ -147,7 +142,7 @@ struct SkinnedNormals::State {
     }
 
     std::array<Deformer, 4> deformers;  // of the rest points, then of these a step along each axis away
-    std::array<std::vector<float>, 3> inverse_steps;
+    float inverse_step = 1.0f;
     std::vector<Vec3<float>> normals;
     std::vector<Vec3<float>> tangents;
     std::vector<std::int32_t> vertices;
