@@ -373,8 +373,11 @@ def main() -> None:
             if arguments.k not in f"{case.name} choices":
                 continue
             found = measure_normals(case, 4.0 if arguments.quick else 8.0)
-            times = "".join(f"{who.lower():>14}{of['median'] * 1e3:7.2f}" for who, of in found.items())
-            say(f"{case.name:38}{times}")
+            times = (
+                f"{who.lower():>12}{of['median'] * 1e3:7.2f}{of['least'] * 1e3:7.2f}"
+                for who, of in found.items()
+            )
+            say(f"{case.name:34}{''.join(times)}")
             results[f"{case.name} choices"] = found
         case = next((c for c in cases(arguments.million) if c.rig == "human.blend"), Case(13_380))
         if arguments.k in f"{case.name} methods":

@@ -13,9 +13,7 @@ import bpy
 MARK = "sinew_node_group"
 ATTRIBUTE, POINT_BUFFER = 10, 11
 # Added to it where the group gives normals of this domain.
-_WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40, "FACE": 50}
-# What counts a mesh's elements of a domain.
-_COUNTS = {"POINT": "Point Count", "CORNER": "Face Corner Count", "FACE": "Face Count"}
+_WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40}
 # Where the attribute of normals is named.
 NORMALS = "Normals"
 # Whether they are given in renders, too.
@@ -44,7 +42,7 @@ def find(kind: int) -> bpy.types.NodeTree | None:
 def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
     """The group that takes points from an ATTRIBUTE or from a POINT_BUFFER.
 
-    normals  the domain of those that it takes too, POINT, CORNER or FACE; empty for none; from Blender 4.5 on
+    normals  the domain of those that it takes too, POINT or CORNER; empty for none. Blender 4.5 and later
     """
     make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
     return find(kind + _WITH_NORMALS[normals]) or make(normals)
@@ -364,7 +362,7 @@ def same_count(
     if normals:
         (both,) = add_nodes(group, "FunctionNodeIntegerMath")
         link(count, both.inputs[0])
-        link(of_mesh.outputs[_COUNTS[normals]], both.inputs[1])
+        link(of_mesh.outputs["Face Corner Count" if normals == "CORNER" else "Point Count"], both.inputs[1])
         count = both.outputs["Value"]
     link(count, enabled_socket(equal.inputs, "A"))
     link(of_buffer.outputs["Point Count"], enabled_socket(equal.inputs, "B"))

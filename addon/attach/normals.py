@@ -2,8 +2,8 @@
 """Whether Sinew can give an object its normals with the points, and which: changes nothing.
 
 In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they
-stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so what they
-make is not known.
+stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so nobody
+knows what they make.
 
 Blender then has them as free custom normals of the evaluated mesh and computes none. They draw it as
 Blender's own do. But modifiers behind would move points and keep the normals, and what takes over the mesh
@@ -66,7 +66,6 @@ _POINTERS = ("object", "collection", "target", "auxiliary_target")
 class Kind(Enum):
     """Of the normals of a mesh, by what they take to compute."""
 
-    FACE = "face"  # all is flat
     VERTEX = "vertex"
     CORNER = "corner"  # some edges or faces are sharp
     CUSTOM = "custom"  # of corners, in relation to the computed ones
@@ -83,18 +82,19 @@ def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
     """domain  as domain_of()"""
     if domain and mesh_io.CUSTOM_NORMALS in mesh.attributes:
         return Kind.CUSTOM
-    return {"POINT": Kind.VERTEX, "CORNER": Kind.CORNER, "FACE": Kind.FACE}.get(domain)
+    return {"POINT": Kind.VERTEX, "CORNER": Kind.CORNER}.get(domain)
 
 
 def domain_of(mesh: bpy.types.Mesh) -> str:
-    """Which normals draw the mesh, POINT, CORNER or FACE; empty where Blender is to compute them: without faces,
-    and where custom normals are free already, which it keeps as they are."""
+    """Which normals draw the mesh, POINT or CORNER; empty where Blender is to compute them: of flat meshes,
+    which takes it no longer than to be given them, and where custom normals are free already."""
     if not ARE_SUPPORTED or mesh.is_editmode:
         return ""
     attribute = mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
     if attribute is not None and (attribute.data_type, attribute.domain) != ("INT16_2D", "CORNER"):
         return ""
-    return mesh.normals_domain if len(mesh.polygons) else ""
+    domain = mesh.normals_domain
+    return domain if domain in ("POINT", "CORNER") else ""
 
 
 def obstacle(obj: bpy.types.Object) -> str:

@@ -23,7 +23,7 @@ _OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, "sinew_colours")
 def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders: bool = True) -> None:
     """Makes the attribute or the point buffer for an object's points, and has Sinew's modifier read it.
 
-    normals     the domain of the normals that are stored with them, POINT, CORNER or FACE; empty for none
+    normals     the domain of the normals that are stored with them, POINT or CORNER; empty for none
     in_renders  they are given in renders, too
 
     Raises SinewError where what stands in front can not be evaluated apart.
@@ -84,7 +84,7 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: 
     """Stores float32 [vertices, 3], object space, in the point buffer, and has Blender evaluate it.
 
     rest     the points as the mesh comes with them
-    normals  float32 [vertices, corners or faces, 3], stored behind them; or [0, 3]
+    normals  float32 [vertices or corners, 3], stored behind them; or [0, 3]
     """
     stored = _marked(points, rest)
     if len(normals):

@@ -12,7 +12,7 @@ from .arrays import are_equal
 from .stage_mesh import Topology
 
 # The library's names of domains by Blender's.
-_DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face"}
+_DOMAINS = {"POINT": "vertex", "CORNER": "corner"}
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class SurfaceNormals:
     def write(self, points: np.ndarray, domain: str, out: np.ndarray) -> None:
         """
         points  float32 [vertices, 3]
-        domain  POINT, CORNER or FACE: what has a normal of its own
-        out     float32 [vertices, corners or faces, 3], C-contiguous
+        domain  POINT or CORNER: what has a normal of its own
+        out     float32 [vertices or corners, 3], C-contiguous
         """
         if self._normals is None:
             out[:] = 0.0

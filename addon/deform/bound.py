@@ -79,8 +79,8 @@ class Bound:
         """
         points       float32 [vertices, 3], the shape of the last frame
         rest_points  float32 [vertices, 3], what it was deformed from
-        out          float32 [vertices, corners or faces, 3], C-contiguous: zeros, which say that there are
-                     none, where what stands in front made a mesh that has others
+        out          float32 [vertices or corners, 3], C-contiguous: zeros, which say that there are none,
+                     where what stands in front made a mesh that has others
         """
         source = self.source
         if source.from_front and source.normals_domain != given.domain:

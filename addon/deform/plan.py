@@ -26,7 +26,7 @@ class State(Enum):
 class Normals:
     """Those that Sinew gives with the points.
 
-    domain       POINT, CORNER or FACE: what has a normal of its own; empty for none: Blender computes them
+    domain       POINT or CORNER: what has a normal of its own; empty for none: Blender computes them
     are_skinned  they move with the skin, instead of being those of the deformed surface
     are_for_viewport_alone  in renders Blender computes them
     """
@@ -80,7 +80,7 @@ class ObjectFacts:
     waits_for            what its method needs and is not computed yet, as a clause; empty where nothing is
     gives_normals        the user chose that Sinew computes normals
     skins_normals        and that they move with the skin
-    normals_domain       POINT, CORNER or FACE: which draw the mesh; empty where Blender has to compute them
+    normals_domain       POINT or CORNER: which draw the mesh; empty where Blender computes them in any case
     normals_obstacle     why Blender has to, as a clause; empty where it need not
     normals_for_viewport_alone  a modifier that is on in renders alone needs Blender's
     """
@@ -153,9 +153,7 @@ def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
     obstacle = next((reason for holds, reason in reasons if holds), "")
     if obstacle:
         return Normals(), obstacle
-    # Those of flat faces are of the surface.
-    is_skinned = facts.skins_normals and facts.normals_domain != "FACE"
-    return Normals(facts.normals_domain, is_skinned, facts.normals_for_viewport_alone), ""
+    return Normals(facts.normals_domain, facts.skins_normals, facts.normals_for_viewport_alone), ""
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

@@ -18,7 +18,6 @@ from ..io.animation_paths import animated_paths
 VERTICES = {"lbs": 10_000, "dq": 6_000}
 # The same where Sinew gives the normals that draw the mesh, by normals.Kind: these take Blender more time.
 VERTICES_WITH_NORMALS = {
-    Kind.FACE: {"lbs": 10_000, "dq": 6_000},
     Kind.VERTEX: {"lbs": 5_000, "dq": 4_000},
     Kind.CORNER: {"lbs": 3_000, "dq": 2_500},
     Kind.CUSTOM: {"lbs": 1_500, "dq": 1_500},

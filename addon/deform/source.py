@@ -102,11 +102,9 @@ class Source:
         return known[2]
 
     def normal_count(self, domain: str) -> int:
-        """domain  POINT, CORNER or FACE; empty for no normals"""
+        """domain  POINT or CORNER; empty for no normals"""
         if not domain:
             return 0
-        if domain == "FACE":
-            return len(self.topology.face_offsets) - 1
         return len(self.points if domain == "POINT" else self.topology.corner_vertices)
 
     def keep_normals_of(self, other: Source) -> None:

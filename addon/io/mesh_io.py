@@ -264,7 +264,7 @@ def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
 
 
 def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: str = "POINT") -> None:
-    """Stores float32 [elements of the domain, 3] in the attribute `name`, made where it is missing."""
+    """Stores float32 [vertices or corners, 3] in the attribute `name`, made where it is missing."""
     attribute = mesh.attributes.get(name)
     if not _is_of_vectors(attribute, domain):
         if attribute is not None:
@@ -285,12 +285,12 @@ def _is_of_vectors(attribute: bpy.types.Attribute | None, domain: str) -> bool:
 
 
 def domain_size(mesh: bpy.types.Mesh, domain: str) -> int:
-    """Vertices, corners or faces."""
-    return len({"POINT": mesh.vertices, "CORNER": mesh.loops, "FACE": mesh.polygons}[domain])
+    """Vertices or corners."""
+    return len(mesh.vertices if domain == "POINT" else mesh.loops)
 
 
 def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT") -> np.ndarray | None:
-    """The memory of the evaluated mesh's attribute `name` of the domain, float32 [its elements, 3],
+    """The memory of the evaluated mesh's attribute `name` of the domain, float32 [vertices or corners, 3],
     which Blender then does not share with another mesh. Valid until the mesh is evaluated again or changed.
 
     None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not in

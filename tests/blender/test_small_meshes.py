@@ -89,8 +89,7 @@ def test_taken_up_and_left_by_what_the_artist_does(arm, monkeypatch):
     obj.update_tag()
     bpy.context.view_layer.update()
     assert deformer(obj) == "blender"
-    for limits in (small_meshes.VERTICES, small_meshes.VERTICES_WITH_NORMALS[normals.Kind.FACE]):
-        monkeypatch.setitem(limits, "lbs", len(obj.data.vertices))
+    monkeypatch.setitem(small_meshes.VERTICES, "lbs", len(obj.data.vertices))
     bpy.ops.sinew.rebind()
     assert deformer(obj) == "sinew"
 
@@ -288,8 +287,7 @@ def test_a_mesh_that_is_left_again_has_no_attribute_of_sinews(arm):
     before = set(obj.data.attributes.keys())
     properties.of(obj).leave_small = False
     expected = scenes.shapes(obj, FRAMES)
-    own = {properties.of(obj).attribute, properties.of(obj).normals_attribute} - {""}
-    assert set(obj.data.attributes.keys()) == before | own
+    assert set(obj.data.attributes.keys()) == before | {properties.of(obj).attribute}
     properties.of(obj).leave_small = True
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1e-5 * scenes.diagonal(obj)
     assert set(obj.data.attributes.keys()) == before
@@ -350,11 +348,9 @@ def test_fewer_are_left_where_sinew_gives_normals(kind, monkeypatch):
     count = len(obj.data.vertices)
     monkeypatch.setitem(small_meshes.VERTICES_WITH_NORMALS, kind, {"lbs": count})
     scenes.add_sinew(obj, "lbs")
-    is_flat = kind is normals.Kind.FACE
-    assert deformer(obj) == ("sinew" if is_flat else "blender")
-    if not is_flat:
-        obj.data.shade_smooth()
-    if kind in (normals.Kind.CORNER, normals.Kind.CUSTOM):
+    assert deformer(obj) == "blender"
+    obj.data.shade_smooth()
+    if kind is not normals.Kind.VERTEX:
         obj.data.edges[7].use_edge_sharp = True
     if kind is normals.Kind.CUSTOM:
         obj.data.normals_split_custom_set([(0.0, 0.0, 1.0)] * len(obj.data.loops))
