@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..io import mesh_io
+
 # A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
 # where the group finds the points.
 MARK = "sinew_node_group"
@@ -144,18 +146,20 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
             PRESENT: PRESENT_SOCKET,
         },
     )
+    # Set Position would add an offset to each point.
     source, named, place, remove, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeInputNamedAttribute",
-        "GeometryNodeSetPosition",
+        "GeometryNodeStoreNamedAttribute",
         "GeometryNodeRemoveAttribute",
         "NodeGroupOutput",
     )
-    named.data_type = "FLOAT_VECTOR"
+    named.data_type = place.data_type = "FLOAT_VECTOR"
+    place.inputs["Name"].default_value = mesh_io.POSITION
     group.links.new(source.outputs["Points"], named.inputs["Name"])
     group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
-    group.links.new(named.outputs["Attribute"], place.inputs["Position"])
+    group.links.new(named.outputs["Attribute"], enabled_socket(place.inputs, "Value"))
     # A mesh without the attribute keeps its shape instead of falling into the origin.
     group.links.new(named.outputs["Exists"], place.inputs["Selection"])
     # Else a subdivision behind would work it out for each of its vertices, and exports would have it.

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether Sinew can give an object its normals with the points, and which: changes nothing.
 
-In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they
-stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so nobody
-knows what they make.
-
 Blender then has them as free custom normals of the evaluated mesh and computes none. They draw it as
 Blender's own do. But modifiers behind would move points and keep the normals, and what takes over the mesh
 with its attributes would have them too. And some of Blender's are means of the given ones then (seen on 4.5
 and 5.2): the normal of a face, and that of a vertex where the corners have their own.
+
+In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they
+stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so nobody
+knows what they make.
 """
 
 from __future__ import annotations
