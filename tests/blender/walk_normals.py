@@ -32,7 +32,8 @@ def faults(obj: bpy.types.Object, mesh: bpy.types.Mesh, points: np.ndarray) -> l
         return []
     depsgraph = bpy.context.evaluated_depsgraph_get()
     proxy = properties.of(obj).upstream_proxy
-    source = obj.data if proxy is None else upstream_proxy.evaluated_mesh(obj, depsgraph)
+    upstream = None if proxy is None else upstream_proxy.evaluated_mesh(obj, depsgraph)
+    source = upstream or obj.data
     shown, own = mesh_io.read_shading(mesh), mesh_io.read_shading(source)
     shading = Shading(shown.sharp_edges, shown.sharp_faces, own.custom)
     expected = np.empty((mesh_io.domain_size(mesh, given.domain), 3), dtype=np.float32)
