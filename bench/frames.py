@@ -53,7 +53,9 @@ class Case:
         return what + (f", subdivision {self.subdivision}" if self.subdivision else "") + shading + normals
 
 
-SHADINGS = ("smooth", "sharp", "custom")
+SHADINGS = ("smooth", "sharp", "custom", "flat")
+# Who computes the normals, as the panel has it.
+CHOICES = ("AS_BLENDER", "SKINNED", "LEAVE")
 
 
 def cases(million: bool) -> list[Case]:
@@ -125,9 +127,11 @@ def make_tube(case: Case, index: int) -> bpy.types.Object:
 
 
 def shade(mesh: bpy.types.Mesh, shading: str) -> None:
-    """Every fiftieth edge sharp; or custom normals of corners, as imported characters have them."""
+    """Every fiftieth edge sharp; custom normals of corners, as imported characters have them; or all flat."""
     rng = np.random.default_rng(1)
-    if shading == "sharp":
+    if shading == "flat":
+        mesh.shade_flat()
+    elif shading == "sharp":
         mesh.edges.foreach_set("use_edge_sharp", rng.random(len(mesh.edges)) < 0.02)
     elif shading == "custom":
         normals = np.empty((len(mesh.loops), 3), dtype=np.float32)
@@ -286,6 +290,23 @@ def looks(scene: Scene) -> dict[str, Callable[[], None]]:
     }
 
 
+def measure_normals(case: Case, seconds: float) -> dict:
+    """Spreads of seconds of a drawn frame by the modifier and by each choice of normals, which take turns."""
+    scene = Scene(case, leave_small=False)
+    times: dict[str, list[float]] = {"modifier": [], **{choice: [] for choice in CHOICES}}
+    number, end = 1, time.perf_counter() + seconds
+    while time.perf_counter() < end or len(times["modifier"]) < 2 * RUN:
+        numbers = [1 + (number + 7 * i) % FRAMES for i in range(RUN)]
+        number += 7 * RUN
+        for who, of in times.items():
+            scene.switch(who != "modifier")
+            for obj in scene.meshes if who != "modifier" else ():
+                obj.sinew.normals = who
+            scene.run(numbers[:BEFORE])
+            of += scene.run(numbers)
+    return {who: common.spread(of) for who, of in times.items()}
+
+
 def measure_methods(case: Case, seconds: float) -> dict:
     """Spreads of seconds of a frame by the names of looks(), which take turns."""
     scene = Scene(case, leave_small=False)
@@ -347,6 +368,17 @@ def main() -> None:
             result = measure(case, 2.0 if arguments.quick else 4.0, not arguments.all_by_sinew)
             results[f"{case.name} {case.method}"] = result
             say(line(case.name, result))
+        drawn = [Case(size, normals=True, shading=each) for size in (13_380, 100_000) for each in SHADINGS]
+        for case in drawn:
+            if arguments.k not in f"{case.name} choices":
+                continue
+            found = measure_normals(case, 4.0 if arguments.quick else 8.0)
+            times = (
+                f"{who.lower():>12}{of['median'] * 1e3:7.2f}{of['least'] * 1e3:7.2f}"
+                for who, of in found.items()
+            )
+            say(f"{case.name:34}{''.join(times)}")
+            results[f"{case.name} choices"] = found
         case = next((c for c in cases(arguments.million) if c.rig == "human.blend"), Case(13_380))
         if arguments.k in f"{case.name} methods":
             say(

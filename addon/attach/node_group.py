@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import bpy
 
+from ..io import mesh_io
+
 # A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
 # where the group finds the points.
 MARK = "sinew_node_group"
 ATTRIBUTE, POINT_BUFFER = 10, 11
 # Added to it where the group gives normals of this domain.
-_WITH_NORMALS = {"": 0, "POINT": 10, "CORNER": 20}
+_WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40}
 # Where the attribute of normals is named.
 NORMALS = "Normals"
+# Whether they are given in renders, too.
+IN_RENDERS = "Normals in Renders"
 # An input that no node reads; pose_driver has its driver there.
 POSE = "Pose"
 # An input that is off in saved files: without Sinew the group then says what is missing.
@@ -26,6 +30,10 @@ MISSING = (
 )
 
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
+IN_RENDERS_SOCKET = (
+    "NodeSocketBool",
+    "Off where a modifier that is on in renders alone needs Blender's",
+)
 PRESENT_SOCKET = ("NodeSocketBool", "Off in saved files, which Blenders without Sinew open too")
 
 
@@ -133,22 +141,25 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
         {
             "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
             **({NORMALS: ("NodeSocketString", "Attribute that holds the normals")} if normals else {}),
+            **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
             POSE: POSE_SOCKET,
             PRESENT: PRESENT_SOCKET,
         },
     )
+    # Set Position would add an offset to each point.
     source, named, place, remove, result = add_nodes(
         group,
         "NodeGroupInput",
         "GeometryNodeInputNamedAttribute",
-        "GeometryNodeSetPosition",
+        "GeometryNodeStoreNamedAttribute",
         "GeometryNodeRemoveAttribute",
         "NodeGroupOutput",
     )
-    named.data_type = "FLOAT_VECTOR"
+    named.data_type = place.data_type = "FLOAT_VECTOR"
+    place.inputs["Name"].default_value = mesh_io.POSITION
     group.links.new(source.outputs["Points"], named.inputs["Name"])
     group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
-    group.links.new(named.outputs["Attribute"], place.inputs["Position"])
+    group.links.new(named.outputs["Attribute"], enabled_socket(place.inputs, "Value"))
     # A mesh without the attribute keeps its shape instead of falling into the origin.
     group.links.new(named.outputs["Exists"], place.inputs["Selection"])
     # Else a subdivision behind would work it out for each of its vertices, and exports would have it.
@@ -171,7 +182,8 @@ def _take_normals_of_attribute(
     normal = named.outputs["Attribute"]
     first = _sample(group, geometry, normal, domain)
     link(source.outputs[NORMALS], remove.inputs["Name"])
-    link(_with_normals(group, geometry, normal, first, domain), remove.inputs["Geometry"])
+    given = _with_normals(group, geometry, normal, first, source.outputs[IN_RENDERS], domain)
+    link(given, remove.inputs["Geometry"])
     return remove.outputs["Geometry"]
 
 
@@ -180,16 +192,22 @@ def _with_normals(
     geometry: bpy.types.NodeSocket,
     normal: bpy.types.NodeSocket,
     first: bpy.types.NodeSocket,
+    in_renders: bpy.types.NodeSocket,
     domain: str,
 ) -> bpy.types.NodeSocket:
-    """The geometry with these normals; as it is where the first of them is 0: then Sinew gave none."""
-    length, is_given, give, choice = add_nodes(
+    """The geometry with these normals; as it is where the first of them is 0: then Sinew gave none. As it is
+    also in renders, where they are not for these."""
+    length, is_given, view, is_here, both, give, choice = add_nodes(
         group,
         "ShaderNodeVectorMath",
         "FunctionNodeCompare",
+        "GeometryNodeIsViewport",
+        "FunctionNodeBooleanMath",
+        "FunctionNodeBooleanMath",
         "GeometryNodeSetMeshNormal",
         "GeometryNodeSwitch",
     )
+    is_here.operation, both.operation = "OR", "AND"
     length.operation, is_given.data_type, is_given.operation = "LENGTH", "FLOAT", "GREATER_THAN"
     give.mode, give.domain, choice.input_type = "FREE", domain, "GEOMETRY"
     enabled_socket(is_given.inputs, "B").default_value = 0.5
@@ -198,7 +216,11 @@ def _with_normals(
     link(length.outputs["Value"], enabled_socket(is_given.inputs, "A"))
     link(geometry, give.inputs["Mesh"])
     link(normal, enabled_socket(give.inputs, "Custom Normal"))
-    link(is_given.outputs["Result"], choice.inputs["Switch"])
+    link(in_renders, is_here.inputs[0])
+    link(view.outputs[0], is_here.inputs[1])
+    link(is_given.outputs["Result"], both.inputs[0])
+    link(is_here.outputs[0], both.inputs[1])
+    link(both.outputs[0], choice.inputs["Switch"])
     link(geometry, choice.inputs["False"])
     link(give.outputs["Mesh"], choice.inputs["True"])
     return choice.outputs["Output"]
@@ -235,6 +257,7 @@ def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
                 "NodeSocketObject",
                 "Object that has the modifiers in front, to be evaluated with this one",
             ),
+            **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
             POSE: POSE_SOCKET,
             PRESENT: PRESENT_SOCKET,
         },
@@ -258,7 +281,9 @@ def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
     link(fits, place.inputs["Selection"])
     moved = place.outputs["Geometry"]
     if normals:
-        moved = _take_normals_of_buffer(group, moved, buffer, stored, index.outputs["Index"], fits, normals)
+        moved = _take_normals_of_buffer(
+            group, source, moved, buffer, stored, index.outputs["Index"], fits, normals
+        )
     # Never taken: naming the object in a node is what makes Blender evaluate it.
     upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
     choice.input_type = "GEOMETRY"
@@ -271,6 +296,7 @@ def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
 
 def _take_normals_of_buffer(
     group: bpy.types.NodeTree,
+    source: bpy.types.Node,
     geometry: bpy.types.NodeSocket,
     buffer: bpy.types.NodeSocket,
     stored: bpy.types.NodeSocket,
@@ -291,7 +317,8 @@ def _take_normals_of_buffer(
     first = _sample(group, buffer, stored, "POINT", size.outputs["Point Count"])
     link(fits, choice.inputs["Switch"])
     link(geometry, choice.inputs["False"])
-    link(_with_normals(group, geometry, normal, first, domain), choice.inputs["True"])
+    given = _with_normals(group, geometry, normal, first, source.outputs[IN_RENDERS], domain)
+    link(given, choice.inputs["True"])
     return choice.outputs["Output"]
 
 

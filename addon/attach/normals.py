@@ -5,6 +5,10 @@ Blender then has them as free custom normals of the evaluated mesh and computes 
 Blender's own do. But modifiers behind would move points and keep the normals, and what takes over the mesh
 with its attributes would have them too. And some of Blender's are means of the given ones then (seen on 4.5
 and 5.2): the normal of a face, and that of a vertex where the corners have their own.
+
+In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they
+stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so nobody
+knows what they make.
 """
 
 from __future__ import annotations
@@ -15,20 +19,45 @@ import bpy
 
 from ..core.phrases import phrase
 from ..io import mesh_io
-from . import node_group, properties, stack
+from ..io.animation_paths import is_animated, is_visibility_animated
+from . import node_group, properties, stack, upstream_proxy
 
 # False: of objects with normals as Blender computes them it computes them itself, when somebody reads them.
 are_used = True
 # Set Mesh Normal has free normals.
 ARE_SUPPORTED = bpy.app.version >= (4, 5)
-# In front of Sinew's modifier and behind it these neither read nor change normals, points and faces.
-HARMLESS = {
+# Behind Sinew's modifier these neither read nor change normals, points and faces.
+HARMLESS_BEHIND = {
+    "COLLISION",
     "UV_PROJECT",
     "UV_WARP",
     "VERTEX_WEIGHT_EDIT",
     "VERTEX_WEIGHT_MIX",
     "VERTEX_WEIGHT_PROXIMITY",
 }
+# In front of it these keep faces, sharp edges and custom normals as they are: they move points at most.
+_KEEPS_SHADING = {
+    "ARMATURE",
+    "CAST",
+    "CORRECTIVE_SMOOTH",
+    "CURVE",
+    "DISPLACE",
+    "HOOK",
+    "LAPLACIANDEFORM",
+    "LAPLACIANSMOOTH",
+    "LATTICE",
+    "MESH_DEFORM",
+    "SHRINKWRAP",
+    "SIMPLE_DEFORM",
+    "SMOOTH",
+    "SURFACE_DEFORM",
+    "UV_PROJECT",
+    "UV_WARP",
+    "WARP",
+    "WAVE",
+}
+# These make the same faces and sharp edges whatever the points are, but other custom normals.
+_KEEPS_FACES = {"ARRAY", "MASK", "MIRROR", "SOLIDIFY", "SUBSURF"}
 # Modifiers and constraints that read another object's normals or take over its attributes; how they name it.
 READERS = {"BOOLEAN", "DATA_TRANSFER", "NODES", "SHRINKWRAP"}
 _POINTERS = ("object", "collection", "target", "auxiliary_target")
@@ -58,7 +87,7 @@ def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
 
 def domain_of(mesh: bpy.types.Mesh) -> str:
     """Which normals draw the mesh, POINT or CORNER; empty where Blender is to compute them: of flat meshes,
-    for which it takes little time, and where custom normals are free already, which it keeps as they are."""
+    which takes it no longer than to be given them, and where custom normals are free already."""
     if not ARE_SUPPORTED or mesh.is_editmode:
         return ""
     attribute = mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
@@ -70,17 +99,49 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
 
 def obstacle(obj: bpy.types.Object) -> str:
     """Why Blender has to compute the normals of a skinned object, as a clause; empty where it need not."""
+    known = _known_in_front(obj)
     for modifier in stack.upstream(obj):
-        if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
+        if modifier.type not in known and stack.can_be_on(obj, modifier):
             return phrase("{name} is in front", name=modifier.name)
-    for modifier in stack.downstream(obj):
-        if modifier.type not in HARMLESS and stack.can_be_on(obj, modifier):
-            return phrase("{name} follows", name=modifier.name)
+    for modifier in _needing(obj, in_renders=False):
+        return phrase("{name} follows", name=modifier.name)
     if obj.instance_type != "NONE":
         return "it has instances on its vertices or faces"
     if is_read_by_others(obj):
         return "another object reads its mesh"
     return ""
+
+
+def is_for_viewport_alone(obj: bpy.types.Object) -> bool:
+    """Whether Blender has to compute the normals in renders, for a modifier behind that is on there."""
+    return bool(_needing(obj, in_renders=True))
+
+
+def _known_in_front(obj: bpy.types.Object) -> set[str]:
+    """Types of modifiers in front whose result Sinew reads often enough."""
+    if upstream_proxy.changes_weights(obj):
+        # Then all is read again with each frame that changes it.
+        return _KEEPS_SHADING | _KEEPS_FACES | upstream_proxy.WEIGHT_CHANGERS
+    return _KEEPS_SHADING if mesh_io.CUSTOM_NORMALS in obj.data.attributes else _KEEPS_SHADING | _KEEPS_FACES
+
+
+def _needing(obj: bpy.types.Object, in_renders: bool) -> list[bpy.types.Modifier]:
+    """The modifiers behind that need or change normals, as far as they can be on."""
+    return [
+        modifier
+        for modifier in stack.downstream(obj)
+        if modifier.type not in HARMLESS_BEHIND and _can_be_on(obj, modifier, in_renders)
+    ]
+
+
+def _can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier, in_renders: bool) -> bool:
+    if is_visibility_animated(obj, modifier):
+        return True
+    if modifier.type == "SUBSURF":
+        levels = "render_levels" if in_renders else "levels"
+        if getattr(modifier, levels) == 0 and not is_animated(obj, modifier, levels):
+            return False
+    return modifier.show_render if in_renders else modifier.show_viewport
 
 
 def may_read_meshes(obj: bpy.types.Object) -> bool:

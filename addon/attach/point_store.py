@@ -20,10 +20,11 @@ ATTRIBUTE, NORMALS_ATTRIBUTE = "sinew_points", "sinew_normals"
 _OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, "sinew_colours")
 
 
-def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "") -> None:
+def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders: bool = True) -> None:
     """Makes the attribute or the point buffer for an object's points, and has Sinew's modifier read it.
 
-    normals  the domain of the normals that are stored with them, POINT or CORNER; empty for none
+    normals     the domain of the normals that are stored with them, POINT or CORNER; empty for none
+    in_renders  they are given in renders, too
 
     Raises SinewError where what stands in front can not be evaluated apart.
     """
@@ -42,6 +43,8 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "") -> None:
         kind, inputs = node_group.ATTRIBUTE, {"Points": settings.attribute}
         if normals:
             inputs[node_group.NORMALS] = settings.normals_attribute
+    if normals:
+        inputs[node_group.IN_RENDERS] = in_renders
     made_by_features = (make(obj) for make in subscribers.node_group)
     group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind, normals)
     if nodes.node_group != group:

@@ -130,16 +130,20 @@ class Binding:
         self._last, self._points_outdated = frame, out is not None
         return True
 
-    def skinned_normals(self, rest_normals: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
-        """float32 [n, 3]: normals moved by the blends of their vertices in the last frame; None where the
+    def write_skinned_normals(
+        self, points: np.ndarray, rest_normals: np.ndarray, vertices: np.ndarray | None, out: np.ndarray
+    ) -> bool:
+        """Writes normals that are moved by the blends of their vertices in the last frame; false where the
         shape is not of one blend.
 
+        points        float32 [vertices, 3], object space, of that frame
         rest_normals  float32 [n, 3], object space
         vertices      int32 [n], the vertex of each; None: one normal a vertex
+        out           float32 [n, 3], C-contiguous
         """
         frame = self._last
         if frame is None or frame.scale_rule != BLENDER_4.name:
-            return None
+            return False
         deformer = self._bound[MOTION].deformer
         if self._skinned is None or not (self._skinned[1] is deformer and self._skinned[2] is rest_normals):
             packed, _points = self._packed[MOTION, frozenset(self._vertex_data_of(frame))]
@@ -150,13 +154,15 @@ class Binding:
             )
             self._skinned = (made, deformer, rest_normals)
         same_space = is_same_space(frame.bones_from_model)
-        _points, normals, _tangents = self._skinned[0].deform(
+        self._skinned[0].deform_normals(
             frame.pose,
+            points,
+            out=out,
             bones_from_model=None if same_space else frame.bones_from_model.astype(np.float32),
             rest_inverses=self._rest_from_armature,
             parameters=frame.parameters or None,
         )
-        return normals
+        return True
 
     def _shape(self, frame: Frame, out: np.ndarray) -> None:
         if self._weights_changed(frame):
@@ -374,12 +380,14 @@ class SkinStack:
             self._apply_stages(out)
         return changed
 
-    def skinned_normals(self, rest_normals: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
-        """As Binding.skinned_normals(); None also where several links, a mask or stages made the shape."""
+    def write_skinned_normals(
+        self, points: np.ndarray, rest_normals: np.ndarray, vertices: np.ndarray | None, out: np.ndarray
+    ) -> bool:
+        """As of Binding; false also where several links, a mask or stages made the shape."""
         is_one = self._end is not None and sum(frame is not None for frame in self._frames) == 1
         if self._values or self._end is None or not is_one:
-            return None
-        return self._end.skinned_normals(rest_normals, vertices)
+            return False
+        return self._end.write_skinned_normals(points, rest_normals, vertices, out)
 
     def _apply_stages(self, points: np.ndarray) -> None:
         assert self.stages_after is not None

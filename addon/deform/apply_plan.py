@@ -62,6 +62,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
         skins_normals=settings.normals == properties.SKINNED_NORMALS,
         normals_domain=domain,
         normals_obstacle=obstacle,
+        normals_for_viewport_alone=bool(domain) and normals.is_for_viewport_alone(obj),
     )
 
 
@@ -76,7 +77,8 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
         elif obj.mode not in MODES_OF_THE_MODIFIER:
             point_store.remove(obj)
         return
-    point_store.ensure(obj, wanted.in_buffer, wanted.normals.domain)
+    given = wanted.normals
+    point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
     attach.switch(obj, on=True)
     attach.restore_pointers(obj)
 

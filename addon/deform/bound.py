@@ -79,15 +79,17 @@ class Bound:
         """
         points       float32 [vertices, 3], the shape of the last frame
         rest_points  float32 [vertices, 3], what it was deformed from
-        out          float32 [vertices or corners, 3], C-contiguous
+        out          float32 [vertices or corners, 3], C-contiguous: zeros, which say that there are none,
+                     where what stands in front made a mesh that has others
         """
         source = self.source
+        if source.from_front and source.normals_domain != given.domain:
+            out[:] = 0.0
+            return
         if given.are_skinned:
             vertices = None if given.domain == "POINT" else source.topology.corner_vertices
             rest_normals = source.rest_normals(rest_points, given.domain)
-            moved = self.skin_stack.skinned_normals(rest_normals, vertices)
-            if moved is not None:
-                out[:] = moved
+            if self.skin_stack.write_skinned_normals(points, rest_normals, vertices, out):
                 return
         source.normals.write(points, given.domain, out)
 

@@ -28,10 +28,12 @@ class Normals:
 
     domain       POINT or CORNER: what has a normal of its own; empty for none: Blender computes them
     are_skinned  they move with the skin, instead of being those of the deformed surface
+    are_for_viewport_alone  in renders Blender computes them
     """
 
     domain: str = ""
     are_skinned: bool = False
+    are_for_viewport_alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,7 @@ class ObjectFacts:
     skins_normals        and that they move with the skin
     normals_domain       POINT or CORNER: which draw the mesh; empty where Blender computes them in any case
     normals_obstacle     why Blender has to, as a clause; empty where it need not
+    normals_for_viewport_alone  a modifier that is on in renders alone needs Blender's
     """
 
     enabled: bool = True
@@ -101,6 +104,7 @@ class ObjectFacts:
     skins_normals: bool = False
     normals_domain: str = ""
     normals_obstacle: str = ""
+    normals_for_viewport_alone: bool = False
 
 
 def plan(facts: ObjectFacts) -> Plan:
@@ -144,12 +148,12 @@ def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
         return Normals(), ""
     reasons = (
         (bool(facts.normals_obstacle), facts.normals_obstacle),
-        (facts.has_upstream, "modifiers in front change the mesh"),
         (facts.has_heat_map, "it shows a heat map"),
     )
     obstacle = next((reason for holds, reason in reasons if holds), "")
-    given = Normals() if obstacle else Normals(facts.normals_domain, facts.skins_normals)
-    return given, obstacle
+    if obstacle:
+        return Normals(), obstacle
+    return Normals(facts.normals_domain, facts.skins_normals, facts.normals_for_viewport_alone), ""
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

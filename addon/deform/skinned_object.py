@@ -237,6 +237,9 @@ def object_state_of(obj: bpy.types.Object) -> list:
     state += obj.vertex_groups.keys()
     for modifier in obj.modifiers:
         state += (modifier.name, modifier.show_viewport, modifier.show_render)
+        if modifier.type == "SUBSURF":
+            # With none of them it is off.
+            state += (modifier.levels, modifier.render_levels)
         if modifier.type == "ARMATURE":
             state += (modifier.object, attach.method_of(modifier), *ModifierOptions.values(modifier))
     return state

@@ -10,7 +10,7 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from ..attach import properties, stored_vertex_data, upstream_proxy
+from ..attach import normals, properties, stored_vertex_data, upstream_proxy
 from ..core.arrays import are_equal
 from ..core.influences import GroupWeights
 from ..core.shading import Shading, SurfaceNormals
@@ -33,6 +33,7 @@ class Source:
     mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, whatever stands in front
     sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
     from_front        read from what the modifiers in front make of the mesh
+    normals_domain    which normals draw it, as normals.domain_of()
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  of those when changes were looked at last
     """
@@ -47,6 +48,7 @@ class Source:
     sdef_keys: np.ndarray | None = None
     shading: Shading = field(default_factory=Shading)
     from_front: bool = False
+    normals_domain: str = ""
     stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
     known_key_values: np.ndarray | None = None
@@ -148,7 +150,9 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
         sdef_keys = None
     topology = mesh_io.read_topology(mesh)
     shading = mesh_io.read_shading(mesh)
-    source = Source(names, weights, points, None, topology, mesh_points, keys, sdef_keys, shading, from_front)
+    domain = normals.domain_of(mesh)
+    surface = (points, None, topology, mesh_points)
+    source = Source(names, weights, *surface, keys, sdef_keys, shading, from_front, domain)
     return _with_surface(obj, mesh, source) if with_surface else source
 
 

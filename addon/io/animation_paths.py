@@ -27,6 +27,11 @@ def players(animation: bpy.types.AnimData) -> list[bpy.types.AnimData | bpy.type
     return [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
 
 
+def is_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier, name: str) -> bool:
+    """Whether keys or drivers set a modifier's property."""
+    return f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].{name}' in animated_paths(obj)
+
+
 def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
     """Whether keys or drivers decide when a modifier is on."""
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'

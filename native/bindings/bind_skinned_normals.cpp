@@ -53,6 +53,29 @@ py::tuple deform(const SkinnedNormals& skinned, const py::object& bone_transform
     return py::make_tuple(points, normals, tangents);
 }
 
+py::array_t<float> deform_normals(const SkinnedNormals& skinned, const py::object& bone_transforms,
+                                  const py::object& posed_points, const py::object& out,
+                                  const py::object& threads, const py::object& bones_from_model,
+                                  const py::object& rest_inverses, const py::object& parameters) {
+    const DeformArguments arguments = checked_deform(skinned.deformer(), bone_transforms, threads,
+                                                     bones_from_model, rest_inverses, parameters);
+    const auto points = checked_points(posed_points, "points");
+    const std::size_t vertices = skinned.deformer().vertex_count();
+    if (static_cast<std::size_t>(points.shape(0)) != vertices) {
+        fail("points", "float32 [" + std::to_string(vertices) + ", 3]", describe(posed_points));
+    }
+    auto normals = checked_out(out, skinned.frame_count());
+    if (normals.size() > 0 && normals.data() < points.data() + points.size() &&
+        points.data() < normals.data() + normals.size()) {
+        fail("out", "another array than the points", "one that shares memory with them");
+    }
+    const auto from = as_points(points);
+    const auto to = writable(normals);
+    const auto run = [&] { skinned.deform_normals(arguments.bones, arguments.options, from, to); };
+    skinned.frame_count() > kFramesUnderLock ? without_gil(run) : run();
+    return normals;
+}
+
 std::string text_of(const SkinnedNormals& skinned) {
     return "<sinew.SkinnedNormals: " + std::to_string(skinned.frame_count()) + " of " +
            std::to_string(skinned.deformer().vertex_count()) + " vertices, method " +
@@ -91,7 +114,15 @@ void bind_skinned_normals(py::module_& m) {
              "a face's vertices gives. Where it flattens the plane of a normal to a line, that is 0. The GIL "
              "is\n"
              "released for large meshes. Raises ValueError that names the argument, what was wanted and what "
-             "came.");
+             "came.")
+        .def("deform_normals", &deform_normals, py::arg("bone_transforms"), py::arg("points"),
+             py::arg("out") = py::none(), py::arg("threads") = py::none(),
+             py::arg("bones_from_model") = py::none(), py::arg("rest_inverses") = py::none(),
+             py::arg("parameters") = py::none(),
+             "The normals alone, where the points are known: a fourth less to deform.\n\n"
+             "points: float32 [vertices, 3], as deform() or a Deformer gave them for the same arguments.\n"
+             "out: float32 [frames, 3], C-contiguous; made where it is None. It is returned.\n\n"
+             "All else is as of deform().");
 }
 
 }  // namespace sinew::bindings

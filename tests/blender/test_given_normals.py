@@ -306,6 +306,87 @@ def test_blender_computes_them_where_others_would_find_other_ones(name):
     np.testing.assert_array_equal(given, left)
 
 
+def give_lattice(modifier):
+    """One that moves its points from frame to frame."""
+    lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
+    bpy.context.scene.collection.objects.link(lattice)
+    lattice.scale = (4.0, 4.0, 4.0)
+    lattice.data.points[0].co_deform.x -= 0.4
+    for frame, height in ((1, 0.0), (11, 0.5)):
+        lattice.location.z = height
+        lattice.keyframe_insert("location", frame=frame)
+    modifier.object = lattice
+
+
+def transfer_normals(modifier):
+    modifier.object, modifier.use_loop_data = add_other(), True
+    modifier.data_types_loops = {"CUSTOM_NORMAL"}
+
+
+def mirror(modifier):
+    modifier.use_axis = (False, True, False)
+
+
+def weigh(modifier):
+    modifier.vertex_group = "bone.1"
+
+
+def nothing(_modifier):
+    """Its options are as they come."""
+
+
+HARMLESS = [
+    ("front", "LATTICE", give_lattice, custom),
+    ("front", "MIRROR", mirror, sharp),
+    ("front", "SUBSURF", nothing, smooth),
+    ("front", "DATA_TRANSFER", transfer_normals, sharp),
+    ("front", "VERTEX_WEIGHT_EDIT", weigh, custom),
+    ("behind", "VERTEX_WEIGHT_EDIT", weigh, custom),
+    ("behind", "COLLISION", nothing, sharp),
+]
+
+
+@needs_support
+@pytest.mark.parametrize(("place", "kind", "set_up", "shading"), HARMLESS)
+def test_modifiers_that_leave_normals_to_sinew(place, kind, set_up, shading):
+    obj, _armature = scenes.make_arm()
+    shading(obj)
+    modifier = obj.modifiers.new("Other", kind)
+    set_up(modifier)
+    if place == "front":
+        obj.modifiers.move(1, 0)
+    scenes.add_sinew(obj, "dq")
+    for frame in (3, 11):
+        bpy.context.scene.frame_set(frame)
+        assert has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
+@needs_support
+def test_what_stands_in_front_may_leave_a_mesh_of_another_domain():
+    """The mesh itself is smooth, so room is made for normals of vertices; sharp edges come with the nodes."""
+    obj, _armature = scenes.make_arm()
+    smooth(obj)
+    modifier = obj.modifiers.new("Flat", "NODES")
+    group = modifier.node_group = bpy.data.node_groups.new("Flat", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    source, shade, result = (
+        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSetShadeSmooth", "NodeGroupOutput")
+    )
+    shade.domain, shade.inputs["Shade Smooth"].default_value = "EDGE", False
+    group.links.new(source.outputs[0], shade.inputs[0])
+    group.links.new(shade.outputs[0], result.inputs[0])
+    obj.modifiers.move(1, 0)
+    scenes.add_sinew(obj, "dq")
+    for frame in (3, 11):
+        bpy.context.scene.frame_set(frame)
+        assert not has_given(obj)
+        given, left = both(obj)
+        np.testing.assert_array_equal(given, left)
+
+
 @needs_support
 def test_a_modifier_behind_that_is_switched_off_or_deleted_is_no_obstacle():
     obj, _armature = make(smooth)
@@ -318,8 +399,11 @@ def test_a_modifier_behind_that_is_switched_off_or_deleted_is_no_obstacle():
     bpy.context.scene.frame_set(5)
     assert not has_given(obj)
     obj.modifiers.remove(modifier)
-    bpy.context.scene.frame_set(6)
-    assert has_given(obj)
+    subdivision = obj.modifiers.new("Subdivision", "SUBSURF")
+    for levels in (0, 1):
+        subdivision.levels = levels
+        bpy.context.scene.frame_set(6 + levels)
+        assert has_given(obj) == (levels == 0)
 
 
 @needs_support
@@ -522,7 +606,7 @@ def test_baked_normals_are_the_same(shading):
 
 
 @needs_support
-def test_what_is_on_in_renders_alone_is_an_obstacle(tmp_path):
+def test_what_is_on_in_renders_alone_is_an_obstacle_there(tmp_path):
     obj, _armature = make(smooth)
     light_scene(obj)
     bpy.context.scene.render.engine = "CYCLES"
@@ -533,6 +617,8 @@ def test_what_is_on_in_renders_alone_is_an_obstacle(tmp_path):
     assert has_given(obj)
     modifier.show_render = True
     given = pixels(tmp_path / "picture.exr")
+    # The viewport has Sinew's, where nothing follows.
+    assert has_given(obj)
     choose(obj, LEAVE)
     np.testing.assert_allclose(given, pixels(tmp_path / "picture.exr"), rtol=0, atol=1e-5)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from sinew_addon.attach import properties
+from sinew_addon.attach import properties, upstream_proxy
 from sinew_addon.core.shading import Shading, SurfaceNormals
 from sinew_addon.io import mesh_io
 
@@ -30,7 +30,11 @@ def faults(obj: bpy.types.Object, mesh: bpy.types.Mesh, points: np.ndarray) -> l
         return [f"{obj.name}: it has normals that nobody gave"]
     if properties.of(obj).normals == properties.SKINNED_NORMALS:
         return []
-    shown, own = mesh_io.read_shading(mesh), mesh_io.read_shading(obj.data)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    proxy = properties.of(obj).upstream_proxy
+    upstream = None if proxy is None else upstream_proxy.evaluated_mesh(obj, depsgraph)
+    source = upstream or obj.data
+    shown, own = mesh_io.read_shading(mesh), mesh_io.read_shading(source)
     shading = Shading(shown.sharp_edges, shown.sharp_faces, own.custom)
     expected = np.empty((mesh_io.domain_size(mesh, given.domain), 3), dtype=np.float32)
     normals = SurfaceNormals(len(points), mesh_io.read_topology(mesh), shading)

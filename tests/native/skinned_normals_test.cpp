@@ -86,6 +86,11 @@ TEST_P(SkinnedByMethod, threads_change_no_bit) {
         const auto result = deformed(skinned, scene, threads);
         EXPECT_TRUE(std::ranges::equal(result.normals, expected.normals, same_bits<float>));
         EXPECT_TRUE(std::ranges::equal(result.tangents, expected.tangents, same_bits<float>));
+        DeformOptions options;
+        options.threads = threads;
+        std::vector<Vec3<float>> alone(expected.normals.size());
+        skinned.deform_normals(scene.posed_from_rest, options, expected.points, alone);
+        EXPECT_TRUE(std::ranges::equal(alone, expected.normals, same_bits<float>));
     }
 }
 

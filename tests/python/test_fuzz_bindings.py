@@ -499,7 +499,7 @@ def test_normals(data):
 @given(st.data())
 def test_skinned_normals(data):
     vertices, bones = data.draw(st.sampled_from([0, 1, 5, 20])), data.draw(st.integers(1, 4))
-    wild = wild_one(data.draw, 10)
+    wild = wild_one(data.draw, 11)
     mesh = (
         np.zeros((vertices, 3)),
         range(vertices + 1),
@@ -536,6 +536,12 @@ def test_skinned_normals(data):
     if result is not None:
         assert result[0].shape == (vertices, 3)
         assert result[1].shape == (skinned.frame_count, 3)
+    points = data.draw(or_garbage(arrays((vertices, 3), wild[10]), wild[10]))[0]
+    alone = attempt(
+        skinned.deform_normals, [pose, points, None, threads, space, inverses, parameters], known | {"points"}
+    )
+    if alone is not None:
+        assert alone.shape == (skinned.frame_count, 3)
 
 
 @many(0.1)

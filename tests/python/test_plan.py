@@ -84,7 +84,8 @@ NORMALS = [
     ({**SMOOTH, "normals_domain": ""}, "", ""),
     ({**SMOOTH, "gives_normals": False}, "", ""),
     ({**SMOOTH, "normals_obstacle": "Cast follows"}, "", "Cast follows"),
-    ({**SMOOTH, "has_upstream": True}, "", "in front"),
+    ({**SMOOTH, "has_upstream": True}, "POINT", ""),
+    ({**SMOOTH, "normals_for_viewport_alone": True}, "POINT", ""),
     ({**SMOOTH, "has_heat_map": True}, "", "heat map"),
     ({**SMOOTH, "safe_mode": True}, "POINT", ""),
     ({**SMOOTH, "mesh_is_shared": True}, "POINT", ""),
@@ -100,6 +101,7 @@ def test_who_computes_normals(facts, domain, reason):
     found = plan(ObjectFacts(**facts))
     assert found.normals.domain == domain
     assert found.normals.are_skinned == facts.get("skins_normals", False)
+    assert found.normals.are_for_viewport_alone == facts.get("normals_for_viewport_alone", False)
     assert reason in found.normals_reason
     assert bool(found.normals_reason) == bool(reason)
 

@@ -73,6 +73,10 @@ def test_of_corners_are_those_of_their_vertices():
     np.testing.assert_array_equal(got[0], sinew.Deformer(binding, "lbs", mix).deform(rig.transforms))
     np.testing.assert_array_equal(got[1], each[1][vertices])
     np.testing.assert_array_equal(got[2], each[2][vertices])
+    # And alone, where the points are known.
+    out = np.empty_like(got[1])
+    assert corners.deform_normals(rig.transforms, got[0], out=out) is out
+    np.testing.assert_array_equal(out, got[1])
 
 
 def test_in_the_space_of_the_bones():
@@ -108,3 +112,9 @@ def test_says_what_it_refuses():
             sinew.SkinnedNormals(binding, *arguments)
     with pytest.raises(ValueError, match="bone_transforms: expected at least 15 bones, got 3"):
         sinew.SkinnedNormals(binding, normals).deform(rig.transforms[:3])
+    skinned = sinew.SkinnedNormals(binding, normals)
+    points = rig.deform("lbs")
+    with pytest.raises(ValueError, match=r"points: expected float32 \[200, 3\]"):
+        skinned.deform_normals(rig.transforms, points[:-1])
+    with pytest.raises(ValueError, match="out: expected another array than the points"):
+        skinned.deform_normals(rig.transforms, points, out=points)

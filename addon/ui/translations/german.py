@@ -425,7 +425,6 @@ TEXTS = {
     "Its Armature modifier is on in the viewport or in renders alone": (
         "Ihr Skelett-Modifikator ist nur im Ansichtsfenster oder nur beim Rendern an"
     ),
-    "modifiers in front change the mesh": "Modifikatoren davor ändern die Masche",
     "it shows a heat map": "sie zeigt eine Wärmekarte",
     "it has instances on its vertices or faces": "sie hat Instanzen auf ihren Punkten oder Flächen",
     "another object reads its mesh": "ein anderes Objekt liest ihre Masche",

@@ -581,3 +581,20 @@ class SkinnedNormals:
         The GIL is released for large meshes. Raises ValueError that names the argument, what was wanted
         and what came.
         """
+    def deform_normals(
+        self,
+        bone_transforms: ArrayLike,
+        points: ArrayLike,
+        out: NDArray[np.float32] | None = None,
+        threads: int | np.integer[Any] | None = None,
+        bones_from_model: ArrayLike | None = None,
+        rest_inverses: ArrayLike | None = None,
+        parameters: Mapping[str, float | bool | str] | None = None,
+    ) -> NDArray[np.float32]:
+        """The normals alone, where the points are known: a fourth less to deform.
+
+        points: float32 [vertices, 3], as deform() or a Deformer gave them for the same arguments.
+        out: float32 [frames, 3], C-contiguous; made where it is None. It is returned.
+
+        All else is as of deform().
+        """

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sinew/deform/check_bind_data.h"
+#include "sinew/deform/skinned_normal_kernel.h"
 #include "sinew/deform/thread_pool.h"
 
 namespace sinew {
@@ -68,6 +69,10 @@ Vec3<float> unit(const Vec3<float>& v) {
     return squared > kShortest && std::isfinite(squared) ? v / std::sqrt(squared) : Vec3<float>(0.0f);
 }
 
+std::size_t threads_for(std::size_t wanted, std::size_t count) noexcept {
+    return wanted > 0 ? wanted : std::min(hardware_threads(), 1 + count / kFramesWorthAThread);
+}
+
 }  // namespace
 
 struct SkinnedNormals::State {
@@ -80,47 +85,72 @@ struct SkinnedNormals::State {
           vertices(rest.vertices.begin(), rest.vertices.end()) {
         const std::vector<Vec3<float>> points = binding.unpack().rest_points;
         const float step = step_of(points);
+        inverse_step = 1.0f / step;
         for (int axis = 0; axis < 3; ++axis) {
-            std::vector<Vec3<float>> moved = points;
-            std::vector<float>& scale = inverse_steps[static_cast<std::size_t>(axis)];
-            for (Vec3<float>& point : moved) {
-                const float before = point[axis];
-                point[axis] += step;
-                // How far it is after rounding.
-                scale.push_back(1.0f / (point[axis] - before));
-            }
+            std::vector<Vec3<float>> stepped = points;
+            for (Vec3<float>& point : stepped) point[axis] += step;
             const auto i = static_cast<std::size_t>(axis);
-            deformers[1 + i].set_rest_points(moved);
-            columns[i].resize(points.size());
+            deformers[1 + i].set_rest_points(stepped);
+            moved[i].resize(points.size());
+            if (!vertices.empty()) cofactors[i].resize(points.size());
         }
     }
 
+    /// Deforms the points that are a step away from those at rest.
+    void move_steps(std::span<const Affine<float>> posed_from_rest,
+                    const DeformOptions& options) const noexcept {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            deformers[1 + axis].deform(posed_from_rest, options, moved[axis]);
+        }
+    }
+
+    void move_normals(std::span<const Vec3<float>> points, std::span<Vec3<float>> to,
+                      std::size_t threads) const noexcept {
+        SkinnedNormalFrame frame{};
+        frame.points = points.data();
+        frame.inverse_step = inverse_step;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            frame.moved[axis] = moved[axis].data();
+            frame.cofactors[axis] = cofactors[axis].data();
+        }
+        frame.rest_normals = normals.data();
+        frame.vertices = vertices.data();
+        frame.normals = to.data();
+        const SkinnedNormalKernel kernel = skinned_normal_kernel();
+        const auto compute = [&](SkinnedNormalKernel::Compute* function, std::size_t count) {
+            const auto part = [&frame, function](std::size_t begin, std::size_t end) {
+                function(frame, begin, end);
+            };
+            parallel_for(count, threads_for(threads, count), part);
+        };
+        if (vertices.empty()) return compute(kernel.of_vertices, to.size());
+        compute(kernel.cofactors, points.size());
+        compute(kernel.of_frames, to.size());
+    }
+
     /// Of frames [begin, end).
-    void move_frames(std::span<const Vec3<float>> points, std::span<Vec3<float>> to_normals,
-                     std::span<Vec3<float>> to_tangents, std::size_t begin, std::size_t end) const noexcept {
+    void move_tangents(std::span<const Vec3<float>> points, std::span<Vec3<float>> to, std::size_t begin,
+                       std::size_t end) const noexcept {
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t vertex = vertices.empty() ? i : static_cast<std::size_t>(vertices[i]);
             const auto column = [&](std::size_t axis) {
-                return inverse_steps[axis][vertex] * (columns[axis][vertex] - points[vertex]);
+                return inverse_step * (moved[axis][vertex] - points[vertex]);
             };
-            const Vec3<float> a = column(0), b = column(1), c = column(2);
-            const Vec3<float>& n = normals[i];
-            to_normals[i] = unit(n.x * glm::cross(b, c) + n.y * glm::cross(c, a) + n.z * glm::cross(a, b));
-            if (to_tangents.empty()) continue;
             const Vec3<float>& t = tangents[i];
-            to_tangents[i] = unit(t.x * a + t.y * b + t.z * c);
+            to[i] = unit(t.x * column(0) + t.y * column(1) + t.z * column(2));
         }
     }
 
     std::array<Deformer, 4> deformers;  // of the rest points, then of these a step along each axis away
-    std::array<std::vector<float>, 3> inverse_steps;
+    float inverse_step = 1.0f;
     std::vector<Vec3<float>> normals;
     std::vector<Vec3<float>> tangents;
     std::vector<std::int32_t> vertices;
 
     // Of one call at a time.
     mutable std::mutex mutex;
-    mutable std::array<std::vector<Vec3<float>>, 3> columns;
+    mutable std::array<std::vector<Vec3<float>>, 3> moved;
+    mutable std::array<std::vector<Float4>, 3> cofactors;
 };
 
 SkinnedNormals::SkinnedNormals(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
@@ -146,21 +176,23 @@ void SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
     if (!tangents.empty() && tangents.size() != most_tangents) return;
     const std::scoped_lock lock(state.mutex);
     state.deformers[0].deform(posed_from_rest, options, points);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        state.deformers[1 + axis].deform(posed_from_rest, options, state.columns[axis]);
-    }
-    struct Work {
-        const State& state;
-        std::span<const Vec3<float>> points;
-        std::span<Vec3<float>> normals;
-        std::span<Vec3<float>> tangents;
-    } const work{state, points, normals, tangents};
-    const std::size_t threads = options.threads > 0
-                                    ? options.threads
-                                    : std::min(hardware_threads(), 1 + normals.size() / kFramesWorthAThread);
-    parallel_for(normals.size(), threads, [&work](std::size_t begin, std::size_t end) {
-        work.state.move_frames(work.points, work.normals, work.tangents, begin, end);
-    });
+    state.move_steps(posed_from_rest, options);
+    state.move_normals(points, normals, options.threads);
+    if (tangents.empty()) return;
+    const auto part = [&](std::size_t begin, std::size_t end) {
+        state.move_tangents(points, tangents, begin, end);
+    };
+    parallel_for(tangents.size(), threads_for(options.threads, tangents.size()), part);
+}
+
+void SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
+                                    const DeformOptions& options, std::span<const Vec3<float>> points,
+                                    std::span<Vec3<float>> normals) const noexcept {
+    const State& state = *state_;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return;
+    const std::scoped_lock lock(state.mutex);
+    state.move_steps(posed_from_rest, options);
+    state.move_normals(points, normals, options.threads);
 }
 
 }  // namespace sinew
