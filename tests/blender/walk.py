@@ -42,13 +42,12 @@ ROUTES = {"evaluation": "fast", "update": "safe"}
 EPISODE = 120
 # A step that hangs.
 LIMIT = 60.0
-# After these a comparison's copies are still what their originals are: what is done to the modifiers of an
-# original they do not follow.
+# After these a comparison's copies are still what their originals are: what is done to the modifiers and the
+# stages of an original they do not follow.
 FOLLOWED = {
     *("frame", "subframe", "play", "pose", "key_pose", "rest_position", "move_vertices", "weights", "update"),
     *(
         "method",
-        "stages",
         "parameters",
         "enabled",
         "rebind",
