@@ -2,10 +2,10 @@
 """Skinning in native code: bind a mesh to bones once, deform it at any pose. Numpy in, numpy out.
 
 Rigid transforms, and what lies between them: sinew.affine, sinew.quat_vec, sinew.dual_quat,
-sinew.interpolate, sinew.spline.
+sinew.interpolate, sinew.spline; and what fits them to measurements: sinew.fit.
 """
 
-from . import affine, dual_quat, interpolate, quat_vec, spline
+from . import affine, dual_quat, fit, interpolate, quat_vec, spline
 from ._native import (
     Binding,
     BulgeLimit,
@@ -41,6 +41,7 @@ __all__ = [
     "centres_of_rotation",
     "direct_delta_mush",
     "dual_quat",
+    "fit",
     "interpolate",
     "keep_thread_state",
     "methods",

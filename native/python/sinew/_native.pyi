@@ -10,6 +10,7 @@ __version__: str
 # Typed and described in the modules of the package that have these names.
 affine: ModuleType
 dual_quat: ModuleType
+fit: ModuleType
 interpolate: ModuleType
 quat_vec: ModuleType
 spline: ModuleType
