@@ -14,7 +14,7 @@ CASES = 2000
 
 
 def random_pairs(rng, count, points=12, noise=0.05):
-    """Points, where random rigid motions take them but for noise, and weights: [count, points, 3] and so on."""
+    """[count, points, 3] twice, and [count, points]: points, where rigid motions take them, weights."""
     # Thick, flat and thin sets, near the origin and away from it.
     extents = 10.0 ** rng.uniform(-2, 0, (count, 1, 3))
     source = rng.normal(size=(count, points, 3)) * extents + rng.uniform(-5, 5, (count, 1, 3))
@@ -91,7 +91,7 @@ def test_directions_count_as_scipys_vectors(method):
 @SOLVERS
 def test_a_direction_is_what_a_line_of_points_lacks(method):
     motion = rigid(np.random.default_rng(3))
-    line = np.outer(np.linspace(-1, 2, 7), [1.0, 2, -1]) + [4, 0, 0]
+    line = np.array([4.0, 0, 0]) + np.outer(np.linspace(-1, 2, 7), [1.0, 2, -1])
     across = np.array([[0.0, 1, 2]])
     moved, turned = motion.apply(line), motion.rotation.apply(across)
     assert not fit.rigid(line, moved, method=method).is_defined
