@@ -74,11 +74,11 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 def _fitted(args: argparse.Namespace, rows: list[np.ndarray], weights: np.ndarray | None) -> dict[str, Any]:
     if args.what == "points":
-        found = sinew.fit.rigid(*rows, weights, method=args.method)
+        found = sinew.fit.rigid(rows[0], rows[1], weights, method=args.method)
         left = {"error": float(found.error), "is_mirrored": bool(found.is_mirrored)}
         return _facts(found.transforms, bool(found.is_defined), left)
     if args.what == "hand-eye":
-        pair = sinew.fit.hand_eye(*rows, weights)
+        pair = sinew.fit.hand_eye(rows[0], rows[1], weights)
         left = {"angle_degrees": math.degrees(float(pair.angle)), "distance": float(pair.translation)}
         return _facts(pair.transforms, bool(pair.is_defined), left)
     mean = sinew.fit.average(rows[0], weights, robust=args.robust)
