@@ -83,7 +83,7 @@ def made(tmp_path_factory):
 def test_it_needs_nothing_beside_itself(made):
     html, _content, _said = made
     reader = Reader(html)
-    assert reader.tags.count("svg") == 4
+    assert reader.tags.count("svg") == 6
     assert not {"script", "link", "iframe", "object", "embed"} & set(reader.tags)
     assert [reference for reference in reader.references if not reference.startswith(("#", "data:"))] == []
     # Names of namespaces are not fetched.

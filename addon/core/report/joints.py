@@ -74,13 +74,14 @@ def figure_3_3() -> Figure:
     return Figure("3.3", TITLE, pictures, (fact,))
 
 
-_COLOURS = {"matrix_linear": "#d8b365", "qv_nlerp": "#01665e", "dlb": "#c51b7d"}
+# Wide below and narrow above, so that arms that fall together are all seen.
+_STYLES = (("#d8b365", 5.0), ("#01665e", 3.2), ("#c51b7d", 1.4))
 
 
 def _plot(from_root: bool) -> str:
     with new_figure(f"3.3 {'root' if from_root else 'parent'}", (6.4, 4.4)) as figure:
         axes = figure.add_subplot()
-        for width, (method, colour) in zip((5.0, 3.2, 1.4), _COLOURS.items(), strict=True):
+        for method, (colour, width) in zip(METHODS, _STYLES, strict=True):
             style = {"color": colour, "linewidth": width, "markersize": width + 1.0}
             axes.plot([], [], "-o", label=method, **style)
             for arm in arms(method, np.array(TIMES), from_root):

@@ -430,7 +430,7 @@ def translation_errors(name: str) -> np.ndarray:
     halves = (np.float32(np.radians(angle / 2)).view(np.int32) + steps).astype(np.int32).view(np.float32)
     direction = (np.array(axis) / np.linalg.norm(axis)).astype(np.float32)
     quaternions = np.column_stack([np.cos(halves), np.sin(halves)[:, None] * direction])
-    pairs = np.column_stack([quaternions, np.tile(np.float32(shift), (ANGLES, 1))])
+    pairs = np.column_stack([quaternions, np.tile(np.array(shift, np.float32), (ANGLES, 1))])
     transforms = pairs if name == "quat_vec" else getattr(sinew.quat_vec, f"to_{name}")(pairs)
     if name == "dual_quat":
         transforms = sinew.dual_quat.normalized(transforms)
