@@ -249,8 +249,9 @@ TEST(Hermite, passes_through_points_with_the_tangents_given) {
     const std::vector<Vec3<double>> tangents{{1, 0, 0}, {0, 1, 2}, {-1, 0, 3}};
     const std::vector<double> times{0, 2, 3};
     const auto at = [&](double time) {
-        return hermite<double>(std::span<const Vec3<double>>(points), std::span<const Vec3<double>>(tangents),
-                               std::span<const double>(times), time);
+        return sinew::hermite<double>(std::span<const Vec3<double>>(points),
+                                      std::span<const Vec3<double>>(tangents), std::span<const double>(times),
+                                      time);
     };
     for (std::size_t i = 0; i < 3; ++i) EXPECT_LT(distance(at(times[i]), points[i]), 1e-15);
     for (const double side : {1e-6, -1e-6}) {
