@@ -66,8 +66,9 @@ def hand_eye(a: ArrayLike, b: ArrayLike, weights: ArrayLike | None = None) -> Ha
         camera on it, or of a bone and of a marker. A matrix's linear part becomes the nearest rotation.
     weights: [.., n], not below 0; None: 1 each.
 
-    By dual quaternions, rotation and translation at once (Daniilidis 1999). Not defined: fewer than two
-    motions, rotations about parallel axes alone, half turns alone, no weight above 0.
+    By dual quaternions, rotation and translation at once (Daniilidis 1999); then the translation again, by
+    least squares for that rotation (Park, Martin 1994), which noise puts less far off. Not defined: fewer
+    than two motions, rotations about parallel axes alone, half turns alone, no weight above 0.
     """
     return HandEye(*_native.hand_eye(a, b, weights))
 

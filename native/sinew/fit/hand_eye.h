@@ -132,6 +132,42 @@ template <class T>
     return singular_values<8>(rows.columns());
 }
 
+/// `x` with the translation that fits its rotation best: (R_a - 1) t = R_x t_b - t_a by least squares (Park, Martin
+/// 1994). Along what the rotations leave open it stays.
+template <class T>
+[[nodiscard]] DualQuat<double> with_best_translation(const DualQuat<double>& x,
+                                                     std::span<const DualQuat<T>> a,
+                                                     std::span<const DualQuat<T>> b,
+                                                     std::span<const T> weights, double largest_weight,
+                                                     double length) noexcept {
+    const Vec3<double> start = translation(x);
+    Mat3<double> normal(0.0);
+    Vec3<double> residual(0.0);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        const double weight = (weights.empty() ? 1.0 : static_cast<double>(weights[i])) / largest_weight;
+        if (!(weight > 0.0)) continue;
+        const DualQuat<double> from = with_lengths_divided(a[i], length);
+        const DualQuat<double> onto = with_lengths_divided(b[i], length);
+        const Mat3<double> rows = to_mat3(from.real) - Mat3<double>(1.0);
+        const Vec3<double> wanted = rotate(x.real, translation(onto)) - translation(from);
+        normal += weight * (glm::transpose(rows) * rows);
+        residual += weight * (glm::transpose(rows) * (wanted - rows * start));
+    }
+    Columns<3> columns{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Vec3<double>& column = normal[static_cast<int>(i)];
+        columns[i] = {column.x, column.y, column.z};
+    }
+    const SingularValues<3> s = singular_values<3>(columns);
+    Vec3<double> correction(0.0);
+    for (std::size_t i = 0; i < 3; ++i) {
+        // Symmetric: its left and right vectors are one.
+        const Vec3<double> v(s.v[i][0], s.v[i][1], s.v[i][2]);
+        if (s.values[i] > 1e-12 * s.values[0]) correction += (glm::dot(v, residual) / s.values[i]) * v;
+    }
+    return to_dual_quat(QuatVec<double>{x.real, start + correction});
+}
+
 }  // namespace detail
 
 /// x of a x = x b, for n motions a of one body and b of another that is fixed to it: where the one is, seen from the
@@ -143,7 +179,9 @@ template <class T>
 /// weights  [n] not negative; empty: 1 each
 ///
 /// Lengths are divided by the longest translation of a and b first, so that their unit does not matter. Of half
-/// turns, whose signs are free, others decide the sign. Computed in double; nothing is allocated.
+/// turns, whose signs are free, others decide the sign. Where motions are noisy the translation that comes with the
+/// rotation is not the best for it, and is solved for again (Park, Martin 1994). Computed in double; nothing is
+/// allocated.
 template <class T>
 [[nodiscard]] HandEye<T> hand_eye(std::span<const DualQuat<T>> a, std::span<const DualQuat<T>> b,
                                   std::span<const T> weights = {}) noexcept {
@@ -163,7 +201,8 @@ template <class T>
     const SingularValues<8> first = detail::hand_eye_values(a, b, weights, largest_weight, length, nullptr);
     const DualQuat<double> rough = detail::unit_in_null_space(first);
     const SingularValues<8> s = detail::hand_eye_values(a, b, weights, largest_weight, length, &rough);
-    DualQuat<double> x = detail::unit_in_null_space(s);
+    DualQuat<double> x =
+        detail::with_best_translation(detail::unit_in_null_space(s), a, b, weights, largest_weight, length);
     x.dual *= length;
 
     // Where scalar parts are but rounding, the first equations, of which they are factors, decide nothing.
