@@ -69,7 +69,7 @@ def times(seconds: float) -> dict:
     return found
 
 
-# --- Hand-eye: at once, or the rotation first
+# --- Hand-eye: by dual quaternions, or by matrices
 
 
 def two_steps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -88,7 +88,7 @@ def hand_eye(trials: int) -> dict:
     rng = np.random.default_rng(1)
     found = {}
     for noise in NOISES:
-        off: dict[str, list] = {"at once": [], "two steps": []}
+        off: dict[str, list] = {"dual quaternions": [], "two steps": []}
         for _ in range(trials):
             x = motions(rng, 1)[0]
             # Below half a turn, where the sign of a logarithm would be the noise's.
@@ -98,7 +98,10 @@ def hand_eye(trials: int) -> dict:
             eye = RigidTransform.concatenate([x.inv() * each * x for each in hand])
             eye = eye * RigidTransform.from_exp_coords(noise * rng.normal(size=(8, 6)))
             a, b = hand.as_matrix(), eye.as_matrix()
-            for name, got in (("at once", fit.hand_eye(a, b).transforms), ("two steps", two_steps(a, b))):
+            for name, got in (
+                ("dual quaternions", fit.hand_eye(a, b).transforms),
+                ("two steps", two_steps(a, b)),
+            ):
                 off[name].append(sinew.affine.rigid_distance(got, x.as_matrix()))
         found[noise] = {name: np.median(of, axis=0).tolist() for name, of in off.items()}
     return found
@@ -137,7 +140,7 @@ def draw(spreads: dict, eyes: dict, averages: dict) -> None:
         values = [spreads[f"{size}/{name}"]["least"] * 1e6 for size in SIZES]
         first.loglog(SIZES, values, color=colour, marker=marker, label=name)
     first.set(xlabel="points", ylabel="microseconds a fit", title="The time of one fit")
-    for (colour, marker), name in zip(styles, ("at once", "two steps"), strict=False):
+    for (colour, marker), name in zip(styles, ("dual quaternions", "two steps"), strict=False):
         values = [eyes[noise][name][1] for noise in NOISES]
         second.loglog(NOISES, values, color=colour, marker=marker, label=name)
     second.set(
