@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .commands.console import Console
 
 # Batches start Blenders of their own, or prepare this one later; a report without Blender has no pictures.
-WITHOUT_BLENDER = ("methods", "check", "report", "reskin", "restore")
+WITHOUT_BLENDER = ("methods", "check", "fit", "report", "reskin", "restore")
 
 _commands: list[object] = []
 
@@ -39,6 +39,7 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         bake,
         check,
         compare,
+        fit,
         inbetween,
         info,
         methods,
@@ -60,6 +61,7 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         "bake": bake,
         "compare": compare,
         "render": render,
+        "fit": fit,
         "report": report,
     }
     parser = argparse.ArgumentParser(prog="sinew", description="Skinning for Blender files.")

@@ -19,6 +19,7 @@ NAMES = (
         "centres_of_rotation",
         "direct_delta_mush",
         "dual_quat",
+        "fit",
         "interpolate",
     ),
     *("keep_thread_state", "methods", "quat_vec", "spline", "stages"),

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <glm/gtx/dual_quaternion.hpp>
 
 #include "sinew/interpolate/methods.h"
@@ -160,6 +161,26 @@ struct GlmDualQuat {
     static Point apply(const Transform& a, const Point& point) { return a * point; }
     static Transform dlb(const Transform& a, const Transform& b, float t) {
         return glm::normalize(glm::lerp(a, b, t));
+    }
+    /// Screw linear interpolation as Kenwright 2012 has it ("A beginners guide to dual-quaternions", section 7), which
+    /// the report took (section 3.1): the angle by acos, and no case for rotations that are equal or half a turn apart.
+    static Transform sclerp(const Transform& a, const Transform& b, float t) {
+        const Transform onto = glm::dot(a.real, b.real) < 0.0f ? b * -1.0f : b;
+        const Transform step = Transform(glm::conjugate(a.real), glm::conjugate(a.dual)) * onto;
+        const glm::vec3 axial(step.real.x, step.real.y, step.real.z);
+        const float shorten = 1.0f / std::sqrt(glm::dot(axial, axial));
+        const glm::vec3 axis = axial * shorten;
+        const float angle = 2.0f * std::acos(step.real.w);
+        const float shift = -2.0f * step.dual.w * shorten;
+        const glm::vec3 moment =
+            (glm::vec3(step.dual.x, step.dual.y, step.dual.z) - axis * (0.5f * shift * step.real.w)) *
+            shorten;
+        const float sine = std::sin(0.5f * t * angle);
+        const float cosine = std::cos(0.5f * t * angle);
+        const float along = 0.5f * t * shift;
+        const glm::vec3 dual = sine * moment + (along * cosine) * axis;
+        return a * Transform(glm::quat(cosine, sine * axis.x, sine * axis.y, sine * axis.z),
+                             glm::quat(-along * sine, dual.x, dual.y, dual.z));
     }
     static Transform blend(const Transform* transforms, const Weights& weights) {
         Transform sum = transforms[0] * weights[0];

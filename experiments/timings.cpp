@@ -258,6 +258,7 @@ void add_all() {
     add_linear<Glm4x4>("glm_4x4");
     add_pair<GlmPair>("glm_quat_vec");
     add_between<GlmDualQuat>("glm_dual_quat", &GlmDualQuat::dlb);
+    add_between<GlmDualQuat>("glm_dual_quat_sclerp", &GlmDualQuat::sclerp);
     add_linear<Eigen4x4>("eigen_4x4");
     add_linear<Eigen3x4>("eigen_3x4");
     add_pair<EigenPair>("eigen_quat_vec");

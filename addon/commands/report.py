@@ -26,9 +26,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "report",
         help="do the experiments of Smith 2013 again and write them as one page",
         description="Writes FOLDER/report.html, which needs no other file, and report.json: Tables 3.1 "
-        "to 3.10 and Figures 3.4 to 3.11 of Smith 2013, each with the printed values, Sinew's and whether "
+        "to 3.10 and Figures 3.3 to 3.11 of Smith 2013, each with the printed values, Sinew's and whether "
         "they agree. An installed Sinew computes Tables 3.1 and 3.6 to 3.8 and, with matplotlib, Figures "
-        "3.4 and 3.5. Operation counts and times (Tables 3.2 to 3.5, 3.9, 3.10) take programs that are "
+        "3.3 to 3.5. Operation counts and times (Tables 3.2 to 3.5, 3.9, 3.10) take programs that are "
         "built against GLM and Eigen, and pictures (Figures 3.6 to 3.11) Sinew's example rigs: ./dev report "
         "in a checkout builds the programs and passes on both. The page says what was left out and why.",
     )
@@ -54,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 def run(args: argparse.Namespace, console: Console) -> int:
     import sinew
 
-    from ..core.report import answers, measure, meshes, page, paths, tables
+    from ..core.report import answers, joints, measure, meshes, page, paths, tables
 
     for folder in (args.programs, args.blend_files):
         if folder is not None and not folder.is_dir():
@@ -62,8 +62,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     measurements = None
     if args.programs is not None:
         measurements = measure.measure(args.programs, args.quick, console.note)
-    console.note("Computing Figures 3.4 and 3.5")
-    plots = (paths.figure_3_4(), paths.figure_3_5())
+    console.note("Computing Figures 3.3 to 3.5")
+    plots = (joints.figure_3_3(), paths.figure_3_4(), paths.figure_3_5())
     pictures = meshes.missing(NO_FILES) if args.blend_files is None else _draw(args, console)
     figures = (*plots, *pictures)
     build = {} if measurements is None else measurements.build

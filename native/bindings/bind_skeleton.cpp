@@ -33,23 +33,72 @@ py::object as_array(const std::vector<Transform>& bones) {
     return output.take();
 }
 
-template <class T>
-T checked_scalar(const py::object& value, const char* argument) {
-    const auto input = checked_input<T, T>(value, argument);
-    if (!input.lead.empty()) fail(argument, "a number", describe(value));
-    return *input.data;
+// One transform; the identity where `value` is None.
+template <class Transform, class T>
+Transform checked_root(const py::object& value) {
+    if (value.is_none()) return {};
+    const auto input = checked_input<T, Transform>(value, "root");
+    if (!input.lead.empty()) fail("root", "one transform", describe(value));
+    return Item<Transform>::read(input.data);
 }
 
-py::object relative_to_root(const Skeleton& skeleton, const py::object& any_transforms) {
-    const auto [transforms] = promoted<1>({"transforms"}, {any_transforms});
+py::object relative_to_root(const Skeleton& skeleton, const py::object& any_transforms,
+                            const py::object& any_root) {
+    const auto [transforms, root] = promoted<2>({"transforms", "root"}, {any_transforms, any_root});
     return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
         return with_element(transforms, "transforms", "", [&]<class T>(T) {
             using Transform = typename Row::template Transform<T>;
             auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
-            root_relative<Transform>(skeleton, {}, bones, bones);
+            root_relative<Transform>(skeleton, checked_root<Transform, T>(root), bones, bones);
             return as_array(bones);
         });
     });
+}
+
+py::object branch_updated(const Skeleton& skeleton, const py::object& any_relative,
+                          const py::object& any_transforms, const py::object& bone,
+                          const py::object& any_root) {
+    const auto [relative, transforms, root] =
+        promoted<3>({"root_relative", "transforms", "root"}, {any_relative, any_transforms, any_root});
+    const std::string wanted = "the index of one of " + std::to_string(skeleton.bone_count()) + " bones";
+    const double index = checked_number(bone, "bone", wanted);
+    if (!(index >= 0.0) || index >= static_cast<double>(skeleton.bone_count()) ||
+        index != std::floor(index)) {
+        fail("bone", wanted, std::string(py::str(bone)));
+    }
+    return with_representation(transforms, "transforms", "bones", [&]<class Row>(Row) {
+        return with_element(transforms, "transforms", "", [&]<class T>(T) {
+            using Transform = typename Row::template Transform<T>;
+            const auto bones = checked_bones<Transform, T>(skeleton, transforms, "transforms");
+            auto result = checked_bones<Transform, T>(skeleton, relative, "root_relative");
+            update_branch<Transform>(skeleton, checked_root<Transform, T>(root), bones,
+                                     static_cast<std::size_t>(index), result);
+            return as_array(result);
+        });
+    });
+}
+
+// (transforms, is_defined) of run(moment, bones) at every number of `at`: of one number [bones, ..] and a bool, of
+// [..] numbers [.., bones, ..] and [..].
+template <class Transform, class T, class Run>
+py::object at_all(const Skeleton& skeleton, const Input<T>& at, Run run) {
+    Shape shape = at.lead;
+    shape.push_back(static_cast<py::ssize_t>(skeleton.bone_count()));
+    Output<Transform> transforms(shape);
+    Output<bool> is_defined(at.lead);
+    const py::ssize_t count = count_of(at.lead);
+    const auto bone_count = static_cast<py::ssize_t>(skeleton.bone_count());
+    without_gil([&] {
+        std::vector<Transform> bones(skeleton.bone_count());
+        for (py::ssize_t i = 0; i < count; ++i) {
+            is_defined.write(i, run(at.data[i], std::span<Transform>(bones)));
+            for (py::ssize_t bone = 0; bone < bone_count; ++bone) {
+                transforms.write(i * bone_count + bone, bones[static_cast<std::size_t>(bone)]);
+            }
+        }
+    });
+    if (at.lead.empty()) return py::make_tuple(transforms.take(), static_cast<bool>(is_defined.data[0]));
+    return py::make_tuple(transforms.take(), is_defined.take());
 }
 
 py::object interpolate(const Skeleton& skeleton, const py::object& any_a, const py::object& any_b,
@@ -61,10 +110,9 @@ py::object interpolate(const Skeleton& skeleton, const py::object& any_a, const 
             using Transform = typename Method::template Transform<T>;
             const auto from = checked_bones<Transform, T>(skeleton, a, "a");
             const auto onto = checked_bones<Transform, T>(skeleton, b, "b");
-            std::vector<Transform> bones(from.size());
-            const bool are_defined =
-                interpolate_keyframes<Method, T>(skeleton, from, onto, checked_scalar<T>(t, "t"), bones);
-            return py::make_tuple(as_array(bones), are_defined);
+            return at_all<Transform, T>(skeleton, checked_input<T, T>(t, "t"), [&](T part, auto bones) {
+                return interpolate_keyframes<Method, T>(skeleton, from, onto, part, bones);
+            });
         });
     });
 }
@@ -80,10 +128,9 @@ py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, c
     }
     const std::vector<Transform> keys = items_of<Transform>(input);
     const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
-    std::vector<Transform> bones(skeleton.bone_count());
-    const bool are_defined = run(std::span<const Transform>(keys), std::span<const T>(key_times),
-                                 checked_scalar<T>(time, "time"), std::span<Transform>(bones));
-    return py::make_tuple(as_array(bones), are_defined);
+    return at_all<Transform, T>(skeleton, checked_input<T, T>(time, "time"), [&](T now, auto bones) {
+        return run(std::span<const Transform>(keys), std::span<const T>(key_times), now, bones);
+    });
 }
 
 py::object spline(const Skeleton& skeleton, const py::object& any_keyframes, const py::object& any_times,
@@ -145,13 +192,21 @@ void bind_skeleton(py::module_& m) {
                          "a tuple of " + std::to_string(state.size()));
                 return make_skeleton(state[0]);
             }))
-        .def("root_relative", &relative_to_root, py::arg("transforms"),
+        .def("root_relative", &relative_to_root, py::arg("transforms"), py::arg("root") = py::none(),
              "Each bone relative to the root, in the representation that came (Smith 2013, algorithm 1).\n\n"
-             "transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].")
+             "transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].\n"
+             "root: None, or one transform that is placed before every bone without a parent.")
+        .def("update_branch", &branch_updated, py::arg("root_relative"), py::arg("transforms"),
+             py::arg("bone"), py::arg("root") = py::none(),
+             "The same after a change of one bone: computed for that bone and those below it alone.\n\n"
+             "root_relative: what root_relative() gave before the change, in the representation of "
+             "`transforms`.\n"
+             "transforms, root: as of root_relative().\n"
+             "bone: the index of the bone that has changed.")
         .def("interpolate", &interpolate, py::arg("a"), py::arg("b"), py::arg("t"), py::arg("method") = "dlb",
              "(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).\n\n"
              "a, b: [bones, ..] in the representation of the method, at t = 0 and t = 1.\n"
-             "t: a number; outside 0 to 1 the motion goes on.\n"
+             "t: a number or [..], which give [.., bones, ..] and [..]; outside 0 to 1 the motion goes on.\n"
              "method: one of sinew.interpolate.METHODS.\n"
              "is_defined: False where a bone has no one in-between; it then has what "
              "sinew.interpolate.between\n"
@@ -162,7 +217,9 @@ void bind_skeleton(py::module_& m) {
              "(Smith 2013, algorithm 3 and section 3.2.2).\n\n"
              "keyframes: [keys, bones, ..] in the representation of the method, one key or more.\n"
              "times: [keys], not decreasing; keys of equal time are a cut.\n"
-             "time: a number; before the first key and after the last it is that key.\n"
+             "time: a number or [..], which give [.., bones, ..] and [..]; before the first key and after "
+             "the last it\n"
+             "    is that key.\n"
              "method: one of sinew.interpolate.METHODS.")
         .def("spline_vector", &spline_vector_form, py::arg("keyframes"), py::arg("times"), py::arg("time"),
              "The same in vector form (Smith 2013, algorithm 3): not rigid between the keys.\n\n"

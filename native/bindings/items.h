@@ -60,6 +60,11 @@ struct Item<Mat3<T>> {
         }
         return m;
     }
+    static void write(const Mat3<T>& m, T* to) {
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) to[3 * row + column] = m[column][row];
+        }
+    }
 };
 
 /// Read from three rows or four, of which the fourth is not read; written with four.
@@ -99,6 +104,16 @@ void write_quat(const Quat<T>& q, T* to) {
     to[2] = q.y;
     to[3] = q.z;
 }
+
+template <class T>
+struct Item<Quat<T>> {
+    using Element = T;
+    static constexpr const char* kShape = "[.., 4]";
+    static constexpr std::size_t kSize = 4;
+    static constexpr std::array<std::size_t, 1> kDimensions{4};
+    static Quat<T> read(const T* from) { return read_quat(from); }
+    static void write(const Quat<T>& q, T* to) { write_quat(q, to); }
+};
 
 template <class T>
 struct Item<QuatVec<T>> {

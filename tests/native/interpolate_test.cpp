@@ -289,5 +289,30 @@ TEST(Slerp, of_opposite_quaternions_is_finite) {
     }
 }
 
+TYPED_TEST(Interpolation, a_tie_that_the_order_decides_is_not_defined) {
+    using T = typename TypeParam::Scalar;
+    using M = typename TypeParam::M;
+    const auto rotated = [&](T degrees) {
+        return this->in_layout({about<T>(Vec3<T>(0, 0, 1), degrees), Vec3<T>(1, 2, 3)});
+    };
+    const auto tie = this->blend({rotated(0), rotated(120), rotated(240)}, {T(1), T(1), T(1)});
+    // Matrices have no signs; that of matrix_polar is flat, and any rotation about z as near.
+    EXPECT_EQ(tie.is_defined, (std::is_same_v<M, MatrixLinear> || std::is_same_v<M, MatrixLog>));
+    EXPECT_TRUE(this->is_finite(tie.transform));
+    EXPECT_TRUE(this->blend({rotated(0), rotated(40), rotated(80)}, {T(1), T(1), T(1)}).is_defined);
+}
+
+TYPED_TEST(Interpolation, what_is_no_rotation_is_not_defined) {
+    using T = typename TypeParam::Scalar;
+    using M = typename TypeParam::M;
+    auto a = this->in_layout({about<T>(Vec3<T>(1, 2, 3), T(50)), Vec3<T>(1, 2, 3)});
+    const auto b = this->in_layout({});
+    EXPECT_TRUE(M::between(a, b, T(0.5)).is_defined);
+    a = scaled(T(1.1), a);
+    const bool takes_any = std::is_same_v<M, MatrixLinear> || std::is_same_v<M, MatrixPolar>;
+    EXPECT_EQ(M::between(a, b, T(0.5)).is_defined, takes_any);
+    EXPECT_EQ(this->blend({a, b}, {T(0.3), T(0.7)}).is_defined, takes_any);
+}
+
 }  // namespace
 }  // namespace sinew

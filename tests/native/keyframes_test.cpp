@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sinew/skeleton/keyframes.h"
 
+#include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/transform/make.h"
@@ -241,6 +242,23 @@ double elbow_gap(bool combine_first) {
     }
     // The end of the upper arm and the head of the lower are one point of a real arm.
     return distance(transform_point(bones[0], {1, 0, 0}), transform_point(bones[1], {0, 0, 0}));
+}
+
+TEST(Hermite, passes_through_points_with_the_tangents_given) {
+    const std::vector<Vec3<double>> points{{0, 0, 0}, {1, 2, 0}, {3, 1, 1}};
+    const std::vector<Vec3<double>> tangents{{1, 0, 0}, {0, 1, 2}, {-1, 0, 3}};
+    const std::vector<double> times{0, 2, 3};
+    const auto at = [&](double time) {
+        return sinew::hermite<double>(std::span<const Vec3<double>>(points),
+                                      std::span<const Vec3<double>>(tangents), std::span<const double>(times),
+                                      time);
+    };
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_LT(distance(at(times[i]), points[i]), 1e-15);
+    for (const double side : {1e-6, -1e-6}) {
+        EXPECT_LT(distance((at(2 + side) - points[1]) / side, tangents[1]), 1e-5);
+    }
+    EXPECT_EQ(at(-1), points[0]);
+    EXPECT_EQ(at(9), points[2]);
 }
 
 TEST(FigureThreeThree, interpolating_after_combining_tears_the_elbow) {

@@ -77,6 +77,27 @@ TEST(ForwardKinematics, scale_reaches_the_children) {
     EXPECT_EQ(distance(bones[1].translation, Vec3<double>(2, 3, 4)), 0.0);
 }
 
+TEST(ForwardKinematics, of_one_branch_leaves_the_others) {
+    const std::vector<std::int32_t> parents{-1, 0, 1, 0, 3, -1};
+    const Skeleton skeleton(parents);
+    test::Random random(5);
+    std::vector<QuatVec<double>> bones;
+    for (std::size_t i = 0; i < parents.size(); ++i) bones.push_back(random.motion(2.0));
+    const QuatVec<double> root = random.motion(2.0);
+    std::vector<QuatVec<double>> whole(6);
+    root_relative<QuatVec<double>>(skeleton, root, bones, whole);
+    bones[3] = random.motion(2.0);
+    std::vector<QuatVec<double>> wanted(6);
+    root_relative<QuatVec<double>>(skeleton, root, bones, wanted);
+    // What is not in the branch is not written, be it right or wrong.
+    whole[2].translation = {7, 7, 7};
+    wanted[2].translation = {7, 7, 7};
+    update_branch<QuatVec<double>>(skeleton, root, bones, 3, whole);
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+        EXPECT_EQ(test::distance(to_affine(whole[i]), to_affine(wanted[i])), 0.0) << i;
+    }
+}
+
 TEST(Skeleton, keeps_the_parents) {
     const Skeleton skeleton(kParents);
     EXPECT_EQ(skeleton.bone_count(), kParents.size());

@@ -191,6 +191,10 @@ def studio(tmp_path_factory):
     for name in ("human.blend", "characters/hero.blend", "shots/010/shot.blend", "library/other.blend"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(rig, folder / name)
+    for name in ("scan.csv", "model.csv"):
+        (folder / name).write_text("0,0,0\n1,0,0\n0,2,0\n0,0,3\n", encoding="utf-8")
+    for name in ("hand.csv", "camera.csv", "seen.csv"):
+        (folder / name).write_text("1,0,0,0,1,2,3\n0.8,0.6,0,0,1,2,4\n0.8,0,0.6,0,2,2,3\n", encoding="utf-8")
     batch = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
     job = re.search(r"```toml\n(.*?)```", batch, re.DOTALL)[1]
     # The rig has one mesh, which the example's lists of names do not know.
@@ -232,6 +236,6 @@ def test_it_runs_as_written(command, studio, tmp_path):
     before = {path for path in folder.rglob("*") if path.is_file()}
     assert run(command.line, folder)
     written = {path for path in folder.rglob("*") if path.is_file()} - before
-    reads_only = command.words[1] in ("methods", "info", "check")
+    reads_only = command.words[1] in ("methods", "info", "check", "fit")
     assert bool(written) != reads_only or "--resume" in command.words
     assert not [path for path in written if "unfinished" in path.name]

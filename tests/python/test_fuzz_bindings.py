@@ -257,6 +257,29 @@ def blend_calls(draw):
     return function, [draw(kinds[kind](wild[i])) for i, kind in enumerate(of_arguments.split())]
 
 
+@st.composite
+def fit_calls(draw):
+    of_fit = sinew._native.fit
+    count = draw(st.integers(0, 5))
+    wild = wild_one(draw, 5)
+    layout = draw(st.sampled_from(["affine", "rows", "quat_vec", "dual_quat"]))
+
+    def rows(shape, index):
+        return draw(or_garbage(arrays((count, *shape), wild[index]), wild[index]))
+
+    weights = draw(st.one_of(st.just((None, None)), st.just(rows((), 2))))
+    if draw(st.booleans()):
+        solver = draw(names(st.sampled_from(sinew.fit.METHODS), wild[4]).map(lambda name: (name, None)))
+        directions = [(None, None)] * 3
+        if draw(st.booleans()):
+            directions = [rows((3,), 3), rows((3,), 4), (None, None)]
+        return of_fit.rigid, [rows((3,), 0), rows((3,), 1), weights, *directions, solver]
+    if draw(st.booleans()):
+        return of_fit.hand_eye, [rows(KINDS[layout], 0), rows(KINDS[layout], 1), weights]
+    is_robust = (draw(st.booleans()), None)
+    return of_fit.average, [rows(KINDS[layout], 0), weights, is_robust]
+
+
 def run(function, arguments):
     result = attempt(function, [given for given, _ in arguments], names_of_arguments(function))
     if result is not None:
@@ -282,6 +305,12 @@ def test_transforms(call):
 @many(0.2)
 @given(blend_calls())
 def test_blends_and_splines(call):
+    run(*call)
+
+
+@many(0.05)
+@given(fit_calls())
+def test_fits(call):
     run(*call)
 
 

@@ -321,3 +321,125 @@ def test_the_largest_translations_are_finite_and_never_falsely_defined(method, d
     ends = np.array([-large, large], dtype)
     between_times = sinew.spline.catmull_rom_vector(np.stack([a, b]), ends, 0.0)
     assert np.isfinite(between_times.transforms).all()
+
+
+SIGNED = ("qv_nlerp", "qv_slerp", "dlb", "dib")
+
+
+def blends_in_two_orders(method, motions, weights):
+    """(blends of [n, 3] motions, whether another order changes the blend)."""
+    name = LAYOUT_OF[method]
+    size = 4 if name == "quat_vec" else 8
+    array = layout(motions, name).reshape(-1, 3, size + (3 if name == "quat_vec" else 0))
+    plain = blend(array, weights, method)
+    apart = np.zeros(len(array))
+    for order in ([1, 2, 0], [2, 0, 1], [0, 2, 1]):
+        other = blend(array[:, order], weights[:, order], method)
+        distance = sinew.quat_vec.rigid_distance if name == "quat_vec" else sinew.dual_quat.rigid_distance
+        apart = np.maximum(apart, distance(plain.transforms, other.transforms).angle)
+    return plain, apart > 1e-6
+
+
+def wide_motions(rng, count):
+    """[3 count], up to 143 degrees from the identity."""
+    axes = rng.normal(size=(3 * count, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    angles = rng.uniform(0, 2.5, (3 * count, 1))
+    rotations = Rotation.from_rotvec(angles * axes)
+    return RigidTransform.from_components(rng.uniform(-2, 2, (3 * count, 3)), rotations)
+
+
+@pytest.mark.parametrize("method", SIGNED)
+def test_what_the_order_decides_is_not_defined(method):
+    rng = np.random.default_rng(20)
+    even = np.ones((2000, 3))
+    plain, changes = blends_in_two_orders(method, wide_motions(rng, 2000), even)
+    # Never silently; and hardly ever where nothing changes (the means of two choices of signs can be one).
+    assert not (plain.is_defined & changes).any()
+    assert 0.1 < changes.mean() < 0.3
+    if method in ("qv_nlerp", "dlb"):
+        np.testing.assert_array_equal(plain.is_defined, ~changes)
+    # With one that is the heaviest nothing is left to the order.
+    uneven = np.tile([1.0, 1.001, 0.999], (2000, 1))
+    plain, changes = blends_in_two_orders(method, wide_motions(rng, 2000), uneven)
+    assert not (plain.is_defined & changes).any()
+    assert plain.is_defined.mean() > 0.99
+
+
+def test_turns_by_thirds_are_a_tie():
+    turns = sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians([0.0, 120, 240]))
+    for method in ("dlb", "dib", "sclerp"):
+        assert not blend(turns, np.ones(3), method).is_defined
+        assert not blend(turns, np.full(3, np.float32(1 / 3)), method).is_defined
+        assert blend(turns, [1.0, 1.1, 1.0], method).is_defined
+    assert not blend(sinew.dual_quat.to_quat_vec(turns), np.ones(3), "qv_nlerp").is_defined
+    # Near one another, equal weights are as good as any.
+    near = sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians([0.0, 40, 80]))
+    assert blend(near, np.ones(3), "dlb").is_defined
+
+
+@ALL
+def test_what_is_no_rotation_is_not_defined(method):
+    name = LAYOUT_OF[method]
+    ends = layout(rigid(np.random.default_rng(21), 2), name)
+    long = ends.copy()
+    if name == "affine":
+        long[:, :3, :3] *= 2
+    else:
+        long[:, : 4 if name == "quat_vec" else 8] *= 2
+    # A matrix that scales is one that matrices blend.
+    is_any = method in ("matrix_linear", "matrix_polar")
+    assert between(*ends, 0.3, method).is_defined
+    assert between(*long, 0.3, method).is_defined == is_any
+    assert blend(long, [0.3, 0.7], method).is_defined == is_any
+    assert np.isfinite(blend(long, [0.3, 0.7], method).transforms).all()
+
+
+def test_matrix_log_of_shears_and_mirrors_is_not_defined():
+    shear = np.eye(4)
+    shear[0, 1] = 1
+    assert not between(np.eye(4), shear, 0.5, "matrix_log").is_defined
+    assert not between(np.eye(4), np.diag([-1.0, 1, 1, 1]), 0.5, "matrix_log").is_defined
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("method", ["qv_slerp", "sclerp", "dib"])
+def test_angles_that_are_not_known_are_not_defined(method, dtype):
+    ends = layout(rigid(np.random.default_rng(22), 2), LAYOUT_OF[method], dtype)
+    for t, is_defined in ((3.0, True), (-100.0, True), (1e30, False)):
+        result = between(*ends, dtype(t), method)
+        assert result.is_defined == is_defined
+        assert np.isfinite(result.transforms).all()
+    if dtype == np.float64:
+        result = between(*ends, 1e150, method)
+        assert not result.is_defined
+        assert np.isfinite(result.transforms).all()
+
+
+def test_signs_by_the_running_sum_are_those_of_skinning():
+    rng = np.random.default_rng(23)
+    motions = layout(wide_motions(rng, 200), "dual_quat").reshape(200, 3, 8)
+    weights = rng.uniform(0.1, 1, (200, 3)).astype(np.float32)
+    weights /= weights.sum(axis=1, keepdims=True)
+    point = np.array([[0.3, -0.2, 0.5]], np.float32)
+    differ = 0
+    for poses, shares in zip(motions, weights, strict=True):
+        offsets, bones = np.array([0, 3], np.int32), np.arange(3, dtype=np.int32)
+        matrices = sinew.dual_quat.to_affine(poses).astype(np.float32)
+        skinned = sinew.Deformer(point, offsets, bones, shares, "dq").deform(matrices)
+        running = blend(poses, shares, "dlb", signs="running_sum")
+        close(sinew.dual_quat.transform_point(running.transforms, point), skinned, 2e-4)
+        heaviest = blend(poses, shares, "dlb").transforms
+        differ += np.abs(sinew.dual_quat.transform_point(heaviest, point) - skinned).max() > 1e-2
+    # The rules are not the same.
+    assert differ > 5
+
+
+def test_signs_as_given_are_kept_and_others_refused():
+    one, half = sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians([20.0, 60]))
+    given = blend([one, -half], [0.5, 0.5], "dlb", signs="as_given")
+    close(given.transforms, blend([one, sinew.dual_quat.from_axis_angle([0, 0, 1], np.radians(420))],
+                                  [0.5, 0.5], "dlb", signs="as_given").transforms)  # fmt: skip
+    assert sinew.dual_quat.rigid_distance(given.transforms, one).angle > 2.5
+    with pytest.raises(ValueError, match="signs: expected one of heaviest, running_sum, as_given"):
+        blend([one, half], [0.5, 0.5], "dlb", signs="shortest")

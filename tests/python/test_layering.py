@@ -14,6 +14,7 @@ LIBRARY = ROOT / "native" / "sinew"
 MAY_INCLUDE = {
     "transform": {"transform"},
     "interpolate": {"transform", "interpolate"},
+    "fit": {"transform", "interpolate", "fit"},
     "skeleton": {"transform", "interpolate", "skeleton"},
     "skinning": {"transform", "interpolate", "skeleton", "skinning"},
     "deform": {"transform", "interpolate", "skeleton", "skinning", "deform"},

@@ -9,7 +9,7 @@ normalises the axis (as glm::rotate does), its quaternion path the quaternion (c
 import numpy as np
 import pytest
 import sinew
-from sinew_addon.core.report import answers, paths, printed, studies, tables
+from sinew_addon.core.report import answers, joints, paths, printed, studies, tables
 from sinew_addon.core.report.tables import AS_REPORT, LAYOUTS, error, moved_combined, moved_one_by_one, pair
 
 
@@ -31,6 +31,21 @@ def test_table_3_6_translation_of_one_transform():
             moved = sinew.dual_quat.transform_point(sinew.quat_vec.to_dual_quat(motion), zero)
             assert error(moved, (1, 0, 0.5)) <= 2 * np.finfo(dtype).eps
     assert [row.agrees for row in tables.translation().rows] == [True] * 3
+    assert not tables.translation_errors("affine").any()
+    assert not tables.translation_errors("quat_vec").any()
+    errors = tables.translation_errors("dual_quat")
+    assert 0.05 < (errors > 1e-7).mean() < 0.95
+    assert errors.max() < 5e-7
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"), [("dual_quat", (1.000001, 0, 0.5)), ("affine", (1.00000012, 0, 0.5))]
+)
+def test_table_3_6_takes_no_error_for_rounding_that_is_none(monkeypatch, name, wrong):
+    monkeypatch.setattr(printed, "TRANSLATED", {**printed.TRANSLATED, name: wrong})
+    rows = {row.name: row.agrees for row in tables.translation().rows}
+    assert rows.pop(printed.NAMES[name]) is False
+    assert all(rows.values())
 
 
 @pytest.mark.parametrize(
@@ -142,6 +157,20 @@ def test_figures_3_4_and_3_5_show_what_the_report_says():
     shrinking = paths.figure_3_5().facts[0].values
     # Half way, the mean matrix keeps only the axis of the rotation between the two: by hand, from the sum.
     assert shrinking["matrix_linear"] == pytest.approx(0.1347, abs=1e-4)
+
+
+def test_figure_3_3_tears_the_elbow_where_bones_are_combined_first():
+    figure = joints.figure_3_3()
+    assert figure.missing is None
+    assert len(figure.pictures) == 2
+    assert figure.facts[0].agrees
+    gaps = figure.facts[0].values
+    # The upper arm's end goes on the circle, the lower arm's head straight: apart by its height.
+    assert gaps["gap, root, qv_nlerp"] == pytest.approx(1 - np.cos(np.radians(joints.DEGREES / 2)), abs=1e-6)
+    # Matrices shrink the upper arm, too: their elbow holds, and nothing is rigid.
+    assert gaps["gap, root, matrix_linear"] < 1e-12
+    assert gaps["gap, root, dlb"] > 0.05
+    assert max(gap for name, gap in gaps.items() if name.startswith("gap, parent")) < 1e-12
 
 
 def test_plots_name_every_method():

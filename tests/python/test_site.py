@@ -17,6 +17,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 import sinew
+from sinew import _types
 from sinew_addon import cli
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -178,7 +179,7 @@ def test_the_python_package_is_whole(pages, site):
                 if not member.startswith("_") and not isinstance(found, property)
             }
         elif hasattr(value, "__all__"):
-            own = {member for member in value.__all__ if member != "Blended"}
+            own = set(value.__all__) - set(vars(_types))
             wanted |= {f"sinew.{name}"} | {f"{name}.{member}" for member in own}
         elif callable(value):
             wanted.add(name)

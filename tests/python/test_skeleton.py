@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 import sinew
+from motions import layout, rigid
 from rigs import random_motion
 
 PARENTS = np.int32([-1, 0, 1, 1, 0, -1, 5])
@@ -114,3 +115,32 @@ def test_transforms_are_checked(transforms, message):
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the whole message is compared below
         sinew.Skeleton(PARENTS).root_relative(transforms)
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("name", ["affine", "quat_vec", "dual_quat"])
+def test_root_and_branches(name):
+    rng = np.random.default_rng(9)
+    parents = [-1, 0, 1, 0, 3, 3, -1, 6]
+    skeleton = sinew.Skeleton(parents)
+    bones, root = layout(rigid(rng, 8), name), layout(rigid(rng), name)
+    module = getattr(sinew, name)
+    plain, placed = skeleton.root_relative(bones), skeleton.root_relative(bones, root)
+    np.testing.assert_allclose(placed, module.compose(root, plain), atol=1e-13)
+    for changed in range(8):
+        other = bones.copy()
+        other[changed] = layout(rigid(rng), name)
+        want = skeleton.root_relative(other, root)
+        np.testing.assert_array_equal(skeleton.update_branch(placed, other, changed, root), want)
+    # Others are left as they are, right or wrong.
+    wrong = np.repeat(root[None], 8, axis=0)
+    result = skeleton.update_branch(wrong, bones, 3, root)
+    np.testing.assert_array_equal(result[[0, 1, 2, 6, 7]], wrong[[0, 1, 2, 6, 7]])
+    assert (result[[3, 4, 5]] != wrong[[3, 4, 5]]).any(axis=tuple(range(1, result.ndim))).all()
+
+
+@pytest.mark.parametrize("bone", [-1, 8, 1.5, None, "0"])
+def test_branches_of_no_bone_are_refused(bone):
+    skeleton = sinew.Skeleton([-1] * 8)
+    bones = np.tile(np.eye(4), (8, 1, 1))
+    with pytest.raises(ValueError, match="bone: expected the index of one of 8 bones"):
+        skeleton.update_branch(bones, bones, bone)

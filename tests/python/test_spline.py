@@ -217,10 +217,6 @@ def test_interpolating_after_combining_tears_the_elbow(method):
             "a: expected 4 bones, got 5",
         ),
         (
-            lambda k: sinew.Skeleton(PARENTS).interpolate(k[:4], k[:4], TIMES),
-            "t: expected a number, got float64 [5]",
-        ),
-        (
             lambda k: sinew.Skeleton(PARENTS).spline(k[None], TIMES[:1], 0.5),
             "keyframes: expected one key or more of 4 bones, got float64 [1, 5, 8]",
         ),
@@ -247,3 +243,74 @@ def test_refusals_name_argument_wanted_and_got(call, message):
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the message is compared below
         call(keys)
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_hermite_of_points_is_scipys(dtype):
+    rng = np.random.default_rng(30)
+    points, tangents = rng.normal(size=(2, 5, 3)).astype(dtype)
+    result = sinew.spline.hermite(points, tangents, TIMES.astype(dtype), AT.astype(dtype))
+    wanted = CubicHermiteSpline(TIMES, points, tangents)(np.clip(AT, TIMES[0], TIMES[-1]))
+    close(result.transforms, wanted, 64 * np.finfo(dtype).eps)
+    assert result.is_defined.all()
+    # With Catmull-Rom's tangents it is that spline, of points too.
+    plain = catmull_rom_vector(points.astype(float), TIMES, AT).transforms
+    close(plain, reference(points.astype(float), TIMES, AT), 1e-13)
+
+
+def test_hermite_of_transforms_passes_with_the_velocities_given_and_is_rigid():
+    rng = np.random.default_rng(31)
+    for _ in range(20):
+        keys = layout(rigid(rng, 4), "dual_quat")
+        twists = rng.normal(size=(4, 6))
+        times = np.array([0.0, 1, 1.5, 4])
+        at = sinew.spline.hermite(keys, twists, times, times)
+        assert sinew.dual_quat.rigid_distance(at.transforms, keys).translation.max() < 1e-13
+        for side in (1e-6, -1e-6):
+            near = sinew.spline.hermite(keys, twists, times, times[1:3] + side).transforms
+            step = sinew.dual_quat.compose(sinew.dual_quat.inverse(keys[1:3]), near)
+            close(sinew.dual_quat.to_twist(step) / side, twists[1:3], 3e-4)
+        whole = sinew.spline.hermite(keys, twists, times, np.linspace(0, 4, 50)).transforms
+        close(sinew.dual_quat.norm(whole), np.tile([1, 0], (50, 1)), 1e-13)
+
+
+def test_hermite_at_a_constant_velocity_is_the_screw():
+    screw = np.array([0.3, -0.2, 0.4, 1, 2, 3.0])
+    times = np.array([0.0, 2, 3])
+    keys = sinew.dual_quat.from_twist(times[:, None] * screw)
+    at = np.linspace(0, 3, 31)
+    result = sinew.spline.hermite(keys, np.tile(screw, (3, 1)), times, at).transforms
+    close(
+        matrix(result, "dual_quat"),
+        matrix(sinew.dual_quat.from_twist(at[:, None] * screw), "dual_quat"),
+        1e-12,
+    )
+
+
+def test_hermite_names_its_arguments():
+    keys = np.zeros((3, 3))
+    for call, argument in (
+        (lambda: sinew.spline.hermite(keys, keys[:2], [0, 1, 2], 0.5), "tangents"),
+        (lambda: sinew.spline.hermite(keys[:0], keys[:0], [], 0.5), "keys"),
+        (lambda: sinew.spline.hermite(keys, keys, [0, 1], 0.5), "times"),
+        (lambda: sinew.spline.hermite(np.zeros((3, 7)), keys, [0, 1, 2], 0.5), "keys"),
+    ):
+        with pytest.raises(ValueError, match=f"^{argument}: expected"):
+            call()
+
+
+@ALL
+def test_skeletons_take_many_times_in_one_call(method):
+    rng = np.random.default_rng(32)
+    skeleton = sinew.Skeleton([-1, 0, 1])
+    keys = np.stack([layout(rigid(rng, 3), LAYOUT_OF[method]) for _ in range(3)])
+    t = np.array([[0.0, 0.3], [0.7, 1.0]])
+    transforms, is_defined = skeleton.interpolate(keys[0], keys[1], t, method)
+    assert transforms.shape == (2, 2, *keys[0].shape)
+    assert is_defined.shape == (2, 2)
+    one, defined = skeleton.interpolate(keys[0], keys[1], 0.3, method)
+    assert isinstance(defined, bool)
+    np.testing.assert_array_equal(transforms[0, 1], one)
+    several, are_defined = skeleton.spline(keys, [0, 1, 2], [0.5, 1.5], method)
+    np.testing.assert_array_equal(several[1], skeleton.spline(keys, [0, 1, 2], 1.5, method)[0])
+    assert are_defined.shape == (2,)

@@ -31,6 +31,30 @@ TITLES = {
 _POSES = "The report does not print its poses; these are those of Sinew's own file."
 
 
+def joint_degrees(parents: np.ndarray, rest: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """[bones]: how far each joint rotates between two poses; one without parent by its whole motion.
+
+    parents               int32 [bones], parents before children
+    rest, first, second   [bones, 4, 4] of the bones in one space
+    """
+    motions = []
+    for pose in (first, second):
+        moved = sinew.affine.normalized(sinew.affine.compose(pose, sinew.affine.inverse(rest)))
+        relative = moved.copy()
+        child = parents >= 0
+        relative[child] = sinew.affine.compose(sinew.affine.inverse(moved[parents[child]]), moved[child])
+        motions.append(sinew.affine.normalized(relative))
+    return np.degrees(sinew.affine.rigid_distance(*motions).angle)
+
+
+def said_of_joints(degrees: np.ndarray, between: str) -> str:
+    """Such as: 5 joints rotate by 90 degrees between the keys. degrees: of joint_degrees()."""
+    moving = degrees[degrees > 0.5]
+    count = {1: "One joint rotates"}.get(len(moving), f"{len(moving)} joints rotate")
+    low, high = (f"{angle:.0f}" for angle in (moving.min(), moving.max()))
+    return f" {count} by {low if low == high else f'{low} to {high}'} degrees {between}."
+
+
 @dataclass(frozen=True)
 class Chain:
     """Links that do not blend, between two keyframes.
@@ -100,6 +124,8 @@ def hierarchy_figures(
         float(np.linalg.norm(a - b, axis=1).max())
         for a, b in zip(shapes["qv_nlerp"], shapes["dlb"], strict=True)
     )
+    degrees = joint_degrees(chain.parents, chain.rest, chain.first, chain.second)
+    joints = said_of_joints(degrees, "between the keys")
     result = []
     for method, (number, title) in HIERARCHIES.items():
         middle = kept[method][TIMES.index(0.5)]
@@ -122,7 +148,7 @@ def hierarchy_figures(
                 rigid < 1e-5 and apart < 1e-5 * length,
                 {**values, "largest change of volume": rigid, "apart": apart / length},
             )
-        notes = (_POSES + " Five joints rotate from -45 to 45 degrees; each vertex follows one bone.",)
+        notes = (_POSES + joints + " Each vertex follows one bone.",)
         result.append(Figure(number, title, tuple(pictures[method]), (fact,), notes))
     return tuple(result)
 
@@ -166,7 +192,10 @@ def figure_3_9(skin: Skin, picture: Picture) -> Figure:
     return Figure("3.9", TITLES["3.9"], (picture,), (fact,))
 
 
-def figure_3_10(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture]) -> Figure:
+def figure_3_10(
+    skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture], degrees: np.ndarray
+) -> Figure:
+    """degrees  of joint_degrees(), from rest"""
     kept = {method: skin.volume_kept(points) for method, points in shapes.items()}
     drift = float(np.linalg.norm(shapes["qv"] - shapes["dq"], axis=1).max())
     width = float(np.ptp(skin.rest[:, 1]))
@@ -185,12 +214,14 @@ def figure_3_10(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
             {"drift, in widths": drift / width},
         ),
     )
-    return Figure(
-        "3.10", TITLES["3.10"], tuple(pictures), facts, (_POSES + " The joint rotates by 120 degrees.",)
-    )
+    notes = (_POSES + said_of_joints(degrees, "from rest"),)
+    return Figure("3.10", TITLES["3.10"], tuple(pictures), facts, notes)
 
 
-def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture]) -> Figure:
+def figure_3_11(
+    skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture], degrees: np.ndarray
+) -> Figure:
+    """degrees  of joint_degrees(), from rest"""
     # The tube's own surface, off the domes, whose middle lies on the axis at rest.
     radius = np.hypot(skin.rest[:, 1], skin.rest[:, 2])
     wall = radius > 0.999 * radius.max()
@@ -199,14 +230,14 @@ def figure_3_11(skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Pictur
         for method, points in shapes.items()
     }
     fact = Fact(
-        "(a) Matrices have the candy-wrapper effect; (b) pairs and (c) dual quaternions have not.",
+        "(a) Matrices have the candy-wrapper effect, which dual quaternions avoid (chapter 4).",
         f"Where it is thinnest, the tube has {kept['lbs']:.1%} of its radius with matrices, {kept['qv']:.1%} "
         f"with pairs and {kept['dq']:.1%} with dual quaternions.",
         kept["lbs"] < 0.5 and min(kept["qv"], kept["dq"]) > 0.99,
         {f"radius, {method}": share for method, share in kept.items()},
     )
     notes = (
-        _POSES + " The joint rotates by 170 degrees.",
+        _POSES + said_of_joints(degrees, "from rest"),
         f"Of its future work, log-matrix blending leaves {kept['log']:.1%} of the radius, spherical blend "
         f"skinning {kept['sbs']:.1%}.",
     )

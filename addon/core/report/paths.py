@@ -147,10 +147,10 @@ def _bends(all_paths: dict[str, Path]) -> Fact:
     straight = max(values[method] for method in ("matrix_linear", "matrix_polar", "qv_nlerp", "qv_slerp"))
     curved = min(values[method] for method in ("dlb", "sclerp"))
     return Fact(
-        "Dual quaternions do not just rotate about the origin, but about an ideal centre: their paths of the "
-        "origin are curved, those of the other methods straight.",
-        f"Matrices (linear and polar) and pairs leave the straight line by at most {straight:.0e}, dual "
-        f"quaternions by {curved:.2f}, logarithms of matrices by {values['matrix_log']:.2f}.",
+        "Dual quaternions do not just rotate about the origin, but choose an ideal centre.",
+        "So their paths of the origin are curved. Matrices (linear and polar) and pairs leave the straight "
+        f"line by at most {straight:.0e}, dual quaternions by {curved:.2f}, logarithms of matrices by "
+        f"{values['matrix_log']:.2f}.",
         straight < 1e-9 < 1e-2 < curved,
         values,
     )

@@ -13,6 +13,8 @@ from .tables import LAYOUTS
 
 CHAINS = 2000
 LENGTHS = (4, 16, 64, 256)
+# By representation: what solves for a change of coordinates in it.
+SOLVERS: dict[str, sinew.fit.Method] = {"affine": "kabsch", "quat_vec": "horn", "dual_quat": "walker"}
 # Where nlerp and slerp are farthest apart, and near it; from half way on it is the same mirrored.
 TIMES = (0.1, 0.2, 0.3)
 
@@ -65,6 +67,23 @@ def _end(module: Any, links: np.ndarray) -> np.ndarray:
     for link in range(1, links.shape[1]):
         whole = module.compose(whole, links[:, link])
     return module.transform_point(whole, np.zeros(3, links.dtype))
+
+
+def fits(sets: int = CHAINS) -> dict[str, Spread]:
+    """By representation: the degrees between the true rotation of 12 points and the one that is fitted in
+    float32 to them and to where they go, which is off by a hundredth of their size."""
+    random = np.random.default_rng(sets)
+    source = random.normal(size=(sets, 12, 3))
+    true = sinew.affine.from_axis_angle(random.normal(size=(sets, 3)), random.uniform(-np.pi, np.pi, sets))
+    target = sinew.affine.transform_point(true[:, None], source) + 0.01 * random.normal(size=source.shape)
+    found = {}
+    for name, solver in SOLVERS.items():
+        fit = sinew.fit.rigid(source.astype(np.float32), target.astype(np.float32), method=solver).transforms
+        exact = fit.astype(np.float64)
+        matrices = exact if name == "affine" else LAYOUTS[name].to_affine(exact)
+        matrices = sinew.affine.normalized(matrices)
+        found[name] = Spread.of(np.degrees(sinew.affine.rigid_distance(true, matrices).angle))
+    return found
 
 
 def drift(length: int, chains: int = CHAINS, most: float = np.pi / 4) -> Spread:

@@ -65,27 +65,34 @@ def _draw(studio: Studio, view: View, scratch: Path) -> bytes:
     return path.read_bytes()
 
 
+def _parents(armature: bpy.types.Object, bones: armature_io.Bones) -> np.ndarray:
+    """int32 [bones]: the index of each bone's parent, -1 without one."""
+    return np.array(
+        [bones.names.index(bone.parent.name) if bone.parent else -1 for bone in armature.data.bones], np.int32
+    )
+
+
+def _pose(armature: bpy.types.Object, bones: armature_io.Bones, frame: int) -> np.ndarray:
+    """float64 [bones, 4, 4] at a frame, which the scene then has."""
+    evaluate.set_frame(bpy.context.scene, frame)
+    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return armature_io.read_pose(evaluated, bones).astype(np.float64)
+
+
 def read_chain(mesh: bpy.types.Object) -> meshes.Chain:
     """The links of an open LINKS at its two keyframes. Mesh and armature lie in one place."""
-    scene, armature = bpy.context.scene, attach.armature_of(mesh)
-
-    def pose(frame: int) -> np.ndarray:
-        evaluate.set_frame(scene, frame)
-        evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        return armature_io.read_pose(evaluated, bones).astype(np.float64)
-
+    armature = attach.armature_of(mesh)
     bones = armature_io.read_bones(armature)
-    parents = [bones.names.index(bone.parent.name) if bone.parent else -1 for bone in armature.data.bones]
     # One group to a vertex: that is what these figures are about.
     group_of = mesh_io.read_group_weights(mesh.data).groups
     return meshes.Chain(
         points=mesh_io.read_points(mesh.data).astype(np.float64),
         triangles=mesh_io.read_surface(mesh.data).triangles,
         bones=bones.of_groups([group.name for group in mesh.vertex_groups])[group_of],
-        parents=np.array(parents, np.int32),
+        parents=_parents(armature, bones),
         rest=bones.rest.astype(np.float64),
-        first=pose(FIRST_KEY),
-        second=pose(SECOND_KEY),
+        first=_pose(armature, bones, FIRST_KEY),
+        second=_pose(armature, bones, SECOND_KEY),
     )
 
 
@@ -124,8 +131,13 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
         weights=groups.weights,
     )
     shapes: dict[int, dict[str, np.ndarray]] = {BENT: {}, TWISTED: {}}
+    degrees = {}
+    armature = attach.armature_of(mesh)
+    bones = armature_io.read_bones(armature)
+    at_rest = bones.rest.astype(np.float64)
     for frame, of_methods in shapes.items():
-        evaluate.set_frame(scene, frame)
+        posed = _pose(armature, bones, frame)
+        degrees[frame] = meshes.joint_degrees(_parents(armature, bones), at_rest, at_rest, posed)
         for method in meshes.SKINS:
             evaluate.use_method(mesh, method)
             of_methods[method] = evaluate.world_points([mesh])
@@ -143,9 +155,9 @@ def _skins(path: Path, engine: str, size: int, scratch: Path) -> tuple[Figure, .
         pictures[frame] = meshes.trimmed(pictures[frame])
     evaluate.set_frame(scene, scene.frame_start)
     view = whole_view([seen_extent(rest)])
-    at_rest = Picture("At rest: links, each with a bone", _draw(studio, view, scratch))
+    drawn = Picture("At rest: links, each with a bone", _draw(studio, view, scratch))
     return (
-        meshes.figure_3_9(skin, *meshes.trimmed([at_rest])),
-        meshes.figure_3_10(skin, shapes[BENT], pictures[BENT]),
-        meshes.figure_3_11(skin, shapes[TWISTED], pictures[TWISTED]),
+        meshes.figure_3_9(skin, *meshes.trimmed([drawn])),
+        meshes.figure_3_10(skin, shapes[BENT], pictures[BENT], degrees[BENT]),
+        meshes.figure_3_11(skin, shapes[TWISTED], pictures[TWISTED], degrees[TWISTED]),
     )

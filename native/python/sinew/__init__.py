@@ -2,10 +2,11 @@
 """Skinning in native code: bind a mesh to bones once, deform it at any pose. Numpy in, numpy out.
 
 Rigid transforms, and what lies between them: sinew.affine, sinew.quat_vec, sinew.dual_quat,
-sinew.interpolate, sinew.spline.
+sinew.interpolate, sinew.spline; their parts: sinew.quat, sinew.dual; and what fits them to measurements:
+sinew.fit.
 """
 
-from . import affine, dual_quat, interpolate, quat_vec, spline
+from . import affine, dual, dual_quat, fit, interpolate, quat, quat_vec, spline
 from ._native import (
     Binding,
     BulgeLimit,
@@ -40,10 +41,13 @@ __all__ = [
     "affine",
     "centres_of_rotation",
     "direct_delta_mush",
+    "dual",
     "dual_quat",
+    "fit",
     "interpolate",
     "keep_thread_state",
     "methods",
+    "quat",
     "quat_vec",
     "spline",
     "stages",

@@ -9,8 +9,11 @@ __version__: str
 
 # Typed and described in the modules of the package that have these names.
 affine: ModuleType
+dual: ModuleType
 dual_quat: ModuleType
+fit: ModuleType
 interpolate: ModuleType
+quat: ModuleType
 quat_vec: ModuleType
 spline: ModuleType
 
@@ -183,36 +186,51 @@ class Skeleton:
     @property
     def bone_count(self) -> int:
         """Bones of the hierarchy."""
-    def root_relative(self, transforms: ArrayLike) -> NDArray[Any]:
+    def root_relative(self, transforms: ArrayLike, root: ArrayLike | None = None) -> NDArray[Any]:
         """Each bone relative to the root, in the representation that came (Smith 2013, algorithm 1).
 
         transforms: [bones, 4, 4] or [bones, 3, 4], which give [bones, 4, 4]; [bones, 7]; [bones, 8].
+        root: None, or one transform that is placed before every bone without a parent.
+        """
+    def update_branch(
+        self,
+        root_relative: ArrayLike,
+        transforms: ArrayLike,
+        bone: int | np.integer[Any],
+        root: ArrayLike | None = None,
+    ) -> NDArray[Any]:
+        """The same after a change of one bone: computed for that bone and those below it alone.
+
+        root_relative: what root_relative() gave before the change, in the representation of `transforms`.
+        transforms, root: as of root_relative().
+        bone: the index of the bone that has changed.
         """
     def interpolate(
         self, a: ArrayLike, b: ArrayLike, t: ArrayLike, method: str = "dlb"
-    ) -> tuple[NDArray[Any], bool]:
+    ) -> tuple[NDArray[Any], bool | NDArray[np.bool_]]:
         """(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
 
         a, b: [bones, ..] in the representation of the method, at t = 0 and t = 1.
-        t: a number; outside 0 to 1 the motion goes on.
+        t: a number or [..], which give [.., bones, ..] and [..]; outside 0 to 1 the motion goes on.
         method: one of sinew.interpolate.METHODS.
         is_defined: False where a bone has no one in-between; it then has what sinew.interpolate.between
             gives there.
         """
     def spline(
         self, keyframes: ArrayLike, times: ArrayLike, time: ArrayLike, method: str = "dlb"
-    ) -> tuple[NDArray[Any], bool]:
+    ) -> tuple[NDArray[Any], bool | NDArray[np.bool_]]:
         """(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, blend form
         (Smith 2013, algorithm 3 and section 3.2.2).
 
         keyframes: [keys, bones, ..] in the representation of the method, one key or more.
         times: [keys], not decreasing; keys of equal time are a cut.
-        time: a number; before the first key and after the last it is that key.
+        time: a number or [..], which give [.., bones, ..] and [..]; before the first key and after the last
+            it is that key.
         method: one of sinew.interpolate.METHODS.
         """
     def spline_vector(
         self, keyframes: ArrayLike, times: ArrayLike, time: ArrayLike
-    ) -> tuple[NDArray[Any], bool]:
+    ) -> tuple[NDArray[Any], bool | NDArray[np.bool_]]:
         """The same in vector form (Smith 2013, algorithm 3): not rigid between the keys.
 
         keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].

@@ -34,7 +34,7 @@ class Representation:
     def from_rotation_matrix(self, rotation: ArrayLike) -> NDArray[Any]:
         """The rotation of `rotation`, [.., 3, 3].
 
-        Orthonormal with determinant 1 to within rounding; sinew.affine takes any matrix as it is.
+        ValueError where it is no rotation, to 2e-3; sinew.affine takes any matrix as it is.
         """
         return self._native.from_rotation_matrix(rotation)
 
@@ -62,7 +62,7 @@ class Representation:
         return self._native.from_screw_about(axis, point, angle, translation)
 
     def to_screw(self, a: ArrayLike) -> Screw[Any]:
-        """The screw that rigid `a` is (Chasles 1830).
+        """The screw that rigid `a` is (Chasles 1830). ValueError where a matrix scales, shears or mirrors.
 
         axis and moment [.., 3], angle, translation and pitch [..].
         angle: 0 to pi; at pi the axis is one of its two directions. moment: point x axis.
@@ -78,7 +78,8 @@ class Representation:
     def to_twist(self, a: ArrayLike) -> NDArray[Any]:
         """The logarithm of rigid `a` in se(3), [.., 6]: angular, then linear, the angle 0 to pi.
 
-        At 180 degrees both directions of the axis are logarithms, and the result has one of them.
+        At 180 degrees both directions of the axis are logarithms, and the result has one of them. ValueError
+        where a matrix scales, shears or mirrors.
         """
         return self._native.to_twist(a)
 
@@ -87,11 +88,17 @@ class Representation:
         return self._native.to_affine(a)
 
     def to_quat_vec(self, a: ArrayLike) -> NDArray[Any]:
-        """`a` in the layout of sinew.quat_vec, [.., 7]; `a` must be rigid, as normalized() makes it."""
+        """`a` in the layout of sinew.quat_vec, [.., 7]; `a` must be rigid, as normalized() makes it.
+
+        ValueError where a matrix scales, shears or mirrors; the length of quaternions is not looked at.
+        """
         return self._native.to_quat_vec(a)
 
     def to_dual_quat(self, a: ArrayLike) -> NDArray[Any]:
-        """`a` in the layout of sinew.dual_quat, [.., 8]; `a` must be rigid, as normalized() makes it."""
+        """`a` in the layout of sinew.dual_quat, [.., 8]; `a` must be rigid, as normalized() makes it.
+
+        ValueError where a matrix scales, shears or mirrors; the length of quaternions is not looked at.
+        """
         return self._native.to_dual_quat(a)
 
     def compose(self, a: ArrayLike, b: ArrayLike) -> NDArray[Any]:
@@ -135,6 +142,7 @@ class Representation:
     def rigid_distance(self, a: ArrayLike, b: ArrayLike) -> Distance[Any]:
         """How far `b` is from `a`, [..]: angle of the rotation, 0 to pi, and distance of the origin's images.
 
-        The same for compose(x, a) and compose(x, b), x rigid. `a` and `b` must be rigid.
+        The same for compose(x, a) and compose(x, b), x rigid. `a` and `b` must be rigid: ValueError where a
+        matrix scales, shears or mirrors.
         """
         return Distance(*self._native.rigid_distance(a, b))

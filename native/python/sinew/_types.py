@@ -39,3 +39,32 @@ class Blended(NamedTuple, Generic[Float]):
 
     transforms: NDArray[Float]
     is_defined: NDArray[np.bool_] | Any
+
+
+class RigidFit(NamedTuple, Generic[Float]):
+    """transforms: target_from_source, in the layout of the method; error [..]: the root of the weighted mean
+    of the squared distances that are left; is_defined, is_mirrored: bool [..]."""
+
+    transforms: NDArray[Float]
+    error: NDArray[Float]
+    is_defined: NDArray[np.bool_] | Any
+    is_mirrored: NDArray[np.bool_] | Any
+
+
+class HandEye(NamedTuple, Generic[Float]):
+    """transforms: x; angle (radians) and translation [..]: roots of the weighted means of the squared
+    differences of a x and x b; is_defined: bool [..]."""
+
+    transforms: NDArray[Float]
+    angle: NDArray[Float]
+    translation: NDArray[Float]
+    is_defined: NDArray[np.bool_] | Any
+
+
+class Averaged(NamedTuple, Generic[Float]):
+    """transforms: the means; is_defined: bool [..]; kept [.., n]: how much each pose counts beside its
+    weight, 0 to 1; 1 where the mean is not robust."""
+
+    transforms: NDArray[Float]
+    is_defined: NDArray[np.bool_] | Any
+    kept: NDArray[Float]

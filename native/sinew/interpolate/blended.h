@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 
 #include "sinew/transform/convert.h"
@@ -22,7 +23,8 @@ struct Blended {
 /// What a blend does with the free signs of quaternions.
 enum class Signs {
     kToHeaviest,  ///< flips each to the hemisphere of the term of largest weight: the shortest path
-    kAsGiven,     ///< leaves them
+    kRunningSum,  ///< flips each to the hemisphere of the sum of those before it: Blender's rule, and that of Deformer
+    kAsGiven,  ///< leaves them
 };
 
 /// Weights brought to sum 1, and the index of the largest, the first of equals.
@@ -108,6 +110,88 @@ template <class T>
     return a;
 }
 
+/// How far a squared length may be from 1, and products of axes from 0, for a rotation to count as one.
+inline constexpr double kUnitTolerance = 2e-3;
+
+/// Whether the rotation is of unit length, but for what a few operations round: not 2 a, say.
+template <class T>
+[[nodiscard]] bool has_unit_rotation(const Quat<T>& q) noexcept {
+    using std::abs;
+    return abs(glm::dot(q, q) - T(1)) <= T(kUnitTolerance);
+}
+
+template <class T>
+[[nodiscard]] bool has_unit_rotation(const QuatVec<T>& a) noexcept {
+    return has_unit_rotation(a.rotation);
+}
+
+template <class T>
+[[nodiscard]] bool has_unit_rotation(const DualQuat<T>& a) noexcept {
+    return has_unit_rotation(a.real);
+}
+
+/// Matrices are blended as they are.
+template <class T>
+[[nodiscard]] bool has_unit_rotation(const Affine<T>& /*a*/) noexcept {
+    return true;
+}
+
+/// Whether the linear part of `a` is a rotation: no scale, shear or mirror, but for what a few operations round.
+template <class T>
+[[nodiscard]] bool is_rigid(const Affine<T>& a) noexcept {
+    using std::abs;
+    bool is_orthonormal = true;
+    for (int i = 0; i < 3; ++i) {
+        is_orthonormal = is_orthonormal &&
+                         abs(glm::dot(a.linear[i], a.linear[i]) - T(1)) <= T(kUnitTolerance) &&
+                         abs(glm::dot(a.linear[i], a.linear[(i + 1) % 3])) <= T(kUnitTolerance);
+    }
+    return is_orthonormal && glm::determinant(a.linear) > T(0);
+}
+
+template <class T>
+[[nodiscard]] T rotation_dot(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
+    return glm::dot(a.rotation, b.rotation);
+}
+
+template <class T>
+[[nodiscard]] T rotation_dot(const DualQuat<T>& a, const DualQuat<T>& b) noexcept {
+    return glm::dot(a.real, b.real);
+}
+
+/// No two matrices are in different hemispheres.
+template <class T>
+[[nodiscard]] T rotation_dot(const Affine<T>& /*a*/, const Affine<T>& /*b*/) noexcept {
+    return T(1);
+}
+
+/// Whether another order of the terms would choose other signs, and so give another blend: several are of the largest
+/// weight, and from them the others are in different hemispheres.
+template <class Transform, class T>
+[[nodiscard]] bool order_decides(std::span<const Transform> transforms, std::span<const T> weights,
+                                 const Shares<T>& share) noexcept {
+    using std::abs;
+    const Transform& pivot = transforms[share.heaviest];
+    // Rotations within 90 degrees of the pivot are within 180 of one another, in one hemisphere from each.
+    bool is_wide = false;
+    for (std::size_t i = 0; i < transforms.size(); ++i) {
+        is_wide = is_wide || (weights[i] != T(0) && abs(rotation_dot(transforms[i], pivot)) < T(0.7072));
+    }
+    if (!is_wide) return false;
+    const T least = share.largest * (T(1) - T(8) * std::numeric_limits<T>::epsilon());
+    for (std::size_t other = share.heaviest + 1; other < transforms.size(); ++other) {
+        if (weights[other] < least) continue;
+        const T between = rotation_dot(transforms[other], pivot);
+        for (std::size_t i = 0; i < transforms.size(); ++i) {
+            if (weights[i] == T(0)) continue;
+            const T from_pivot = rotation_dot(transforms[i], pivot);
+            const T from_other = rotation_dot(transforms[i], transforms[other]);
+            if ((from_pivot < T(0)) != ((from_other < T(0)) != (between < T(0)))) return true;
+        }
+    }
+    return false;
+}
+
 /// Whether the shorter way from `a` to `b` is decided by rounding: they are 180 degrees apart.
 template <class T>
 [[nodiscard]] bool is_half_turn_apart(const QuatVec<T>& a, const QuatVec<T>& b) noexcept {
@@ -155,23 +239,60 @@ template <class T>
     return a + b;
 }
 
+// A point is a vector without rotation, for splines.
+
+template <class T>
+[[nodiscard]] Vec3<T> scaled(T factor, const Vec3<T>& a) noexcept {
+    return factor * a;
+}
+
+template <class T>
+[[nodiscard]] Vec3<T> sum(const Vec3<T>& a, const Vec3<T>& b) noexcept {
+    return a + b;
+}
+
+template <class T>
+[[nodiscard]] Vec3<T> aligned(const Vec3<T>& a, const Vec3<T>& /*pivot*/) noexcept {
+    return a;
+}
+
+template <class T>
+[[nodiscard]] bool is_half_turn_apart(const Vec3<T>& /*a*/, const Vec3<T>& /*b*/) noexcept {
+    return false;
+}
+
+template <class T>
+[[nodiscard]] bool has_unit_rotation(const Vec3<T>& /*a*/) noexcept {
+    return true;
+}
+
 /// The sum of the components, 12, 7 or 8 of them, each times its weight times `scale`: no rigid transform
-/// (Smith 2013, section 3.2.2). Signs::kToHeaviest is not defined where a transform of weight other than 0
-/// is 180 degrees from the heaviest.
+/// (Smith 2013, section 3.2.2). Not defined where a rotation of weight other than 0 is not of unit length;
+/// Signs::kToHeaviest where one is 180 degrees from the heaviest, or order_decides(); Signs::kRunningSum where one is
+/// perpendicular to the sum before it.
 template <Signs signs, class Transform, class T>
 [[nodiscard]] Blended<Transform> weighted_sum(std::span<const Transform> transforms,
                                               std::span<const T> weights, const Shares<T>& share) noexcept {
     const Transform& pivot = transforms[share.heaviest];
     Blended<Transform> total{scaled(T(0), pivot), true};
+    [[maybe_unused]] bool has_terms = false;
     for (std::size_t i = 0; i < transforms.size(); ++i) {
         if (weights[i] == T(0)) continue;
         const T weight = share.of(weights[i]);
+        if (!has_unit_rotation(transforms[i])) total.is_defined = false;
         if constexpr (signs == Signs::kToHeaviest) {
             if (is_half_turn_apart(transforms[i], pivot)) total.is_defined = false;
             total.transform = sum(total.transform, scaled(weight, aligned(transforms[i], pivot)));
+        } else if constexpr (signs == Signs::kRunningSum) {
+            if (has_terms && is_half_turn_apart(transforms[i], total.transform)) total.is_defined = false;
+            has_terms = true;
+            total.transform = sum(total.transform, scaled(weight, aligned(transforms[i], total.transform)));
         } else {
             total.transform = sum(total.transform, scaled(weight, transforms[i]));
         }
+    }
+    if constexpr (signs == Signs::kToHeaviest) {
+        if (order_decides(transforms, weights, share)) total.is_defined = false;
     }
     return total;
 }

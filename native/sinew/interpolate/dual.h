@@ -14,7 +14,8 @@ namespace sinew {
 /// ScLERP for n = 2 and does not depend on the order (Kavan et al. 2008, algorithm 3). Neither depends on
 /// the origin: x a, x b gives x times the result, and a x, b x the result times x.
 ///
-/// Not defined where two are 180 degrees apart (the signs as given then decide), and of n as Dlb, where the
+/// Not defined where two are 180 degrees apart (the signs as given then decide) or t is beyond a thousandth of
+/// 1 / epsilon, and of n as Dlb, where the
 /// iteration does not settle, or where a rotation is 180 degrees from its result.
 struct Sclerp {
     static constexpr std::string_view name = "sclerp";
@@ -24,7 +25,8 @@ struct Sclerp {
     template <class T>
     [[nodiscard]] static Blended<DualQuat<T>> between(const DualQuat<T>& a, const DualQuat<T>& b,
                                                       T t) noexcept {
-        const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
+        const bool is_defined = (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && is_near(t) &&
+                                has_unit_rotation(a) && has_unit_rotation(b);
         return finite_or<DualQuat<T>>({normalized(a * power(inverse(a) * b, t)), is_defined},
                                       T(1) - t < t ? b : a);
     }

@@ -11,7 +11,9 @@ namespace sinew {
 //   between(a, b, t)             from `a` at t = 0 to `b` at t = 1; other t go on beyond
 //   blend(transforms, weights)   of n >= 1; weights of any sign, brought to sum 1
 // All rotations are of unit length. Where the weights' sum is not above 0, or the type can not hold the result, it
-// is not defined and is the heaviest transform. Of two equal weights the first is the heavier.
+// is not defined and is the heaviest transform. Of two equal weights the first is the heavier; where another order
+// would then give another blend (order_decides()), it is not defined. Nor is what is made of rotations that are not of
+// unit length (has_unit_rotation()).
 
 // The linear methods make what they give of a weighted sum by
 //   finished(total, heaviest)    `total` of weights of sum 1, defined where its signs are
@@ -24,7 +26,8 @@ template <class Method, class Transform, class T>
     const Transform& heaviest = s < t ? onto : a;
     // As shares() has it of weights that all but cancel.
     if (!(T(1) > T(kDegenerateBlend) * (s < t ? t : s))) return {heaviest, false};
-    const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
+    const bool is_defined =
+        (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && has_unit_rotation(a) && has_unit_rotation(b);
     return finite_or(Method::template finished<T>({sum(scaled(s, a), scaled(t, onto)), is_defined}, heaviest),
                      heaviest);
 }
@@ -41,7 +44,7 @@ template <class Method, Signs signs, class Transform, class T>
 }
 
 /// The matrices' sum, component by component: not rigid between different rotations, and between opposite
-/// ones flat (Smith 2013, section 2.2.2). No sign, so no shortest path to choose; always defined.
+/// ones flat (Smith 2013, section 3.5.2). No sign, so no shortest path to choose; always defined.
 struct MatrixLinear {
     static constexpr std::string_view name = "matrix_linear";
     template <class T>
@@ -97,7 +100,7 @@ struct MatrixPolar {
     }
 };
 
-/// Rotations by normalised sum, translations by mean (Smith 2013, sections 2.2.1 and 3.6.1, direct
+/// Rotations by normalised sum, translations by mean (Smith 2013, sections 2.2.1 and 2.3.1, direct
 /// quaternion blending). Between two: the shorter way, not at constant pace. Depends on the origin.
 ///
 /// Not defined where a rotation is 180 degrees from the heaviest (its sign as given then decides), or where
@@ -129,7 +132,7 @@ struct QvNlerp {
 };
 
 /// Unit dual quaternion along the weighted sum (DLB; Kavan et al. 2008, eq. 4; Smith 2013, sections 2.2.3
-/// and 2.3.1). Between two: about the axis of Sclerp's screw, rotation and translation not at constant pace and out of
+/// and 3.5.2). Between two: about the axis of Sclerp's screw, rotation and translation not at constant pace and out of
 /// step by up to 8.15 degrees and 15 % of the shift. Does not depend on the origin.
 ///
 /// Not defined where a rotation is 180 degrees from the heaviest (its sign as given then decides), or where

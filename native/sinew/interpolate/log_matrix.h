@@ -15,7 +15,7 @@ namespace sinew {
 /// turn about one screw axis, as from or to the identity.
 ///
 /// Not defined where a matrix is 180 degrees from the identity to within rounding: the axis of its
-/// logarithm then has the sign that makes to_quat() of it.
+/// logarithm then has the sign that makes to_quat() of it; nor where one scales, shears or mirrors (is_rigid()).
 struct MatrixLog {
     static constexpr std::string_view name = "matrix_log";
     template <class T>
@@ -37,6 +37,7 @@ struct MatrixLog {
         bool is_defined = true;
         for (std::size_t i = 0; i < transforms.size(); ++i) {
             if (weights[i] == T(0)) continue;
+            if (!is_rigid(transforms[i])) is_defined = false;
             const QuatVec<T> rigid = to_quat_vec(transforms[i]);
             // Below this the sign of w, and with it that of the axis, is rounding.
             const bool is_half_turn = rigid.rotation.w < T(kDegenerateBlend);

@@ -12,6 +12,13 @@ namespace sinew {
 /// Steps after which an iterated blend counts as not defined. One within 90 degrees takes 5 to 15.
 inline constexpr int kBlendSteps = 100;
 
+/// Whether so many times an angle is known to a thousandth of a radian.
+template <class T>
+[[nodiscard]] bool is_near(T t) noexcept {
+    using std::abs;
+    return abs(t) * std::numeric_limits<T>::epsilon() < T(1e-3);
+}
+
 /// Unit quaternions `a` to `b` along the great circle through both, the way their signs say (Shoemake 1985;
 /// Smith 2013, section 2.1.1). Opposite ones (a = -b) lie on no one circle: then along the sum.
 template <class T>
@@ -31,7 +38,7 @@ template <class T>
 /// constant pace. Of n: the weighted mean on the sphere (Buss and Fillmore 2001, algorithm A1), which does
 /// not depend on the order. Depends on the origin.
 ///
-/// Not defined as QvNlerp, where the iteration does not settle, or where a rotation is 180 degrees from its
+/// Not defined as QvNlerp, where t is beyond a thousandth of 1 / epsilon, where the iteration does not settle, or where a rotation is 180 degrees from its
 /// result.
 struct QvSlerp {
     static constexpr std::string_view name = "qv_slerp";
@@ -40,7 +47,8 @@ struct QvSlerp {
 
     template <class T>
     [[nodiscard]] static Blended<QuatVec<T>> between(const QuatVec<T>& a, const QuatVec<T>& b, T t) noexcept {
-        const bool is_defined = t == T(0) || t == T(1) || !is_half_turn_apart(a, b);
+        const bool is_defined = (t == T(0) || t == T(1) || !is_half_turn_apart(a, b)) && is_near(t) &&
+                                has_unit_rotation(a) && has_unit_rotation(b);
         return finite_or<QuatVec<T>>({{slerp(a.rotation, aligned(b.rotation, a.rotation), t),
                                        (T(1) - t) * a.translation + t * b.translation},
                                       is_defined},

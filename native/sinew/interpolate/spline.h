@@ -112,7 +112,7 @@ template <class Method, class T>
     return spline_blend<Method>(span, keys_of(span, keys));
 }
 
-/// The same in vector form: not rigid between the keys.
+/// The same in vector form: not rigid between the keys. Transform may be Vec3, for points.
 template <class Transform, class T>
 [[nodiscard]] Blended<Transform> catmull_rom_vector(std::span<const Transform> keys, std::span<const T> times,
                                                     T time) noexcept {

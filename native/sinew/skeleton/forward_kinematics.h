@@ -30,4 +30,31 @@ void root_relative(const Skeleton& skeleton, const Transform& root_from_parentle
     }
 }
 
+/// Whether `bone` is `top` or comes below it.
+[[nodiscard]] inline bool is_in_branch(const Skeleton& skeleton, std::size_t bone, std::size_t top) noexcept {
+    auto at = static_cast<std::int32_t>(bone);
+    // Parents come first: what is in front of `top` is not below it.
+    while (at > static_cast<std::int32_t>(top)) at = skeleton.parents()[static_cast<std::size_t>(at)];
+    return at == static_cast<std::int32_t>(top);
+}
+
+/// The same for one bone and those below it alone, after a change of that bone (Smith 2013, algorithm 1, called for a
+/// bone): the others in `root_from_bone` are those of before.
+template <class Transform>
+void update_branch(const Skeleton& skeleton, const Transform& root_from_parentless,
+                   std::span<const Transform> parent_from_bone, std::size_t top,
+                   std::span<Transform> root_from_bone) noexcept {
+    assert(parent_from_bone.size() == skeleton.bone_count());
+    assert(root_from_bone.size() == skeleton.bone_count());
+    assert(top < skeleton.bone_count());
+    const std::span<const std::int32_t> parents = skeleton.parents();
+    for (std::size_t bone = top; bone < parents.size(); ++bone) {
+        if (!is_in_branch(skeleton, bone, top)) continue;
+        const std::int32_t parent = parents[bone];
+        const Transform& before =
+            parent < 0 ? root_from_parentless : root_from_bone[static_cast<std::size_t>(parent)];
+        root_from_bone[bone] = before * parent_from_bone[bone];
+    }
+}
+
 }  // namespace sinew

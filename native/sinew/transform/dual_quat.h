@@ -60,7 +60,13 @@ template <class T>
 template <class T>
 [[nodiscard]] Dual<T> norm(const DualQuat<T>& a) noexcept {
     const T length = glm::length(a.real);
-    if (!(length > T(0))) return {};
+    const T before = prescale(a.real, length);
+    if (!(before > T(0))) return {};
+    if (before != T(1)) {
+        const Quat<T> real = a.real / before;
+        const T rest = glm::length(real);
+        return {before * rest, glm::dot(real / rest, a.dual)};
+    }
     return {length, glm::dot(a.real, a.dual) / length};
 }
 
@@ -75,7 +81,9 @@ template <class T>
 template <class T>
 [[nodiscard]] DualQuat<T> normalized(const DualQuat<T>& a) noexcept {
     const T length = glm::length(a.real);
-    if (!(length > T(0))) return {};
+    const T before = prescale(a.real, length);
+    if (!(before > T(0))) return {};
+    if (before != T(1)) return normalized(DualQuat<T>{a.real / before, a.dual / before});
     const T scale = T(1) / length;
     const Quat<T> real = a.real * scale;
     const Quat<T> dual = a.dual * scale;

@@ -46,7 +46,9 @@ template <class T>
 template <class T>
 [[nodiscard]] QuatVec<T> normalized(const QuatVec<T>& a) noexcept {
     const T length = glm::length(a.rotation);
-    if (!(length > T(0))) return {Quat<T>(T(1), T(0), T(0), T(0)), a.translation};
+    const T before = prescale(a.rotation, length);
+    if (!(before > T(0))) return {Quat<T>(T(1), T(0), T(0), T(0)), a.translation};
+    if (before != T(1)) return {glm::normalize(a.rotation / before), a.translation};
     return {a.rotation / length, a.translation};
 }
 

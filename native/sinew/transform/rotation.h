@@ -32,6 +32,16 @@ template <class T>
     return hypot(v.x, v.y, v.z);
 }
 
+/// 1 where the squares of the components of `q`, of length `length`, are numbers of full precision; else what to divide
+/// `q` by first: its largest component, 0 only where all are.
+template <class T>
+[[nodiscard]] T prescale(const Quat<T>& q, T length) noexcept {
+    using std::abs;
+    using std::max;
+    if (length > T(1e-12) && length < T(1e12)) return T(1);
+    return max(max(abs(q.w), abs(q.x)), max(abs(q.y), abs(q.z)));
+}
+
 /// Unit quaternion of the rotation by `angle` radians about `axis`, of any length. An axis of length 0 gives
 /// the identity.
 template <class T>
@@ -65,6 +75,23 @@ template <class T>
     const T half = safe_length(rotation) * T(0.5);
     const Vec3<T> v = (T(0.5) * sinc(half)) * rotation;
     return Quat<T>(cos(half), v.x, v.y, v.z);
+}
+
+/// x, y and z of the unit quaternion `q` or of -q, whichever has w >= 0 (Smith 2013, section 3.3): what stores a
+/// rotation in three numbers.
+template <class T>
+[[nodiscard]] Vec3<T> three_numbers(const Quat<T>& q) noexcept {
+    return q.w < T(0) ? -vector_part(q) : vector_part(q);
+}
+
+/// The unit quaternion whose three_numbers() are `v`: w is the root of 1 - |v|^2, of a length above 1 by rounding 0.
+///
+/// Near 180 degrees w is small and lost: it is off by up to the root of the type's rounding there.
+template <class T>
+[[nodiscard]] Quat<T> from_three_numbers(const Vec3<T>& v) noexcept {
+    using std::max;
+    using std::sqrt;
+    return glm::normalize(Quat<T>(sqrt(max(T(1) - glm::dot(v, v), T(0))), v.x, v.y, v.z));
 }
 
 /// The angle of the rotation from `a` to `b`, both of unit length and either sign: 0 to pi.

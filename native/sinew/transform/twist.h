@@ -49,11 +49,21 @@ template <class T>
     return to_twist(to_quat_vec(a));
 }
 
-/// The exponential of `twist`, of any angle: undoes to_twist().
+/// The exponential of `twist`, of any angle: undoes to_twist(). From angles of 1 / epsilon on the rotation is one of
+/// any; infinities and NaN where the length of an argument is beyond the type.
 template <class T>
 [[nodiscard]] QuatVec<T> to_quat_vec(const Twist<T>& twist) noexcept {
     using std::sin;
     const T angle = safe_length(twist.angular);
+    if (angle > T(1e4)) {
+        // In powers of the angle below there would be infinities.
+        const Vec3<T> axis = twist.angular / angle;
+        const T half = sin(angle * T(0.5));
+        const T along = glm::dot(axis, twist.linear);
+        return {quat_from_rotation_vector(twist.angular),
+                along * axis + (sin(angle) / angle) * (twist.linear - along * axis) +
+                    (T(2) * half * half / angle) * glm::cross(axis, twist.linear)};
+    }
     const T x2 = angle * angle;
     const T half_sinc = sinc(angle * T(0.5));
     // (x - sin x) / x^3.

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "sinew/transform/convert.h"
+
+namespace sinew {
+
+/// Points and directions of a source, and those of a target that a rigid transform is to take them to.
+///
+/// source, target                        [n] points, finite
+/// weights                               [n] of points, not negative; empty: 1 each
+/// source_directions, target_directions  [m] of any length, of which only the direction counts; one of length 0,
+///                                       on either side, does not count
+/// direction_weights                     [m] not negative; empty: 1 each. A direction counts as a point at
+///                                       distance 1 from the middle, so its weight is in squares of lengths
+template <class T>
+struct Pairs {
+    std::span<const Vec3<T>> source{};
+    std::span<const Vec3<T>> target{};
+    std::span<const T> weights{};
+    std::span<const Vec3<T>> source_directions{};
+    std::span<const Vec3<T>> target_directions{};
+    std::span<const T> direction_weights{};
+};
+
+/// What a fit gives.
+///
+/// transform    target_from_source: the least weighted sum of squared distances
+/// error        the root of the weighted mean of the squared distances that are left, points and directions
+/// is_defined   false where other rotations are as good to within rounding of T: points on one line or all at one
+///              place, a mirror image with a symmetry, no weight above 0. The transform is then one of the best,
+///              finite; without weight the identity
+/// is_mirrored  a mirror image would fit better, by more than rounding
+template <class Transform, class T>
+struct Fitted {
+    Transform transform;
+    T error = T(0);
+    bool is_defined = true;
+    bool is_mirrored = false;
+};
+
+namespace detail {
+
+/// Sums over pairs, in double, of coordinates about the two middles and divided by `scale`, of weights divided by
+/// the largest.
+struct PairMoments {
+    Vec3<double> source_middle{0.0};
+    Vec3<double> target_middle{0.0};
+    double scale = 1.0;
+    double weight = 0.0;            ///< of points
+    double direction_weight = 0.0;  ///< of directions that count
+    Mat3<double> covariance{0.0};   ///< the weighted sum of target source^T
+    double size = 0.0;              ///< no singular value of `covariance` is above
+    double noise = 0.0;             ///< what rounding of the input adds to a direction without extent
+    double largest_weight = 1.0;
+};
+
+template <class T>
+[[nodiscard]] double weight_at(std::span<const T> weights, std::size_t i) noexcept {
+    return weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+}
+
+inline double largest_component(const Vec3<double>& v) noexcept {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// f(source, target, weight) of every pair of points of weight above 0.
+template <class T, class F>
+void for_points(const Pairs<T>& pairs, F f) noexcept {
+    assert(pairs.source.size() == pairs.target.size());
+    for (std::size_t i = 0; i < pairs.source.size(); ++i) {
+        const double weight = weight_at(pairs.weights, i);
+        if (weight > 0.0) f(Vec3<double>(pairs.source[i]), Vec3<double>(pairs.target[i]), weight);
+    }
+}
+
+/// f(source, target, weight) of every pair of directions that counts, of length 1.
+template <class T, class F>
+void for_directions(const Pairs<T>& pairs, F f) noexcept {
+    assert(pairs.source_directions.size() == pairs.target_directions.size());
+    const Vec3<double> none(0.0);
+    for (std::size_t i = 0; i < pairs.source_directions.size(); ++i) {
+        const double weight = weight_at(pairs.direction_weights, i);
+        const Vec3<double> source = unit(Vec3<double>(pairs.source_directions[i]), none);
+        const Vec3<double> target = unit(Vec3<double>(pairs.target_directions[i]), none);
+        if (weight > 0.0 && source != none && target != none) f(source, target, weight);
+    }
+}
+
+template <class T>
+[[nodiscard]] PairMoments moments_of(const Pairs<T>& pairs) noexcept {
+    PairMoments m;
+    double largest = 0.0;
+    const auto note_weight = [&](const auto&, const auto&, double weight) {
+        largest = std::max(largest, weight);
+    };
+    for_points(pairs, note_weight);
+    for_directions(pairs, note_weight);
+    if (!(largest > 0.0)) return m;
+    m.largest_weight = largest;
+
+    for_points(pairs, [&](const auto&, const auto&, double weight) { m.weight += weight / largest; });
+    double reach = 0.0;
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        const double share = weight / largest / m.weight;
+        m.source_middle += share * source;
+        m.target_middle += share * target;
+        reach = std::max({reach, largest_component(source), largest_component(target)});
+    });
+    double extent = 0.0;
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double) {
+        extent = std::max({extent, largest_component(source - m.source_middle),
+                           largest_component(target - m.target_middle)});
+    });
+    bool has_directions = false;
+    for_directions(pairs, [&](const auto&, const auto&, double) { has_directions = true; });
+    if (has_directions) extent = std::max(extent, 1.0);
+    if (extent > 0.0) m.scale = extent;
+
+    double source_square = 0.0;
+    double target_square = 0.0;
+    const auto add = [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        m.covariance += weight * glm::outerProduct(target, source);
+        source_square += weight * glm::dot(source, source);
+        target_square += weight * glm::dot(target, target);
+    };
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        add((source - m.source_middle) / m.scale, (target - m.target_middle) / m.scale, weight / largest);
+    });
+    for_directions(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        m.direction_weight += weight / largest;
+        add(source, target, weight / largest / m.scale / m.scale);
+    });
+    m.size = std::sqrt(source_square) * std::sqrt(target_square);
+    // Coordinates are known to half a unit in their last digit; eight times leaves room for what made them.
+    const double rounding = 8.0 * std::numeric_limits<T>::epsilon();
+    m.noise = m.weight * std::pow(rounding * reach / m.scale, 2) +
+              m.direction_weight * std::pow(rounding / m.scale, 2);
+    return m;
+}
+
+/// The fit of a solver that found `rotation`, with `gap`, the sum of the two smaller singular values of the
+/// covariance, the last negative where that mirrors.
+template <class T>
+[[nodiscard]] Fitted<QuatVec<double>, double> judged(const Pairs<T>& pairs, const PairMoments& m,
+                                                     const QuatVec<double>& fit, double gap) noexcept {
+    Fitted<QuatVec<double>, double> result{fit};
+    double square = 0.0;
+    for_points(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        const Vec3<double> off = (transform_point(fit, source) - target) / m.scale;
+        square += weight / m.largest_weight * glm::dot(off, off);
+    });
+    for_directions(pairs, [&](const Vec3<double>& source, const Vec3<double>& target, double weight) {
+        const Vec3<double> off = (rotate(fit.rotation, source) - target) / m.scale;
+        square += weight / m.largest_weight * glm::dot(off, off);
+    });
+    const double weight = m.weight + m.direction_weight;
+    if (!(weight > 0.0) || (m.weight == 0.0 && !pairs.source.empty())) {
+        return {{}, 0.0, false, false};
+    }
+    result.error = m.scale * std::sqrt(square / weight);
+
+    // The smallest singular value with its sign, from its sum and its product with the second.
+    const Mat3<double> aligned = glm::transpose(to_mat3(fit.rotation)) * m.covariance;
+    const double first = aligned[0][0] + aligned[1][1] + aligned[2][2] - gap;
+    const double product = first > 0.0 ? glm::determinant(m.covariance) / first : 0.0;
+    const double root = std::sqrt(std::max(gap * gap - 4.0 * product, 0.0));
+    const double last = gap + root > 0.0 ? 2.0 * product / (gap + root) : 0.0;
+    const double first_order = 8.0 * std::numeric_limits<T>::epsilon() * m.size;
+    const double second_order = 64.0 * std::numeric_limits<double>::epsilon() * m.size + m.noise;
+    result.is_mirrored = last < -first_order - m.noise;
+    // Beside a mirror the gap is a difference, and rounding counts in full; else it is a sum of squares of extents.
+    result.is_defined = gap > second_order + (last < -second_order ? first_order : 0.0);
+    return result;
+}
+
+template <class Transform, class T>
+[[nodiscard]] Fitted<Transform, T> rounded(const Fitted<QuatVec<double>, double>& fit) noexcept {
+    const QuatVec<T> transform = cast<T>(fit.transform);
+    const T error = static_cast<T>(fit.error);
+    if (!std::isfinite(glm::dot(glm::abs(transform.translation), Vec3<T>(T(1) / T(4)))) ||
+        !std::isfinite(error)) {
+        return {Transform{}, T(0), false, false};
+    }
+    if constexpr (requires(Transform a) { a.linear; }) {
+        return {to_affine(transform), error, fit.is_defined, fit.is_mirrored};
+    } else if constexpr (requires(Transform a) { a.rotation; }) {
+        return {transform, error, fit.is_defined, fit.is_mirrored};
+    } else {
+        return {cast<T>(to_dual_quat(fit.transform)), error, fit.is_defined, fit.is_mirrored};
+    }
+}
+
+}  // namespace detail
+}  // namespace sinew

@@ -1,0 +1,363 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""sinew.fit against scipy and against float64 written from the papers."""
+
+import numpy as np
+import pytest
+import sinew
+from motions import layout, matrix, rigid
+from scipy.spatial.transform import RigidTransform, Rotation
+from sinew import fit
+
+LAYOUT_OF = {"kabsch": "affine", "horn": "quat_vec", "walker": "dual_quat"}
+SOLVERS = pytest.mark.parametrize("method", fit.METHODS)
+CASES = 2000
+
+
+def random_pairs(rng, count, points=12, noise=0.05):
+    """[count, points, 3] twice, and [count, points]: points, where rigid motions take them, weights."""
+    # Thick, flat and thin sets, near the origin and away from it.
+    extents = 10.0 ** rng.uniform(-2, 0, (count, 1, 3))
+    source = rng.normal(size=(count, points, 3)) * extents + rng.uniform(-5, 5, (count, 1, 3))
+    motions = rigid(rng, count)
+    target = np.einsum("cij,cpj->cpi", motions.rotation.as_matrix(), source) + motions.translation[:, None]
+    target += noise * extents.min(axis=2, keepdims=True) * rng.normal(size=target.shape)
+    return source, target, rng.uniform(0.1, 2.0, (count, points))
+
+
+def by_scipy(source, target, weights):
+    """[4, 4]: Rotation.align_vectors about the weighted means."""
+    middles = [np.average(points, axis=0, weights=weights) for points in (source, target)]
+    rotation = Rotation.align_vectors(target - middles[1], source - middles[0], weights=weights)[0]
+    return RigidTransform.from_components(middles[1] - rotation.apply(middles[0]), rotation).as_matrix()
+
+
+@pytest.fixture(scope="module")
+def by_scipy_of_many():
+    pairs = random_pairs(np.random.default_rng(0), CASES)
+    return pairs, np.array([by_scipy(*case) for case in zip(*pairs, strict=True)])
+
+
+@SOLVERS
+def test_rigid_agrees_with_scipy(method, by_scipy_of_many):
+    (source, target, weights), want = by_scipy_of_many
+    result = fit.rigid(source, target, weights, method=method)
+    assert result.is_defined.all()
+    assert not result.is_mirrored.any()
+    got = matrix(result.transforms, LAYOUT_OF[method])
+    # The condition of the rotation about the longest axis: 1e4 where the others are a hundredth of it.
+    np.testing.assert_allclose(got, want, rtol=0, atol=2e-10)
+    moved = np.einsum("cij,cpj->cpi", want[:, :3, :3], source) + want[:, None, :3, 3]
+    square = (weights * ((moved - target) ** 2).sum(axis=2)).sum(axis=1) / weights.sum(axis=1)
+    np.testing.assert_allclose(result.error, np.sqrt(square), rtol=1e-9, atol=1e-13)
+
+
+@SOLVERS
+def test_float32_differs_by_its_own_rounding(method):
+    source, target, weights = (
+        array.astype(np.float32) for array in random_pairs(np.random.default_rng(1), 200, noise=1.0)
+    )
+    result = fit.rigid(source, target, weights, method=method)
+    assert result.transforms.dtype == np.float32
+    exact = fit.rigid(source.astype(float), target.astype(float), weights.astype(float), method=method)
+    got, want = (matrix(each.transforms, LAYOUT_OF[method]) for each in (result, exact))
+    np.testing.assert_allclose(got, want, rtol=0, atol=1e-5)
+
+
+@SOLVERS
+def test_directions_count_as_scipys_vectors(method):
+    rng = np.random.default_rng(2)
+    vectors = rng.normal(size=(200, 5, 3))
+    rotations = Rotation.random(200, rng=rng)
+    moved = np.einsum("cij,cpj->cpi", rotations.as_matrix(), vectors) + 0.1 * rng.normal(size=vectors.shape)
+    unit = [array / np.linalg.norm(array, axis=2, keepdims=True) for array in (vectors, moved)]
+    weights = rng.uniform(0.1, 2.0, (200, 5))
+    result = fit.rigid(
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+        source_directions=vectors,
+        target_directions=3 * moved,
+        direction_weights=weights,
+        method=method,
+    )
+    assert result.is_defined.all()
+    want = [
+        Rotation.align_vectors(b, a, weights=w)[0].as_matrix() for a, b, w in zip(*unit, weights, strict=True)
+    ]
+    got = matrix(result.transforms, LAYOUT_OF[method])
+    np.testing.assert_allclose(got[:, :3, :3], want, rtol=0, atol=1e-12)
+    assert (got[:, :3, 3] == 0).all()
+
+
+@SOLVERS
+def test_a_direction_is_what_a_line_of_points_lacks(method):
+    motion = rigid(np.random.default_rng(3))
+    line = np.array([4.0, 0, 0]) + np.outer(np.linspace(-1, 2, 7), [1.0, 2, -1])
+    across = np.array([[0.0, 1, 2]])
+    moved, turned = motion.apply(line), motion.rotation.apply(across)
+    assert not fit.rigid(line, moved, method=method).is_defined
+    result = fit.rigid(line, moved, source_directions=across, target_directions=turned, method=method)
+    assert result.is_defined
+    got = matrix(result.transforms, LAYOUT_OF[method])
+    np.testing.assert_allclose(got, motion.as_matrix(), rtol=0, atol=1e-13)
+    assert result.error < 1e-14
+
+
+def flat(rng):
+    return rng.normal(size=(9, 3)) * [1, 2, 0]
+
+
+# What is there, whether the fit is the only one as good, whether a mirror image would be better.
+DEGENERATE = {
+    "one point": (lambda rng: np.ones((1, 3)), 1, False, False),
+    "one place": (lambda rng: np.full((5, 3), 0.1), 1, False, False),
+    "a line": (lambda rng: rng.normal(size=(9, 1)) * [1.0, 2.0, 0.5] + 1, 1, False, False),
+    "a plane": (flat, 1, True, False),
+    "a plane, mirrored": (flat, [1, -1, 1], True, False),
+    "a body, mirrored": (lambda rng: rng.normal(size=(9, 3)) * [1, 2, 3], [1, -1, 1], True, True),
+    # As far along y as along z: half a turn about either of many axes.
+    "a cross, mirrored": (lambda rng: np.vstack([np.eye(3), -np.eye(3)]), [1, -1, 1], False, True),
+}
+
+
+@SOLVERS
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("case", DEGENERATE)
+def test_degenerate_points_are_flagged(case, dtype, method):
+    make, mirror, is_defined, is_mirrored = DEGENERATE[case]
+    rng = np.random.default_rng(4)
+    motion = rigid(rng)
+    source = make(rng)
+    target = motion.apply(source * mirror)
+    result = fit.rigid(source.astype(dtype), target.astype(dtype), method=method)
+    assert result.is_defined == is_defined
+    assert result.is_mirrored == is_mirrored
+    got = matrix(result.transforms, LAYOUT_OF[method])
+    assert np.isfinite(got).all()
+    np.testing.assert_allclose(np.linalg.det(got[:3, :3]), 1, atol=1e-5)
+    off = source @ got[:3, :3].T + got[:3, 3] - target
+    np.testing.assert_allclose(result.error, np.sqrt((off**2).sum(axis=1).mean()), atol=1e-5)
+    if not is_mirrored:
+        # One of the best: nothing is left.
+        assert np.abs(off).max() < (1e-5 if dtype == np.float32 else 1e-13)
+
+
+@SOLVERS
+def test_no_weight_gives_the_identity_and_weights_of_0_leave_points_out(method):
+    rng = np.random.default_rng(5)
+    source, target, weights = random_pairs(rng, 1, noise=0)
+    nothing = fit.rigid(source[0], target[0], np.zeros(12), method=method)
+    assert not nothing.is_defined
+    np.testing.assert_array_equal(matrix(nothing.transforms, LAYOUT_OF[method]), np.eye(4))
+    weights[0, :4] = 0
+    target[0, :4] = 100
+    part = fit.rigid(source[0], target[0], weights[0], method=method)
+    want = by_scipy(source[0, 4:], target[0, 4:], weights[0, 4:])
+    np.testing.assert_allclose(matrix(part.transforms, LAYOUT_OF[method]), want, atol=1e-10)
+
+
+@SOLVERS
+@pytest.mark.parametrize(("size", "dtype"), [(1e-150, float), (1e150, float), (1e-30, "f4"), (1e30, "f4")])
+def test_sizes_near_the_ends_of_a_type(method, size, dtype):
+    source, target, _ = random_pairs(np.random.default_rng(6), 1, noise=0)
+    result = fit.rigid((size * source[0]).astype(dtype), (size * target[0]).astype(dtype), method=method)
+    got = matrix(result.transforms, LAYOUT_OF[method])
+    want = by_scipy(source[0], target[0], np.ones(12))
+    got[:3, 3] /= size
+    assert result.is_defined
+    np.testing.assert_allclose(got, want, atol=1e-3 if dtype == "f4" else 1e-9)
+
+
+def hand_eye_reference(a, b):
+    """[8]: Daniilidis 1999, eqs. 31 to 36, from dual quaternions [n, 8]."""
+
+    def cross(v):
+        return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+    rows = []
+    for p, q in zip(a, b, strict=True):
+        p, q = p * np.sign(p[0]), q * np.sign(q[0])
+        real = np.column_stack([p[1:4] - q[1:4], cross(p[1:4] + q[1:4])])
+        dual = np.column_stack([p[5:] - q[5:], cross(p[5:] + q[5:])])
+        rows += [np.hstack([real, np.zeros((3, 4))]), np.hstack([dual, real])]
+    v7, v8 = np.linalg.svd(np.vstack(rows))[2][6:]
+    roots = np.roots([v7[:4] @ v7[4:], v7[:4] @ v8[4:] + v8[:4] @ v7[4:], v8[:4] @ v8[4:]]).real
+    found = max((s * v7 + v8 for s in roots), key=lambda v: np.linalg.norm(v[:4]) / np.linalg.norm(v))
+    return found / np.linalg.norm(found[:4]) * np.sign(found[0])
+
+
+def motions_of_two(rng, count, motions, noise=0.0):
+    """Motions of one body, those of the other, and where this is: a x = x b but for noise."""
+    x = rigid(rng, count)
+    a = [rigid(rng, count) for _ in range(motions)]
+    b = [x.inv() * each * x for each in a]
+    if noise:
+        twists = rng.normal(size=(motions, count, 6)) * noise
+        b = [each * RigidTransform.from_exp_coords(t) for each, t in zip(b, twists, strict=True)]
+    stacked = [np.stack([layout(each, "dual_quat") for each in of], axis=1) for of in (a, b)]
+    return *stacked, x
+
+
+def test_hand_eye_finds_what_was_there():
+    a, b, x = motions_of_two(np.random.default_rng(7), CASES, 4)
+    signs = np.random.default_rng(8).choice([-1, 1], (CASES, 4, 1))
+    result = fit.hand_eye(signs * a, b)
+    assert result.is_defined.all()
+    error = np.abs(matrix(result.transforms, "dual_quat") - x.as_matrix()).max(axis=(1, 2))
+    assert np.median(error) < 2e-15
+    # Some of random motions have almost parallel axes.
+    assert error.max() < 1e-10
+    assert result.angle.max() < 1e-12
+    assert result.translation.max() < 1e-12
+
+
+def test_hand_eye_of_noisy_motions_is_that_of_the_paper():
+    a, b, _ = motions_of_two(np.random.default_rng(9), 200, 8, noise=0.01)
+    for i in range(200):
+        # Half turns have signs that noise decides, which the formulas leave open.
+        clear = (np.abs(a[i, :, 0]) > 0.05) & (np.abs(b[i, :, 0]) > 0.05)
+        p, q = a[i, clear], b[i, clear]
+        # The paper's rows have the unit of length that comes; Sinew's none.
+        longest = max(np.linalg.norm(sinew.dual_quat.to_quat_vec(e)[:, 4:], axis=1).max() for e in (p, q))
+        scale = np.repeat([1, 1 / longest], 4)
+        want = hand_eye_reference(p * scale, q * scale) / scale
+        got = matrix(fit.hand_eye(p, q).transforms, "dual_quat")
+        rotation = matrix(want, "dual_quat")[:3, :3]
+        np.testing.assert_allclose(got[:3, :3], rotation, atol=1e-11)
+        # Of the translation the paper's is not the least squares of what is left; ours is.
+        a_motions, b_motions = matrix(p, "dual_quat"), matrix(q, "dual_quat")
+        rows = np.vstack(a_motions[:, :3, :3] - np.eye(3))
+        right = np.concatenate(b_motions[:, :3, 3] @ rotation.T - a_motions[:, :3, 3])
+        np.testing.assert_allclose(got[:3, 3], np.linalg.lstsq(rows, right, rcond=None)[0], atol=1e-10)
+
+
+def test_hand_eye_of_every_layout_and_with_weights():
+    a, b, x = motions_of_two(np.random.default_rng(10), 5, 6)
+    b[:, 3:] = a[:, 3:]  # wrong, and without weight
+    weights = np.array([1.0, 2, 3, 0, 0, 0])
+    for name in ("affine", "quat_vec", "dual_quat"):
+        convert = getattr(sinew.dual_quat, f"to_{name}", lambda same: same)
+        result = fit.hand_eye(convert(a), convert(b), weights)
+        assert result.is_defined.all()
+        np.testing.assert_allclose(matrix(result.transforms, name), x.as_matrix(), atol=1e-11)
+        assert fit.hand_eye(convert(a).astype("f4"), convert(b).astype("f4")).transforms.dtype == np.float32
+
+
+def test_hand_eye_says_what_does_not_decide():
+    rng = np.random.default_rng(11)
+    x = rigid(rng)
+
+    def solve(rotvecs, dtype=float):
+        a = RigidTransform.from_components(rng.normal(size=(len(rotvecs), 3)), Rotation.from_rotvec(rotvecs))
+        b = RigidTransform.concatenate([x.inv() * each * x for each in a])
+        return fit.hand_eye(layout(a, "dual_quat", dtype), layout(b, "dual_quat", dtype))
+
+    for dtype in (np.float32, np.float64):
+        assert not solve([[0.3, 1, 0]], dtype).is_defined
+        assert not solve([[0.3, 1, 0], [-0.6, -2, 0], [0.15, 0.5, 0]], dtype).is_defined
+        assert not solve([[0, 0, 0], [0, 0, 0]], dtype).is_defined
+        assert not solve([[np.pi, 0, 0], [0, np.pi, 0]], dtype).is_defined
+    both = solve([[0.3, 1, 0], [1, 0, 0.2], [np.pi, 0, 0]])
+    assert both.is_defined
+    np.testing.assert_allclose(matrix(both.transforms, "dual_quat"), x.as_matrix(), atol=1e-12)
+    a = layout(rigid(rng, 3), "dual_quat")
+    assert not fit.hand_eye(a, a, np.zeros(3)).is_defined
+
+
+def cluster(rng, middle, count, spread):
+    twists = rng.normal(size=(count, 6)) * spread
+    return RigidTransform.concatenate([middle * RigidTransform.from_exp_coords(t) for t in twists])
+
+
+def test_average_is_where_the_screws_cancel_and_scipys_rotation():
+    rng = np.random.default_rng(12)
+    middles = rigid(rng, CASES)
+    spread = RigidTransform.from_exp_coords(rng.normal(size=(7, CASES, 6)).reshape(-1, 6) * 0.3)
+    poses = RigidTransform.concatenate([middles] * 7) * spread
+    weights = rng.uniform(0.1, 1, (CASES, 7))
+    array = layout(poses, "dual_quat").reshape(7, CASES, 8).swapaxes(0, 1)
+    result = fit.average(array * rng.choice([-1, 1], (CASES, 7, 1)), weights)
+    assert result.is_defined.all()
+    assert (result.kept == 1).all()
+    mean = RigidTransform.from_dual_quat(result.transforms, scalar_first=True)
+    sides = RigidTransform.from_dual_quat(
+        sinew.dual_quat.compose(layout(mean.inv(), "dual_quat")[:, None], array).reshape(-1, 8),
+        scalar_first=True,
+    )
+    screws = np.einsum("cp,cpi->ci", weights, sides.as_exp_coords().reshape(CASES, 7, 6))
+    assert np.abs(screws).max() < 1e-12
+    # As sinew's own blend of many, which begins elsewhere; and other signs or order give the same.
+    blends = sinew.interpolate.blend(array, weights, "dib").transforms
+    np.testing.assert_allclose(matrix(blends, "dual_quat"), mean.as_matrix(), atol=1e-12)
+    order = rng.permutation(7)
+    again = fit.average(array[:, order], weights[:, order]).transforms
+    np.testing.assert_allclose(again, result.transforms, atol=1e-13)
+
+
+@pytest.mark.parametrize("robust", [False, True])
+def test_averages_that_several_poses_are(robust):
+    turns = RigidTransform.from_rotation(Rotation.from_euler("z", [[0], [120], [240]], degrees=True))
+    for name in ("affine", "quat_vec", "dual_quat"):
+        result = fit.average(layout(turns, name), robust=robust)
+        assert not result.is_defined
+        assert np.isfinite(result.transforms).all()
+        one = fit.average(layout(turns[:1], name), robust=robust)
+        assert one.is_defined
+        np.testing.assert_allclose(matrix(one.transforms, name), np.eye(4), atol=1e-15)
+        assert not fit.average(layout(turns, name), np.zeros(3), robust=robust).is_defined
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_robust_average_of_poses_of_which_almost_half_are_wrong(dtype):
+    rng = np.random.default_rng(13)
+    away, plain_away = [], []
+    for _ in range(25):
+        middle = rigid(rng)
+        right = cluster(rng, middle, 60, 0.02)
+        poses = RigidTransform.concatenate([rigid(rng, 40, extent=20), right])
+        array = layout(poses, "quat_vec", dtype)
+        result = fit.average(array, robust=True)
+        assert result.is_defined
+        assert (result.kept[:40] == 0).mean() > 0.95
+        assert (result.kept[40:] > 0.2).all()
+        of_right = fit.average(array[40:]).transforms
+        apart = sinew.quat_vec.rigid_distance(result.transforms, of_right)
+        away.append([apart.angle, apart.translation])
+        plain = sinew.quat_vec.rigid_distance(fit.average(array).transforms, of_right)
+        plain_away.append([plain.angle, plain.translation])
+    # The mean of 60 is itself known to 0.02 / sqrt(60) in each of three directions.
+    assert np.sqrt(np.mean(np.square(away), axis=0)).max() < 0.02 * np.sqrt(3 / 60)
+    assert np.median(plain_away, axis=0).min() > 0.1
+
+
+def test_robust_average_of_equal_poses_is_that_pose():
+    rng = np.random.default_rng(14)
+    right = layout(rigid(rng), "affine")
+    poses = np.concatenate([layout(rigid(rng, 4), "affine"), np.repeat(right[None], 5, axis=0)])
+    result = fit.average(poses, robust=True)
+    assert result.is_defined
+    np.testing.assert_allclose(result.transforms, right, atol=1e-14)
+    np.testing.assert_array_equal(result.kept > 0.99, [False] * 4 + [True] * 5)
+    # Weights decide whose half it is.
+    weights = np.array([1.0] * 4 + [0.1] * 5)
+    assert not np.allclose(fit.average(poses, weights, robust=True).transforms, right)
+
+
+def test_arguments_are_named():
+    points = np.zeros((4, 3))
+    poses = np.zeros((4, 8))
+    poses[:, 0] = 1
+    for call, argument in (
+        (lambda: fit.rigid(points, points[:3]), "target"),
+        (lambda: fit.rigid(points[0], points), "source"),
+        (lambda: fit.rigid(points, points, np.ones(3)), "weights"),
+        (lambda: fit.rigid(points, points, -np.ones(4)), "weights"),
+        (lambda: fit.rigid(points, points, source_directions=points), "target_directions"),
+        (lambda: fit.rigid(points, points, method="svd"), "method"),
+        (lambda: fit.rigid(points * np.nan, points), "source"),
+        (lambda: fit.hand_eye(poses, poses[:3]), "b"),
+        (lambda: fit.hand_eye(points, points), "a"),
+        (lambda: fit.average(poses[:0]), "poses"),
+        (lambda: fit.average(poses, np.ones(5)), "weights"),
+    ):
+        with pytest.raises(ValueError, match=f"^{argument}: expected"):
+            call()
