@@ -348,6 +348,32 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
     }
 }
 
+/// sqrt(x), x not negative; of less than any length that counts, something as small.
+template <class D>
+HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+    // As inverse_root().
+    x = hn::Max(x, hn::Set(d, 1e-37f));
+    const auto inverse = hn::ApproximateReciprocalSqrt(x);
+    const auto result = hn::Mul(x, inverse);
+    const auto half = hn::Mul(result, hn::Set(d, 0.5f));
+    return hn::MulAdd(half, hn::NegMulAdd(result, inverse, hn::Set(d, 1.0f)), result);
+#else
+    return hn::Sqrt(x);
+#endif
+}
+
+/// 1 / x, x positive. A division takes as long as the root.
+template <class D>
+HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+    const auto estimate = hn::ApproximateReciprocal(x);
+    return hn::Mul(estimate, hn::NegMulAdd(x, estimate, hn::Set(d, 2.0f)));
+#else
+    return hn::Div(hn::Set(d, 1.0f), x);
+#endif
+}
+
 /// Vertices [begin, begin + count) of a run, at most kLanes.
 ///
 /// index_of(vertex, k)  the k-th neighbour of a vertex from `begin` on; kIsConsecutive: of the first alone
@@ -379,14 +405,13 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
                                            HWY_ATTR { return index_of(HWY_MIN(vertex, count - 1), k); };
                 edge = subtract<D>(collected_points(d, frame.from, of_vertex, lane), point);
             }
-            const auto squared = dot_of<D>(edge, edge);
-            const auto length = hn::Mul(squared, inverse_length(d, squared));
+            const auto length = root(d, dot_of<D>(edge, edge));
             sum = add_scaled<D>(sum, length, edge);
             lengths = hn::Add(lengths, length);
         }
         const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
         const auto factor = frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
-        const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factor, lengths));
+        const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Mul(factor, reciprocal(d, lengths)));
         store_lanes(d, add_scaled<D>(point, share, sum), result, lane);
     }
     if (result == rest) std::copy_n(rest, count, frame.to + begin);
