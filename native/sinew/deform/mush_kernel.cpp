@@ -376,10 +376,12 @@ HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
 
 /// Vertices [begin, begin + count) of a run, at most kLanes.
 ///
+/// kValence             neighbours of each vertex; 0: `valence`
 /// index_of(vertex, k)  the k-th neighbour of a vertex from `begin` on; kIsConsecutive: of the first alone
-template <bool kIsConsecutive, class Index>
+template <std::size_t kValence, bool kIsConsecutive, class Index>
 HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valence, std::size_t begin,
                                        std::size_t count, const Index& index_of) {
+    if constexpr (kValence > 0) valence = kValence;
     const Full d;
     using D = Full;
     const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
@@ -411,10 +413,33 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
         }
         const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
         const auto factor = frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
-        const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Mul(factor, reciprocal(d, lengths)));
+        const auto share =
+            hn::IfThenElseZero(hn::Gt(divisor, least), hn::Mul(factor, reciprocal(d, lengths)));
         store_lanes(d, add_scaled<D>(point, share, sum), result, lane);
     }
     if (result == rest) std::copy_n(rest, count, frame.to + begin);
+}
+
+/// A run that is consecutive.
+template <std::size_t kValence>
+HWY_INLINE void smooth_consecutive_by_length(const MushFrame& frame, const MushRun& run) {
+    const std::int32_t* const neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    for (std::size_t i = run.begin; i < run.end; i += kLanes) {
+        const auto behind = static_cast<std::int32_t>(i - run.begin);
+        smooth_lanes_by_length<kValence, true>(frame, run.valence, i, HWY_MIN(kLanes, run.end - i),
+                                               [&](std::size_t, std::size_t k)
+                                                   HWY_ATTR { return neighbours[k] + behind; });
+    }
+}
+
+HWY_INLINE void smooth_others_by_length(const MushFrame& frame, const MushRun& run) {
+    const std::size_t valence = run.valence;
+    const std::int32_t* neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    for (std::size_t i = run.begin; i < run.end; i += kLanes, neighbours += kLanes * valence) {
+        smooth_lanes_by_length<0, false>(frame, valence, i, HWY_MIN(kLanes, run.end - i),
+                                         [&](std::size_t vertex, std::size_t k)
+                                             HWY_ATTR { return neighbours[vertex * valence + k]; });
+    }
 }
 
 /// An iteration by length.
@@ -422,25 +447,14 @@ void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end
     const MushMesh& mesh = *frame.mesh;
     for (std::size_t r = mesh.first_runs[begin]; r < mesh.first_runs[end]; ++r) {
         const MushRun& run = mesh.runs[r];
-        const std::size_t valence = run.valence;
-        if (valence == 0) {
+        if (run.valence == 0) {
             copy_run(frame, run);
-            continue;
-        }
-        const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
-        for (std::size_t i = run.begin; i < run.end; i += kLanes) {
-            const std::size_t count = HWY_MIN(kLanes, run.end - i);
-            if (run.is_consecutive) {
-                const auto behind = static_cast<std::int32_t>(i - run.begin);
-                smooth_lanes_by_length<true>(frame, valence, i, count,
-                                             [&](std::size_t, std::size_t k)
-                                                 HWY_ATTR { return neighbours[k] + behind; });
-            } else {
-                smooth_lanes_by_length<false>(frame, valence, i, count,
-                                              [&](std::size_t vertex, std::size_t k)
-                                                  HWY_ATTR { return neighbours[vertex * valence + k]; });
-                neighbours += kLanes * valence;
-            }
+        } else if (!run.is_consecutive) {
+            smooth_others_by_length(frame, run);
+        } else if (run.valence == 4) {
+            smooth_consecutive_by_length<4>(frame, run);
+        } else {
+            smooth_consecutive_by_length<0>(frame, run);
         }
     }
 }
