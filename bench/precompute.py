@@ -2,8 +2,8 @@
 """What methods keep of each vertex, made for a plate of 316 x 316 vertices whose bones are all over it:
 python bench/precompute.py [--name NAME] [--threads 2]
 
-Seconds by the clock and of the processor, least of the runs. The processor's are of all threads: other programs
-make them little longer.
+Seconds by the clock and of the processor, least of the runs. The processor's are of all threads: other
+programs make them little longer.
 """
 
 from __future__ import annotations
