@@ -40,6 +40,10 @@ int main() {
         for (const MethodInfo& method : kMethods) {
             const Deformer deformer(scene.data_for(method), method);
             count(std::string(method.name) + of, [&] { deformer.deform(scene.pose, {{}, 1}, scene.points); });
+            for (const Variant& variant : variants_of(method)) {
+                count(variant.name + of,
+                      [&] { deformer.deform(scene.pose, variant.options(), scene.points); });
+            }
         }
         count("bind" + of, [&] { const Deformer deformer(scene.data(), Dq::info); });
     }

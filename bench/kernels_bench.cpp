@@ -125,6 +125,16 @@ void register_all() {
                     add("sinew" + std::to_string(threads) + of,
                         [=](benchmark::State& s) { ours(s, Method::info, shape, threads); });
                 }
+                for (const Variant& variant : variants_of(Method::info)) {
+                    add("sinew1/" + variant.name + scene, [=](benchmark::State& s) {
+                        const Deformer& deformer = bound(shape).deformer(Method::info);
+                        Scene& own = scene_of(shape);
+                        for (auto _ : s) {
+                            deformer.deform(own.pose, variant.options(), own.points);
+                            benchmark::ClobberMemory();
+                        }
+                    });
+                }
                 if constexpr (HasPlainLoops<Method>) {
                     add("glm" + of, [=](benchmark::State& s) {
                         plain_loop(

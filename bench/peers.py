@@ -15,20 +15,22 @@ import sinew
 METHODS = [method.name for method in sinew.methods()]
 BONES = 100
 INFLUENCES = 4
+# Of the scene of ddm: libigl keeps ten numbers of each bone for each vertex, those that do not move it too.
+FEW_BONES = INFLUENCES
 
 
 class Scene:
     """A cylinder along a bent and twisted chain of bones.
 
-    rest, weights, bones: float32 [n, 3], float32 [n, 4], int32 [n, 4]; pose: float32 [bones, 4, 4]
+    rest, weights, bones: float32 [n, 3], float32 [n, 4], int32 [n, 4]; pose: float32 [bone_count, 4, 4]
     """
 
-    def __init__(self, vertices: int) -> None:
+    def __init__(self, vertices: int, bone_count: int = BONES) -> None:
         random = np.random.default_rng(1)
-        along = np.arange(vertices) / vertices * BONES
+        along = np.arange(vertices) / vertices * bone_count
         angle = random.uniform(0, 2 * np.pi, vertices)
         self.rest = np.stack([np.cos(angle), np.sin(angle), along], axis=1).astype(np.float32)
-        first = np.clip(np.floor(along) - 1, 0, BONES - INFLUENCES).astype(np.int32)
+        first = np.clip(np.floor(along) - 1, 0, bone_count - INFLUENCES).astype(np.int32)
         self.bones = first[:, None] + np.arange(INFLUENCES, dtype=np.int32)
         away = self.bones + 0.5 - along[:, None]
         weights = np.exp(-(away**2)) + 0.02 + 0.05 * random.random((vertices, INFLUENCES))
@@ -38,7 +40,7 @@ class Scene:
         skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         bend = np.eye(3) + np.sin(0.05) * skew + (1 - np.cos(0.05)) * skew @ skew
         pose, matrix = [], np.eye(4)
-        for bone in range(BONES):
+        for bone in range(bone_count):
             head = np.array([0, 0, bone])
             step = np.eye(4)
             step[:3, :3], step[:3, 3] = bend, head - bend @ head
@@ -51,8 +53,24 @@ class Scene:
         offsets = np.arange(0, INFLUENCES * count + 1, INFLUENCES, dtype=np.int32)
         # Centres of rotation as they are found for a limb: near its middle.
         data = {"cor": self.rest * np.float32([0, 0, 1])} if method == "cor" else {}
+        if method == "ddm":
+            data = {"ddm": self.moments()}
         own = (self.rest, offsets, self.bones.ravel(), self.weights.ravel())
         return sinew.Deformer(*own, method, vertex_data=data)
+
+    def moments(self) -> np.ndarray:
+        """What ddm keeps, float32 [4 n, 12]: neighbourhoods on the surface, spread more along the axis."""
+        centres = 0.98 * self.rest[:, None].repeat(INFLUENCES, axis=1)
+        away = 0.02 * (np.arange(INFLUENCES) - (INFLUENCES - 1) / 2)
+        centres[..., 2] += away - (self.weights @ away)[:, None]
+        seconds = np.array([0.02, 0.02, 0.05, 0.0, 0.0, -0.01])
+        of_weight = np.concatenate([centres, np.broadcast_to(seconds, (*self.bones.shape, 6))], axis=2)
+        numbers = self.weights[..., None] * np.concatenate(
+            [np.ones_like(centres[..., :1]), of_weight], axis=2
+        )
+        vertices = np.broadcast_to(np.arange(len(self.rest))[:, None], self.bones.shape)
+        rows = np.concatenate([vertices[..., None], self.bones[..., None], numbers], axis=2)
+        return rows.reshape(-1, 12).astype(np.float32)
 
 
 def rotate(quats: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -89,15 +107,41 @@ def numpy_candidates(scene: Scene) -> dict:
     return {"lbs": {"numpy": lbs}, "qv": {"numpy": qv}, "dq": {"numpy": dq}}
 
 
+def igl_moments(scene: Scene) -> np.ndarray:
+    """The moments as libigl has them, [n, 10 x bones]: the upper triangles of Omega, about the origin."""
+    rows = scene.moments().astype(np.float64).reshape(len(scene.rest), INFLUENCES, 12)
+    weights, firsts = rows[..., 2], rows[..., 3:6]
+    xx, yy, zz, yz, xz, xy = np.moveaxis(rows[..., 6:], 2, 0)
+    seconds = np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), (0, 1), (2, 3))
+    centroids = firsts.sum(axis=1)[:, None]
+    crossed = firsts[..., :, None] * centroids[..., None, :]
+    both = centroids[..., :, None] * centroids[..., None, :]
+    whole = np.empty((*weights.shape, 4, 4))
+    whole[..., :3, :3] = seconds + crossed + crossed.swapaxes(2, 3) - weights[..., None, None] * both
+    whole[..., :3, 3], whole[..., 3, 3] = firsts, weights
+    omega = np.zeros((len(rows), len(scene.pose), 10))
+    np.put_along_axis(omega, scene.bones[..., None].astype(np.int64), whole[..., *np.triu_indices(4)], axis=1)
+    return omega.reshape(len(rows), -1)
+
+
 def igl_candidates(scene: Scene) -> dict:
     igl = importlib.import_module("igl")
     dense = np.zeros((len(scene.rest), BONES))
     np.put_along_axis(dense, scene.bones.astype(np.int64), scene.weights, axis=1)
     blend = igl.lbs_matrix(scene.rest.astype(np.float64), dense)
+
     # A stack of transposed 3 x 4.
-    stacked = scene.pose[:, :3].astype(np.float64).transpose(0, 2, 1).reshape(-1, 3)
+    def stacked(pose: np.ndarray) -> np.ndarray:
+        return np.ascontiguousarray(pose[:, :3].astype(np.float64).transpose(0, 2, 1).reshape(-1, 3))
+
+    pose = stacked(scene.pose)
     sparse = importlib.import_module("scipy.sparse").csr_matrix(blend)
-    return {"lbs": {"igl lbs_matrix": lambda: blend @ stacked, "the same, sparse": lambda: sparse @ stacked}}
+    found = {"lbs": {"igl lbs_matrix": lambda: blend @ pose, "the same, sparse": lambda: sparse @ pose}}
+    if "ddm" in METHODS and hasattr(igl, "direct_delta_mush"):
+        few = Scene(len(scene.rest), FEW_BONES)
+        own = few.rest.astype(np.float64), stacked(few.pose), igl_moments(few)
+        found["ddm"] = {"igl": lambda: igl.direct_delta_mush(*own)}
+    return found
 
 
 def usd_candidates(scene: Scene) -> dict:
@@ -127,17 +171,15 @@ def usd_candidates(scene: Scene) -> dict:
 
 
 def sinew_candidates(scene: Scene) -> dict:
-    def candidate(deformer: sinew.Deformer, threads: int | None):
-        out = np.empty_like(scene.rest)
-        return lambda: deformer.deform(scene.pose, out=out, threads=threads)
-
-    return {
-        method: {
-            "sinew": candidate(scene.deformer(method), 1),
-            "sinew, threads": candidate(scene.deformer(method), None),
+    def candidates(method: str) -> dict:
+        own = Scene(len(scene.rest), FEW_BONES) if method == "ddm" else scene
+        deformer, out = own.deformer(method), np.empty_like(own.rest)
+        return {
+            name: lambda threads=threads: deformer.deform(own.pose, out=out, threads=threads)
+            for name, threads in (("sinew", 1), ("sinew, threads", None))
         }
-        for method in METHODS
-    }
+
+    return {method: candidates(method) for method in METHODS}
 
 
 PEERS = {
@@ -178,10 +220,10 @@ def main() -> None:
         print(f"without {distribution}: {reason}")
     print("Nanoseconds a vertex, the least of many runs; how far the points are from Sinew's, as a part")
     print("of the size.\n")
-    size = np.ptp(scene.rest, axis=0).max()
     results = {}
     for method, functions in candidates.items():
         points = {name: np.array(call()) for name, call in functions.items()}
+        size = np.ptp(points["sinew"], axis=0).max()
         for name, spread in common.alternate(functions, 0.5 if arguments.quick else 1.5).items():
             away = float(np.abs(points[name] - points["sinew"]).max() / size)
             spread |= {"per_vertex": spread["least"] / vertices * 1e9, "away": away}

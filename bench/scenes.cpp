@@ -137,4 +137,10 @@ Scene make_scene(const Shape& shape) {
     return scene;
 }
 
+std::vector<Variant> variants_of(const MethodInfo& method) {
+    if (!method.keeps_moments) return {};
+    // The index of the variant is the first parameter.
+    return {{std::string(method.name) + "2", {1.0}}, {std::string(method.name) + "4", {2.0}}};
+}
+
 }  // namespace sinew::bench

@@ -4,6 +4,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "plain_loops.h"
@@ -73,5 +74,22 @@ struct Scene {
 };
 
 Scene make_scene(const Shape& shape);
+
+/// A method by values of its parameters that are not the default ones.
+struct Variant {
+    std::string name;
+    std::vector<double> parameters;
+
+    /// On one thread.
+    DeformOptions options() const {
+        DeformOptions options;
+        options.threads = 1;
+        options.parameters = parameters;
+        return options;
+    }
+};
+
+/// Those that take another time: of ddm "ddm2" and "ddm4".
+std::vector<Variant> variants_of(const MethodInfo& method);
 
 }  // namespace sinew::bench

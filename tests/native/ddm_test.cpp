@@ -198,6 +198,36 @@ TEST(DirectDeltaMush, a_vertex_without_faces_has_no_extent) {
     }
 }
 
+// The best one is compared with another solver in tests/python/test_ddm.py. Bones are more than are solved together.
+TEST(DirectDeltaMush, has_the_same_rows_on_each_instruction_set) {
+    constexpr std::int32_t kSide = 20;
+    Random random(25);
+    Scene scene;
+    std::vector<std::int32_t> triangles;
+    for (std::int32_t v = 0; v < kSide * kSide; ++v) {
+        const double x = v / kSide;
+        const double y = v % kSide;
+        scene.add_vertex(Vec3<float>(Vec3<double>(x, y, 0.0) + random.vector(0.3)),
+                         random.influences<float>(4, 7));
+        if (v / kSide + 1 == kSide || v % kSide + 1 == kSide) continue;
+        triangles.insert(triangles.end(), {v, v + kSide, v + kSide + 1, v, v + kSide + 1, v + 1});
+    }
+    const auto expected = direct_delta_mush(scene.data(), triangles, 3.0);
+    ASSERT_TRUE(expected);
+    for (const std::string_view target : simd_targets()) {
+        use_simd_target(target);
+        const auto rows = direct_delta_mush(scene.data(), triangles, 3.0);
+        ASSERT_TRUE(rows);
+        ASSERT_EQ(rows->size(), expected->size()) << target;
+        float largest = 0.0f;
+        for (std::size_t i = 0; i < rows->size(); ++i) {
+            largest = std::max(largest, std::abs((*rows)[i] - (*expected)[i]));
+        }
+        EXPECT_LT(largest, 1e-6f) << target;
+    }
+    use_simd_target(simd_targets().front());
+}
+
 TEST(DirectDeltaMush, of_a_mesh_without_vertices_has_no_rows) {
     const std::int32_t offsets[] = {0};
     const auto rows = direct_delta_mush({{}, offsets, {}, {}}, {}, 0.1);

@@ -96,7 +96,7 @@ public:
     BoneMoments run() {
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             if (mesh_.blocks[b].influences == 0) {
-                moments_.blocks.push_back({0, 0, 0, false});
+                moments_.blocks.push_back({{}, 0, 0, false});
             } else {
                 add_block(b);
             }
@@ -115,16 +115,19 @@ private:
         }
         std::ranges::sort(bones);
         bones.erase(std::unique(bones.begin(), bones.end()), bones.end());
-        MomentBlock block{static_cast<std::uint32_t>(moments_.rows.size()), 0,
-                          static_cast<std::uint32_t>(bones.size()), bones.size() > kMostShared * most};
+        MomentBlock block{{}, 0, static_cast<std::uint32_t>(bones.size()), bones.size() > kMostShared * most};
         if (block.mixed) {
             block.bones = static_cast<std::uint32_t>(most);
             bones = own_bones(most);
         }
         block.first_bone = place_of(bones, block);
-        moments_.rows.resize(moments_.rows.size() + MomentLayout{block.bones}.rows());
-        Lanes<float>* const rows = &moments_.rows[block.first_row];
-        for (std::size_t lane = 0; lane < kLanes; ++lane) fill(block, bones, lane, rows);
+        const auto counts = moment_rows(block.bones);
+        for (std::size_t part = 0; part < kMomentParts; ++part) {
+            std::vector<Lanes<float>>& rows = moments_.parts[part];
+            block.first_rows[part] = static_cast<std::uint32_t>(rows.size());
+            rows.resize(rows.size() + counts[part]);
+        }
+        for (std::size_t lane = 0; lane < kLanes; ++lane) fill(block, bones, lane);
         moments_.blocks.push_back(block);
     }
 
@@ -153,9 +156,11 @@ private:
         return place;
     }
 
-    void fill(const MomentBlock& block, std::span<const std::int32_t> bones, std::size_t lane,
-              Lanes<float>* rows) const {
-        const MomentLayout layout{block.bones};
+    [[nodiscard]] float& number_at(const MomentBlock& block, const MomentPlace& place, std::size_t lane) {
+        return moments_.parts[static_cast<std::size_t>(place.part)][row_of(block, place)].lane[lane];
+    }
+
+    void fill(const MomentBlock& block, std::span<const std::int32_t> bones, std::size_t lane) {
         std::array<double, kMomentNumbers> sums{};
         for (std::size_t i = 0; i < lanes_[lane].size(); ++i) {
             const BoneRow& row = lanes_[lane][i];
@@ -164,12 +169,14 @@ private:
                     ? i
                     : static_cast<std::size_t>(std::ranges::lower_bound(bones, row.bone) - bones.begin());
             for (std::size_t n = 0; n < kMomentNumbers; ++n) {
-                rows[layout.number(k, n)].lane[lane] = row.numbers[n];
+                number_at(block, moment_place(k, n), lane) = row.numbers[n];
                 sums[n] += static_cast<double>(row.numbers[n]);
             }
         }
         for (std::size_t n = 1; n < kMomentNumbers; ++n) {
-            rows[n < 4 ? n - 1 : layout.total() + n - 4].lane[lane] = static_cast<float>(sums[n]);
+            const MomentPlace of_all =
+                n < 4 ? MomentPlace{MomentPart::weight, n - 1} : MomentPlace{MomentPart::second, n - 4};
+            number_at(block, of_all, lane) = static_cast<float>(sums[n]);
         }
     }
 
@@ -204,8 +211,9 @@ std::vector<float> unpack_moments(const PackedMesh& mesh, const BoneMoments& mom
                 Full row{static_cast<float>(mesh.vertices[b].lane[lane]),
                          static_cast<float>(mesh.used_bones[static_cast<std::size_t>(moments.bones[bone])])};
                 for (std::size_t n = 0; n < kMomentNumbers; ++n) {
-                    row[2 + n] =
-                        moments.rows[block.first_row + MomentLayout{block.bones}.number(k, n)].lane[lane];
+                    const MomentPlace place = moment_place(k, n);
+                    const auto part = static_cast<std::size_t>(place.part);
+                    row[2 + n] = moments.parts[part][row_of(block, place)].lane[lane];
                 }
                 if (!is_empty(row.data())) found.push_back(row);
             }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -11,29 +12,37 @@
 
 namespace sinew {
 
-/// The rows of a block's vertices: the centroid of each neighbourhood (x, y, z), then of each of `bones` the weight, then
-/// their first moments, then the sum of all bones' second moments, then these of each. So a variant that needs less reads
-/// the beginning alone.
-struct MomentLayout {
-    std::size_t bones;
+/// The parts that rows of moments are kept in, each of all blocks one after the other: a variant that needs less reads
+/// less memory. They are
+///
+///     weight  the centroid of each neighbourhood (x, y, z), then of each bone its weight
+///     first   of each bone its first moments
+///     second  the sum of all bones' second moments, then those of each
+enum class MomentPart : std::size_t { weight, first, second };
+inline constexpr std::size_t kMomentParts = 3;
 
-    [[nodiscard]] constexpr std::size_t weight(std::size_t bone) const { return 3 + bone; }
-    [[nodiscard]] constexpr std::size_t first(std::size_t bone) const { return 3 + bones + 3 * bone; }
-    [[nodiscard]] constexpr std::size_t total() const { return 3 + 4 * bones; }
-    [[nodiscard]] constexpr std::size_t second(std::size_t bone) const { return 9 + 4 * bones + 6 * bone; }
-    [[nodiscard]] constexpr std::size_t rows() const { return 9 + 10 * bones; }
-    /// The row of number `n` of Moments.
-    [[nodiscard]] constexpr std::size_t number(std::size_t bone, std::size_t n) const {
-        return n == 0 ? weight(bone) : n < 4 ? first(bone) + n - 1 : second(bone) + n - 4;
-    }
+/// Rows of a block whose vertices have moments of `bones`, of each part.
+[[nodiscard]] constexpr std::array<std::size_t, kMomentParts> moment_rows(std::size_t bones) {
+    return {3 + bones, 3 * bones, 6 + 6 * bones};
+}
+
+/// Where number `n` of Moments is of the block's rows.
+struct MomentPlace {
+    MomentPart part;
+    std::size_t row;
 };
+[[nodiscard]] constexpr MomentPlace moment_place(std::size_t bone, std::size_t n) {
+    if (n == 0) return {MomentPart::weight, 3 + bone};
+    if (n < 4) return {MomentPart::first, 3 * bone + n - 1};
+    return {MomentPart::second, 6 + 6 * bone + n - 4};
+}
 
 /// Numbers of each bone: weight, first moment, second moment.
 inline constexpr std::size_t kMomentNumbers = kMomentFloats - 2;
 
 /// The moments of a block of a packed mesh.
 struct MomentBlock {
-    std::uint32_t first_row;   // of BoneMoments::rows, as MomentLayout says
+    std::array<std::uint32_t, kMomentParts> first_rows;  // of BoneMoments::parts
     std::uint32_t first_bone;  // of BoneMoments::bones: [bones], or if mixed [kLanes][bones]
     std::uint32_t bones;       // rising; a vertex that lacks one has 0 of it
     bool mixed;                // every lane has bones of its own
@@ -43,9 +52,14 @@ struct MomentBlock {
 /// bones name them once.
 struct BoneMoments {
     std::vector<MomentBlock> blocks;  // [blocks]; empty: the method has none
-    std::vector<Lanes<float>> rows;
+    std::array<std::vector<Lanes<float>>, kMomentParts> parts;
     std::vector<std::int32_t> bones;  // indices into PackedMesh::used_bones
 };
+
+/// The row of a block.
+[[nodiscard]] inline std::size_t row_of(const MomentBlock& block, const MomentPlace& place) {
+    return block.first_rows[static_cast<std::size_t>(place.part)] + place.row;
+}
 
 /// The bones of the rows, in any order, any number of times. Those of rows of 0 alone are left out.
 [[nodiscard]] std::vector<std::int32_t> bones_of_moments(std::span<const float> rows);

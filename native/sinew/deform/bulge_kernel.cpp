@@ -39,20 +39,24 @@ HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b,
     }
 }
 
-/// From `p` to the nearest point of the bone's segment.
+/// The point of the bone's segment that is nearest to `p`.
 template <class D>
-HWY_INLINE Points<D> to_segment(D d, const BulgeBone& bone, const Points<D>& p) {
+HWY_INLINE Points<D> nearest_of_segment(D d, const BulgeBone& bone, const Points<D>& p) {
     const float* const head = bone.head.value.data();
     const float* const along = bone.along.value.data();
-    const float* const per_length = bone.per_length.value.data();
-    const Points<D> u{hn::Sub(p.x, hn::Set(d, head[0])), hn::Sub(p.y, hn::Set(d, head[1])),
-                      hn::Sub(p.z, hn::Set(d, head[2]))};
-    const Vec<D> share =
-        hn::MulAdd(u.x, hn::Set(d, per_length[0]),
-                   hn::MulAdd(u.y, hn::Set(d, per_length[1]), hn::Mul(u.z, hn::Set(d, per_length[2]))));
-    const Vec<D> t = hn::Min(hn::Max(share, hn::Zero(d)), hn::Set(d, 1.0f));
-    return {hn::MulSub(t, hn::Set(d, along[0]), u.x), hn::MulSub(t, hn::Set(d, along[1]), u.y),
-            hn::MulSub(t, hn::Set(d, along[2]), u.z)};
+    const float* const share = bone.share.value.data();
+    const Vec<D> t = hn::MulAdd(
+        p.x, hn::Set(d, share[0]),
+        hn::MulAdd(p.y, hn::Set(d, share[1]), hn::MulAdd(p.z, hn::Set(d, share[2]), hn::Set(d, share[3]))));
+    const Vec<D> within = hn::Min(hn::Max(t, hn::Zero(d)), hn::Set(d, 1.0f));
+    return {hn::MulAdd(within, hn::Set(d, along[0]), hn::Set(d, head[0])),
+            hn::MulAdd(within, hn::Set(d, along[1]), hn::Set(d, head[1])),
+            hn::MulAdd(within, hn::Set(d, along[2]), hn::Set(d, head[2]))};
+}
+
+template <class D>
+HWY_INLINE Points<D> subtract(const Points<D>& a, const Points<D>& b) {
+    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
 template <class D>
@@ -61,40 +65,44 @@ HWY_INLINE Vec<D> squared_length(const Points<D>& v) {
 }
 
 /// The bones and weights of the lanes: bone_of(k), and weight_of(k) of one.
-template <BulgeForm kForm, class D, class BoneOf, class WeightOf>
+///
+/// kStretched  whether a bone may stretch
+template <BulgeForm kForm, bool kStretched, class D, class BoneOf, class WeightOf>
 HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::size_t lane, std::size_t count,
                              const BoneOf& bone_of, const WeightOf& weight_of, const Points<D>& point,
                              bool& changes) {
     Points<D> p = point;
     if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
-    Points<D> to_bones{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    Points<D> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     Vec<D> stretched = hn::Zero(d);
     Vec<D> most = hn::Zero(d);
     for (std::size_t k = 0; k < count; ++k) {
         const BulgeBone& bone = bone_of(k);
         const Vec<D> weight = weight_of(k);
-        const Points<D> to = to_segment(d, bone, p);
+        const Points<D> own = nearest_of_segment(d, bone, p);
         const Vec<D> stretch = hn::Set(d, bone.head.value[3]);
         if constexpr (kForm == BulgeForm::continuous) {
-            to_bones = add_scaled<D>(to_bones, weight, to);
-            stretched = hn::MulAdd(weight, stretch, stretched);
+            nearest = add_scaled<D>(nearest, weight, own);
+            if constexpr (kStretched) stretched = hn::MulAdd(weight, stretch, stretched);
         } else {
             const auto heavier = hn::Gt(weight, most);
             most = hn::Max(weight, most);
-            to_bones = {hn::IfThenElse(heavier, to.x, to_bones.x), hn::IfThenElse(heavier, to.y, to_bones.y),
-                        hn::IfThenElse(heavier, to.z, to_bones.z)};
+            nearest = {hn::IfThenElse(heavier, own.x, nearest.x), hn::IfThenElse(heavier, own.y, nearest.y),
+                       hn::IfThenElse(heavier, own.z, nearest.z)};
             stretched = hn::IfThenElse(heavier, stretch, stretched);
         }
     }
+    const Points<D> to_bones = subtract<D>(nearest, p);
     const float* const distances = frame.distances[static_cast<std::size_t>(kForm)][b].lane.data() + lane;
-    const Vec<D> allowed = hn::Mul(hn::Load(d, distances), stretched);
+    Vec<D> allowed = hn::Load(d, distances);
+    if constexpr (kStretched) allowed = hn::Mul(allowed, stretched);
     const Vec<D> squared = squared_length(to_bones);
     const auto bulges = hn::Gt(squared, hn::Mul(allowed, allowed));
     changes = !hn::AllFalse(d, bulges);
     if (!changes) return point;
     Vec<D> amount = hn::Set(d, frame.strength);
     if (frame.weights != nullptr) amount = hn::Mul(amount, hn::Load(d, frame.weights[b].lane.data() + lane));
-    const Vec<D> less = hn::Sub(hn::Set(d, 1.0f), hn::Div(allowed, hn::Sqrt(squared)));
+    const Vec<D> less = hn::NegMulAdd(allowed, inverse_root(d, squared), hn::Set(d, 1.0f));
     const Vec<D> share = hn::IfThenElseZero(bulges, hn::Mul(amount, less));
     if (frame.model_from_bones == nullptr) return add_scaled<D>(point, share, to_bones);
     const float* const rows = frame.model_from_bones->value.data();
@@ -112,7 +120,7 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
 /// Blocks [begin, end), which have the same bones: two or more.
 ///
 /// kCount  their influences, or 0 for any number
-template <BulgeForm kForm, std::size_t kCount>
+template <BulgeForm kForm, bool kStretched, std::size_t kCount>
 void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t begin, std::size_t end) {
     const Full d;
     const Block& first = pointers.blocks[begin];
@@ -124,7 +132,7 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             bool changes = false;
-            const Points<Full> points = limited<kForm>(
+            const Points<Full> points = limited<kForm, kStretched>(
                 d, frame, b, lane, count,
                 [&](std::size_t k) -> const BulgeBone& {
                     return frame.bones[static_cast<std::size_t>(bones[k])];
@@ -139,7 +147,7 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
 }
 
 /// A block whose vertices have bones of their own, one by one.
-template <BulgeForm kForm>
+template <BulgeForm kForm, bool kStretched>
 void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::size_t b) {
     const One d;
     const Block& block = pointers.blocks[b];
@@ -151,7 +159,7 @@ void limit_mixed(const BulgeFrame& frame, const MeshPointers& pointers, std::siz
         const std::int32_t* const bones =
             frame.mesh->bones.data() + block.first_bone + block.influences * lane;
         bool changes = false;
-        const Points<One> points = limited<kForm>(
+        const Points<One> points = limited<kForm, kStretched>(
             d, frame, b, lane, block.influences,
             [&](std::size_t k) -> const BulgeBone& {
                 return frame.bones[static_cast<std::size_t>(bones[k])];
@@ -178,32 +186,39 @@ MeshPointers pointers_of(const BulgeFrame& frame) {
             mesh.vertices.data(), mesh.runs.data(), frame.points};
 }
 
-template <BulgeForm kForm>
+template <BulgeForm kForm, bool kStretched>
 void limit_blocks(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     const MeshPointers pointers = pointers_of(frame);
     for (std::size_t b = begin; b < end;) {
         const Block& block = pointers.blocks[b];
         if (block.mixed) {
-            limit_mixed<kForm>(frame, pointers, b++);
+            limit_mixed<kForm, kStretched>(frame, pointers, b++);
             continue;
         }
         const std::size_t after = end_of_same_bones(*frame.mesh, b, end);
         switch (block.influences) {
             case 0:
             case 1: break;
-            case 2: limit_set<kForm, 2>(frame, pointers, b, after); break;
-            case 3: limit_set<kForm, 3>(frame, pointers, b, after); break;
-            case 4: limit_set<kForm, 4>(frame, pointers, b, after); break;
-            default: limit_set<kForm, 0>(frame, pointers, b, after);
+            case 2: limit_set<kForm, kStretched, 2>(frame, pointers, b, after); break;
+            case 3: limit_set<kForm, kStretched, 3>(frame, pointers, b, after); break;
+            case 4: limit_set<kForm, kStretched, 4>(frame, pointers, b, after); break;
+            default: limit_set<kForm, kStretched, 0>(frame, pointers, b, after);
         }
         b = after;
     }
 }
 
 void limit(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
-    frame.form == BulgeForm::continuous ? limit_blocks<BulgeForm::continuous>(frame, begin, end)
-                                        : limit_blocks<BulgeForm::kim_han>(frame, begin, end);
+    if (frame.form == BulgeForm::kim_han) {
+        limit_blocks<BulgeForm::kim_han, true>(frame, begin, end);
+    } else if (frame.is_stretched) {
+        limit_blocks<BulgeForm::continuous, true>(frame, begin, end);
+    } else {
+        limit_blocks<BulgeForm::continuous, false>(frame, begin, end);
+    }
 }
+
+float length_of(const Points<One>& v) { return hn::GetLane(hn::Sqrt(squared_length(v))); }
 
 void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
     const One d;
@@ -218,19 +233,23 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end) {
             Points<One> p = load_deformed(d, pointers, b, lane);
             if (frame.bones_from_model != nullptr) p = displaced(d, frame.bones_from_model->value.data(), p);
             float mean = 0.0f;
+            Points<One> nearest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
             float of_heaviest = 0.0f;
             float most = 0.0f;
             for (std::size_t k = 0; k < block.influences; ++k) {
                 const float weight = block.mixed ? rows[kLanes * (3 + k) + lane]
                                      : k == 0    ? frame.mesh->first_weights[b].lane[lane]
                                                  : rows[kLanes * (2 + k) + lane];
-                const auto to = to_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
-                const float distance = hn::GetLane(hn::Sqrt(squared_length(to)));
+                const auto own = nearest_of_segment(d, frame.bones[static_cast<std::size_t>(bones[k])], p);
+                nearest = add_scaled<One>(nearest, hn::Set(d, weight), own);
+                const float distance = length_of(subtract<One>(own, p));
                 mean += weight * distance;
                 if (weight > most) of_heaviest = distance;
                 most = weight > most ? weight : most;
             }
-            frame.distances[0][b].lane[lane] = kAllowance * mean;
+            // As limited() rounds it, so that it stays where the mean is as short: of bones that lie in one line.
+            frame.distances[0][b].lane[lane] =
+                kAllowance * HWY_MAX(mean, length_of(subtract<One>(nearest, p)));
             frame.distances[1][b].lane[lane] = kAllowance * of_heaviest;
         }
     }
@@ -260,9 +279,9 @@ BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcep
     const Vec3<double>& head = segment.head;
     const Vec3<double> along = segment.tail - head;
     const double squared = glm::dot(along, along);
-    const Vec3<double> per_length = along * (squared > 0.0 ? 1.0 / squared : 0.0);
+    const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
     return {float4(head.x, head.y, head.z, stretch), float4(along.x, along.y, along.z, 0.0),
-            float4(per_length.x, per_length.y, per_length.z, 0.0)};
+            float4(share.x, share.y, share.z, -glm::dot(head, share))};
 }
 
 }  // namespace sinew

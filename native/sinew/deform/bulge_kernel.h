@@ -8,12 +8,12 @@
 
 namespace sinew {
 
-/// A bone's segment as the kernel reads it: the head and how much it stretches, the vector to the tail, and that over
-/// its squared length.
+/// A bone's segment as the kernel reads it: the head and how much it stretches, the vector to the tail, and what makes
+/// of a point (x, y, z, 1) where it is between them, as a part of that vector.
 struct BulgeBone {
     Float4 head;
     Float4 along;
-    Float4 per_length;
+    Float4 share;
 };
 
 /// What the kernels of one call read and write.
@@ -24,6 +24,7 @@ struct BulgeFrame {
     const Lanes<float>* weights;  // [blocks]; null: all 1
     BulgeForm form;
     float strength;
+    bool is_stretched;               // a bone stretches
     const Float4* bones_from_model;  // displacements, as in Frame
     const Float4* model_from_bones;
     Vec3<float>* points;

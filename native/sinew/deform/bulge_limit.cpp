@@ -125,6 +125,7 @@ BulgeFrame BulgeLimit::State::frame(std::span<Vec3<float>> points) const {
             weights.empty() ? nullptr : weights.data(),
             BulgeForm::continuous,
             1.0f,
+            false,
             same_space ? nullptr : to_bones,
             same_space ? nullptr : to_model,
             points.data()};
@@ -173,6 +174,7 @@ void BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
     const State& state = *state_;
     if (points.size() != state.vertex_count) return;
     const std::scoped_lock lock(state.mutex);
+    bool is_stretched = false;
     for (std::size_t i = 0; i < state.bones.size(); ++i) {
         const BoneSegment<double> rest{Vec3<double>(state.segments[i].head),
                                        Vec3<double>(state.segments[i].tail)};
@@ -181,6 +183,7 @@ void BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
         if (number < posed_from_rest.size()) motion = cast<double>(posed_from_rest[number]);
         const double stretch =
             is_orthonormal(motion.linear) ? 1.0 : BulgeLimitStage::stretch(motion.linear, rest);
+        is_stretched = is_stretched || stretch != 1.0;
         state.bones[i] =
             bulge_bone({transform_point(motion, rest.head), transform_point(motion, rest.tail)}, stretch);
     }
@@ -189,6 +192,7 @@ void BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
         BulgeKernel kernel;
     } work{state.frame(points), bulge_kernel()};
     work.frame.form = options.form;
+    work.frame.is_stretched = is_stretched;
     work.frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
     const std::size_t threads = options.threads > 0
                                     ? options.threads

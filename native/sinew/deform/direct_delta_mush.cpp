@@ -9,6 +9,7 @@
 #include <map>
 #include <string>
 
+#include "sinew/deform/block_factor.h"
 #include "sinew/deform/check_bind_data.h"
 #include "sinew/deform/progress_reporter.h"
 #include "sinew/deform/thread_pool.h"
@@ -35,7 +36,7 @@ constexpr double kLeastExtentOfMesh = 1e-12;
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int32_t>;
 
 // 1, x, y, z, xx, yy, zz, yz, xz, xy: what is smoothed of a bone.
-constexpr std::size_t kColumns = 10;
+constexpr std::size_t kColumns = kGroupColumns;
 using Columns = std::array<double, kColumns>;
 
 /// Half the cotangent of the angle at `corner`; 0 of a triangle without area.
@@ -103,62 +104,39 @@ Smoothing smoothing_of(std::span<const Vec3<float>> points, std::span<const std:
     return smoothing;
 }
 
-/// Solves the step for several columns at once, and only where they are not 0: Eigen's own solver goes through the
-/// whole factor for each column.
+/// The step, to be solved for kGroups bones at once, and only where they are not 0.
 class Solver {
 public:
-    explicit Solver(const SparseMatrix& matrix) : factor_(matrix) {
-        if (factor_.info() != Eigen::Success) {
+    explicit Solver(const SparseMatrix& matrix) {
+        const Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>> factor(
+            matrix);
+        if (factor.info() != Eigen::Success) {
             fail("rest_points", "a mesh whose areas are numbers", "one that is too large or too small");
         }
-        const auto diagonal = factor_.vectorD();
-        diagonal_.assign(diagonal.data(), diagonal.data() + diagonal.size());
-        for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-            place_.push_back(static_cast<std::size_t>(factor_.permutationP().indices()(i)));
+        const auto count = static_cast<std::size_t>(matrix.rows());
+        const SparseMatrix& lower = factor.matrixL().nestedExpression();
+        const auto numbers = static_cast<std::size_t>(lower.nonZeros());
+        const auto diagonal = factor.vectorD();
+        factor_ = make_block_factor({lower.outerIndexPtr(), count + 1}, {lower.innerIndexPtr(), numbers},
+                                    {lower.valuePtr(), numbers},
+                                    std::vector<double>(diagonal.data(), diagonal.data() + diagonal.size()));
+        for (std::size_t i = 0; i < count; ++i) {
+            place_.push_back(
+                static_cast<std::size_t>(factor.permutationP().indices()(static_cast<Eigen::Index>(i))));
         }
     }
 
     /// Where the solver has row `i`.
     [[nodiscard]] std::size_t place(std::size_t i) const { return place_[i]; }
 
-    /// From right side to solution. The first column is >= 0, and where it is 0 all are.
-    ///
-    /// is_there  [rows] where it is not 0
+    /// x, is_there  as of SolveBlocks
     void solve(std::span<Columns> x, std::span<std::uint8_t> is_there) const {
-        const SparseMatrix& lower = factor_.matrixL().nestedExpression();
-        const std::int32_t* const starts = lower.outerIndexPtr();
-        const std::int32_t* const rows = lower.innerIndexPtr();
-        const double* const values = lower.valuePtr();
-        for (std::size_t k = 0; k < x.size(); ++k) {
-            if (is_there[k] == 0) continue;
-            if (x[k][0] < kNothing * diagonal_[k]) {
-                x[k] = {};
-                is_there[k] = 0;
-                continue;
-            }
-            const Columns from = x[k];
-            for (std::int32_t i = starts[k]; i < starts[k + 1]; ++i) {
-                const auto row = static_cast<std::size_t>(rows[i]);
-                is_there[row] = 1;
-                for (std::size_t c = 0; c < kColumns; ++c) x[row][c] -= values[i] * from[c];
-            }
-        }
-        for (std::size_t k = x.size(); k-- > 0;) {
-            Columns sum = x[k];
-            for (double& number : sum) number /= diagonal_[k];
-            for (std::int32_t i = starts[k]; i < starts[k + 1]; ++i) {
-                const auto row = static_cast<std::size_t>(rows[i]);
-                if (is_there[row] == 0) continue;
-                for (std::size_t c = 0; c < kColumns; ++c) sum[c] -= values[i] * x[row][c];
-            }
-            is_there[k] = sum[0] >= kNothing;
-            x[k] = is_there[k] != 0 ? sum : Columns{};
-        }
+        solve_(factor_, kNothing, x.front().data(), is_there.data());
     }
 
 private:
-    Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<std::int32_t>> factor_;
-    std::vector<double> diagonal_;
+    BlockFactor factor_;
+    SolveBlocks* solve_ = solve_blocks();
     std::vector<std::size_t> place_;
 };
 
@@ -212,46 +190,72 @@ WeightsByBone weights_by_bone(const NormalisedInfluences& influences) {
     return found;
 }
 
-/// The moments of one bone about all vertices that it has any.
+/// The moments of kGroups bones about all vertices that they have any.
 class BoneSmoother {
 public:
     BoneSmoother(const Solver& solver, std::span<const double> mass, std::span<const Vec3<double>> points)
-        : solver_(solver), mass_(mass), points_(points), x_(points.size()), is_there_(points.size()) {}
+        : solver_(solver),
+          points_(points),
+          mass_(points.size()),
+          x_(kGroups * points.size()),
+          is_there_(points.size()) {
+        for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
+            mass_[solver.place(vertex)] = mass[vertex];
+        }
+    }
 
     /// Nothing where `goes_on()` is false.
+    ///
+    /// weights  [at most kGroups] of each bone
     template <class GoesOn>
-    std::vector<Found> find(std::span<const Weight> weights, double least, const GoesOn& goes_on) {
-        std::ranges::fill(x_, Columns{});
-        std::ranges::fill(is_there_, std::uint8_t{0});
-        for (const auto& [vertex, weight] : weights) {
-            const std::size_t place = solver_.place(vertex);
-            const Columns columns = columns_of(points_[vertex], static_cast<double>(weight));
-            for (std::size_t c = 0; c < kColumns; ++c) x_[place][c] += columns[c];
-            is_there_[place] = 1;
+    void find(std::span<const std::vector<Weight>* const> weights, double least, const GoesOn& goes_on,
+              std::span<std::vector<Found>> found) {
+        clear();
+        for (std::size_t bone = 0; bone < weights.size(); ++bone) {
+            for (const auto& [vertex, weight] : *weights[bone]) {
+                const std::size_t place = solver_.place(vertex);
+                Columns& x = x_[kGroups * place + bone];
+                const Columns columns = columns_of(points_[vertex], static_cast<double>(weight));
+                for (std::size_t c = 0; c < kColumns; ++c) x[c] += columns[c];
+                is_there_[place] = 1;
+            }
         }
         for (int step = 0; step < kSteps; ++step) {
-            if (!goes_on()) return {};
-            for (std::size_t vertex = 0; vertex < points_.size(); ++vertex) {
-                const std::size_t place = solver_.place(vertex);
+            if (!goes_on()) return;
+            for (std::size_t place = 0; place < points_.size(); ++place) {
                 if (is_there_[place] == 0) continue;
-                for (double& number : x_[place]) number *= mass_[vertex];
+                for (std::size_t bone = 0; bone < kGroups; ++bone) {
+                    for (double& number : x_[kGroups * place + bone]) number *= mass_[place];
+                }
             }
             solver_.solve(x_, is_there_);
         }
-        std::vector<Found> found;
         for (std::size_t vertex = 0; vertex < points_.size(); ++vertex) {
-            const Columns& moments = x_[solver_.place(vertex)];
-            if (moments[0] < least) continue;
-            found.push_back({static_cast<std::uint32_t>(vertex), moved_to(points_[vertex], moments)});
+            const std::size_t place = solver_.place(vertex);
+            if (is_there_[place] == 0) continue;
+            const Columns* const x = &x_[kGroups * place];
+            for (std::size_t bone = 0; bone < weights.size(); ++bone) {
+                if (x[bone][0] < least) continue;
+                found[bone].push_back(
+                    {static_cast<std::uint32_t>(vertex), moved_to(points_[vertex], x[bone])});
+            }
         }
-        return found;
     }
 
 private:
+    void clear() {
+        for (std::size_t place = 0; place < points_.size(); ++place) {
+            if (is_there_[place] == 0) continue;
+            std::fill_n(&x_[kGroups * place], kGroups, Columns{});
+            is_there_[place] = 0;
+        }
+    }
+
     const Solver& solver_;
-    std::span<const double> mass_;
     std::span<const Vec3<double>> points_;
-    std::vector<Columns> x_;
+    // As the solver has them.
+    std::vector<double> mass_;
+    std::vector<Columns> x_;  // [points][kGroups], 0 where nothing is there
     std::vector<std::uint8_t> is_there_;
 };
 
@@ -323,39 +327,52 @@ std::optional<std::vector<float>> direct_delta_mush(const BindData& data,
         point -= origin;
         size = std::max(size, glm::dot(point, point));
     }
-    std::vector<const WeightsByBone::value_type*> bones;
-    for (const auto& bone : by_bone) bones.push_back(&bone);
+    std::vector<std::int32_t> bones;
+    std::vector<const std::vector<Weight>*> weights;
+    for (const auto& [bone, own] : by_bone) {
+        bones.push_back(bone);
+        weights.push_back(&own);
+    }
     std::vector<std::vector<Found>> found(bones.size());
+    const std::size_t groups = (bones.size() + kGroups - 1) / kGroups;
     std::atomic<std::size_t> done{0};
     const double least = options.exact ? kLeastExact : kLeastMoment;
     const auto go_on = [&] {
-        const auto share = static_cast<double>(done.load(std::memory_order_relaxed)) /
-                           static_cast<double>(kSteps * bones.size());
+        const auto share =
+            static_cast<double>(done.load(std::memory_order_relaxed)) / static_cast<double>(kSteps * groups);
         return reporter.go_on(kShareOfFactor + (1.0 - kShareOfFactor) * share);
     };
     parallel_for(
-        bones.size(), options.threads > 0 ? options.threads : hardware_threads(),
+        groups, options.threads > 0 ? options.threads : hardware_threads(),
         [&](std::size_t begin, std::size_t end) {
             BoneSmoother smoother(solver, smoothing.mass, points);
-            for (std::size_t bone = begin; bone < end; ++bone) {
-                found[bone] = smoother.find(bones[bone]->second, least, [&] {
-                    const bool goes_on = go_on();
-                    done.fetch_add(1, std::memory_order_relaxed);
-                    return goes_on;
-                });
+            for (std::size_t group = begin; group < end; ++group) {
+                const std::size_t first = kGroups * group;
+                const std::size_t count = std::min(kGroups, bones.size() - first);
+                smoother.find(
+                    std::span(weights).subspan(first, count), least,
+                    [&] {
+                        const bool goes_on = go_on();
+                        done.fetch_add(1, std::memory_order_relaxed);
+                        return goes_on;
+                    },
+                    std::span(found).subspan(first, count));
             }
         },
         1);
     if (!go_on()) return std::nullopt;
 
+    std::size_t row_count = 0;
+    for (const std::vector<Found>& of_bone : found) row_count += of_bone.size();
     std::vector<float> rows;
+    rows.reserve(kMomentFloats * row_count);
     std::vector<std::size_t> next(bones.size());
     std::vector<std::pair<std::int32_t, const Found*>> of_vertex;
     for (std::uint32_t vertex = 0; vertex < vertex_count; ++vertex) {
         of_vertex.clear();
         for (std::size_t bone = 0; bone < bones.size(); ++bone) {
             if (next[bone] == found[bone].size() || found[bone][next[bone]].vertex != vertex) continue;
-            of_vertex.emplace_back(bones[bone]->first, &found[bone][next[bone]++]);
+            of_vertex.emplace_back(bones[bone], &found[bone][next[bone]++]);
         }
         if (influences.offsets[vertex] == influences.offsets[vertex + 1]) continue;
         if (of_vertex.empty()) continue;

@@ -348,12 +348,40 @@ void take_details(const MushFrame& frame, const Float4* rest, MushDetails* detai
     }
 }
 
+/// sqrt(x), x not negative; of less than any length that counts, something as small.
+template <class D>
+HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+    // As inverse_root().
+    x = hn::Max(x, hn::Set(d, 1e-37f));
+    const auto inverse = hn::ApproximateReciprocalSqrt(x);
+    const auto result = hn::Mul(x, inverse);
+    const auto half = hn::Mul(result, hn::Set(d, 0.5f));
+    return hn::MulAdd(half, hn::NegMulAdd(result, inverse, hn::Set(d, 1.0f)), result);
+#else
+    return hn::Sqrt(x);
+#endif
+}
+
+/// 1 / x, x positive. A division takes as long as the root.
+template <class D>
+HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+    const auto estimate = hn::ApproximateReciprocal(x);
+    return hn::Mul(estimate, hn::NegMulAdd(x, estimate, hn::Set(d, 2.0f)));
+#else
+    return hn::Div(hn::Set(d, 1.0f), x);
+#endif
+}
+
 /// Vertices [begin, begin + count) of a run, at most kLanes.
 ///
+/// kValence             neighbours of each vertex; 0: `valence`
 /// index_of(vertex, k)  the k-th neighbour of a vertex from `begin` on; kIsConsecutive: of the first alone
-template <bool kIsConsecutive, class Index>
+template <std::size_t kValence, bool kIsConsecutive, class Index>
 HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valence, std::size_t begin,
                                        std::size_t count, const Index& index_of) {
+    if constexpr (kValence > 0) valence = kValence;
     const Full d;
     using D = Full;
     const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
@@ -379,17 +407,39 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
                                            HWY_ATTR { return index_of(HWY_MIN(vertex, count - 1), k); };
                 edge = subtract<D>(collected_points(d, frame.from, of_vertex, lane), point);
             }
-            const auto squared = dot_of<D>(edge, edge);
-            const auto length = hn::Mul(squared, inverse_length(d, squared));
+            const auto length = root(d, dot_of<D>(edge, edge));
             sum = add_scaled<D>(sum, length, edge);
             lengths = hn::Add(lengths, length);
         }
         const auto divisor = hn::Mul(lengths, hn::Set(d, static_cast<float>(valence)));
         const auto factor = frame.is_uniform ? hn::Set(d, frame.factors[begin]) : hn::Load(d, factors + lane);
-        const auto share = hn::IfThenElseZero(hn::Gt(divisor, least), hn::Div(factor, lengths));
+        const auto share =
+            hn::IfThenElseZero(hn::Gt(divisor, least), hn::Mul(factor, reciprocal(d, lengths)));
         store_lanes(d, add_scaled<D>(point, share, sum), result, lane);
     }
     if (result == rest) std::copy_n(rest, count, frame.to + begin);
+}
+
+/// A run that is consecutive.
+template <std::size_t kValence>
+HWY_INLINE void smooth_consecutive_by_length(const MushFrame& frame, const MushRun& run) {
+    const std::int32_t* const neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    for (std::size_t i = run.begin; i < run.end; i += kLanes) {
+        const auto behind = static_cast<std::int32_t>(i - run.begin);
+        smooth_lanes_by_length<kValence, true>(frame, run.valence, i, HWY_MIN(kLanes, run.end - i),
+                                               [&](std::size_t, std::size_t k)
+                                                   HWY_ATTR { return neighbours[k] + behind; });
+    }
+}
+
+HWY_INLINE void smooth_others_by_length(const MushFrame& frame, const MushRun& run) {
+    const std::size_t valence = run.valence;
+    const std::int32_t* neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
+    for (std::size_t i = run.begin; i < run.end; i += kLanes, neighbours += kLanes * valence) {
+        smooth_lanes_by_length<0, false>(frame, valence, i, HWY_MIN(kLanes, run.end - i),
+                                         [&](std::size_t vertex, std::size_t k)
+                                             HWY_ATTR { return neighbours[vertex * valence + k]; });
+    }
 }
 
 /// An iteration by length.
@@ -397,25 +447,14 @@ void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end
     const MushMesh& mesh = *frame.mesh;
     for (std::size_t r = mesh.first_runs[begin]; r < mesh.first_runs[end]; ++r) {
         const MushRun& run = mesh.runs[r];
-        const std::size_t valence = run.valence;
-        if (valence == 0) {
+        if (run.valence == 0) {
             copy_run(frame, run);
-            continue;
-        }
-        const std::int32_t* neighbours = mesh.neighbours.data() + run.first_neighbour;
-        for (std::size_t i = run.begin; i < run.end; i += kLanes) {
-            const std::size_t count = HWY_MIN(kLanes, run.end - i);
-            if (run.is_consecutive) {
-                const auto behind = static_cast<std::int32_t>(i - run.begin);
-                smooth_lanes_by_length<true>(frame, valence, i, count,
-                                             [&](std::size_t, std::size_t k)
-                                                 HWY_ATTR { return neighbours[k] + behind; });
-            } else {
-                smooth_lanes_by_length<false>(frame, valence, i, count,
-                                              [&](std::size_t vertex, std::size_t k)
-                                                  HWY_ATTR { return neighbours[vertex * valence + k]; });
-                neighbours += kLanes * valence;
-            }
+        } else if (!run.is_consecutive) {
+            smooth_others_by_length(frame, run);
+        } else if (run.valence == 4) {
+            smooth_consecutive_by_length<4>(frame, run);
+        } else {
+            smooth_consecutive_by_length<0>(frame, run);
         }
     }
 }

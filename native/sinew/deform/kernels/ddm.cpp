@@ -115,16 +115,32 @@ public:
     bool is_resolved = false;
 };
 
-/// A row of a block, from the lanes at work on.
+/// The parts of a block's moments, from the lanes at work on.
+struct MomentRows {
+    const float* weight;
+    const float* first;
+    const float* second;
+};
+
+HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::size_t lane) {
+    const auto& first_rows = moments.blocks[b].first_rows;
+    const auto part = [&](MomentPart of) {
+        const auto i = static_cast<std::size_t>(of);
+        return moments.parts[i].data()[first_rows[i]].lane.data() + lane;
+    };
+    return {part(MomentPart::weight), part(MomentPart::first), part(MomentPart::second)};
+}
+
+/// A row of a part.
 template <class D>
-HWY_INLINE Vec<D> load_row(D d, const float* block, std::size_t row) {
-    return hn::Load(d, block + kLanes * row);
+HWY_INLINE Vec<D> load_row(D d, const float* part, std::size_t row) {
+    return hn::Load(d, part + kLanes * row);
 }
 
 /// Three rows that follow each other.
 template <class D>
-HWY_INLINE Points<D> load_point(D d, const float* block, std::size_t row) {
-    return {load_row(d, block, row), load_row(d, block, row + 1), load_row(d, block, row + 2)};
+HWY_INLINE Points<D> load_point(D d, const float* part, std::size_t row) {
+    return {load_row(d, part, row), load_row(d, part, row + 1), load_row(d, part, row + 2)};
 }
 
 /// The rows x, y, z of what `row` of a bone makes of a point and its weight, added to `sum`.
@@ -157,10 +173,9 @@ HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
 }
 
 template <bool kFirst, bool kPlain, bool kResolved, class D>
-HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* block,
+HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
                                    const Points<D>& centroid) {
     alignas(64) float space[kDdmNumbers];
-    const MomentLayout layout{bones.count};
     const Vec<D> zero = hn::Zero(d);
     Motion<D> sum{{zero, zero, zero, zero}, {zero, zero, zero}};
     if (!kPlain) {
@@ -169,15 +184,15 @@ HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const float* b
         if (kResolved) {
             for (std::size_t i = 0; i < 4; ++i) sum.rotation[i] = hn::Set(d, first[i]);
         } else {
-            add_signed<D>(d, first, load_row(d, block, layout.weight(0)), sum.rotation);
+            add_signed<D>(d, first, load_row(d, rows.weight, 3), sum.rotation);
         }
     }
     for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
         const float* const row = bones.row(k, space);
-        const Vec<D> weight = load_row(d, block, layout.weight(k));
+        const Vec<D> weight = load_row(d, rows.weight, 3 + k);
         Points<D> first;
         if constexpr (kFirst) {
-            first = load_point(d, block, layout.first(k));
+            first = load_point(d, rows.first, 3 * k);
         } else {
             first = {hn::Mul(weight, centroid.x), hn::Mul(weight, centroid.y), hn::Mul(weight, centroid.z)};
         }
@@ -208,9 +223,9 @@ struct Symmetric {
 };
 
 template <class D>
-HWY_INLINE Symmetric<D> load_symmetric(D d, const float* block, std::size_t at) {
-    return {load_row(d, block, at),     load_row(d, block, at + 1), load_row(d, block, at + 2),
-            load_row(d, block, at + 3), load_row(d, block, at + 4), load_row(d, block, at + 5)};
+HWY_INLINE Symmetric<D> load_symmetric(D d, const float* part, std::size_t at) {
+    return {load_row(d, part, at),     load_row(d, part, at + 1), load_row(d, part, at + 2),
+            load_row(d, part, at + 3), load_row(d, part, at + 4), load_row(d, part, at + 5)};
 }
 
 /// r m, the row r of three numbers, added to `sum`.
@@ -228,11 +243,11 @@ HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, con
 ///
 /// displacement  of the centroid
 template <bool kPlain, class D>
-HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* block, const Points<D>& centroid,
-                                const Points<D>& displacement, const float* from_model) {
+HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows& rows,
+                                const Points<D>& centroid, const Points<D>& displacement,
+                                const float* from_model) {
     alignas(64) float space[kDdmNumbers];
-    const MomentLayout layout{bones.count};
-    const Symmetric<D> total = load_symmetric(d, block, layout.total());
+    const Symmetric<D> total = load_symmetric(d, rows.second, 0);
     Rows3<D> sum{
         {total.xx, total.xy, total.xz}, {total.xy, total.yy, total.yz}, {total.xz, total.yz, total.zz}};
     const auto add_rows = [&](const float* x, const float* y, const float* z, const Symmetric<D>& m)
@@ -250,14 +265,14 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const float* bloc
     const Vec<D> zero = hn::Zero(d);
     for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
         const float* const row = bones.row(k, space);
-        add_rows(row + 4, row + 8, row + 12, load_symmetric(d, block, layout.second(k)));
+        add_rows(row + 4, row + 8, row + 12, load_symmetric(d, rows.second, 6 + 6 * k));
         // Only what bones differ by counts, as the first moments about the centroid have sum 0.
         Points<D> moved =
             kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
                    : Points<D>{zero, zero, zero};
         add_moved<D>(d, row, centroid, one, moved);
-        const Vec<D> weight = load_row(d, block, layout.weight(k));
-        const Points<D> by = add_scaled<D>(load_point(d, block, layout.first(k)), hn::Neg(weight), centroid);
+        const Vec<D> weight = load_row(d, rows.weight, 3 + k);
+        const Points<D> by = add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
         sum.x = add_scaled<D>(sum.x, moved.x, by);
         sum.y = add_scaled<D>(sum.y, moved.y, by);
         sum.z = add_scaled<D>(sum.z, moved.z, by);
@@ -419,10 +434,10 @@ HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const flo
 
 /// Whether the neighbourhood is a point: see Ddm.
 ///
-/// total  the row of the sum of second moments
+/// second  the part of second moments
 template <class D>
-HWY_INLINE hn::Mask<D> is_point_at(D d, const float* block, std::size_t total, const Points<D>& centroid) {
-    const Points<D> diagonal = load_point(d, block, total);
+HWY_INLINE hn::Mask<D> is_point_at(D d, const float* second, const Points<D>& centroid) {
+    const Points<D> diagonal = load_point(d, second, 0);
     const Vec<D> extent = hn::Add(diagonal.x, hn::Add(diagonal.y, diagonal.z));
     const Vec<D> square = hn::MulAdd(centroid.x, centroid.x,
                                      hn::MulAdd(centroid.y, centroid.y, hn::Mul(centroid.z, centroid.z)));
@@ -454,15 +469,15 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
 template <Variant kVariant, bool kPlain, bool kResolved, class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
-    const float* const block = frame.moments->rows[frame.moments->blocks[b].first_row].lane.data() + lane;
-    Points<D> centroid = load_point(d, block, 0);
+    const MomentRows rows = rows_of(*frame.moments, b, lane);
+    Points<D> centroid = load_point(d, rows.weight, 0);
     Motion<D> motion =
-        blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, block, centroid);
+        blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, rows, centroid);
     if constexpr (kVariant == Variant::nearest) {
         const Rows3<D> matrix =
-            correlation<kPlain>(d, bones, block, centroid, motion.displacement, spaces.bones_from_model);
-        to_nearest(d, matrix, is_point_at(d, block, MomentLayout{bones.count}.total(), centroid),
-                   spaces.bones_from_model, motion.rotation);
+            correlation<kPlain>(d, bones, rows, centroid, motion.displacement, spaces.bones_from_model);
+        to_nearest(d, matrix, is_point_at(d, rows.second, centroid), spaces.bones_from_model,
+                   motion.rotation);
     }
     const Points<D> rest = load_rest(d, pointers.rows + pointers.blocks[b].first_row, spaces, lane);
     if (spaces.bones_from_model != nullptr) centroid = displaced(d, spaces.bones_from_model, centroid);
