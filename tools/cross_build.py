@@ -35,7 +35,6 @@ GOOGLETEST = Path("/usr/src/googletest")
 TESTS = ("sinew_deform_tests", "sinew_tests", "sinew_quiet_tests")
 
 
-
 def fail(message: str) -> None:
     raise SystemExit(f"cross_build: {message}")
 
@@ -50,7 +49,9 @@ class Python:
 
 
 def python_of(executable: Path) -> Python:
-    code = "import sys, sysconfig; print(sysconfig.get_path('include')); print('%d.%d' % sys.version_info[:2])"
+    code = (
+        "import sys, sysconfig; print(sysconfig.get_path('include')); print('%d.%d' % sys.version_info[:2])"
+    )
     done = subprocess.run([executable, "-I", "-c", code], capture_output=True, text=True, check=True)
     include, version = done.stdout.splitlines()
     return Python(executable, version, Path(include))
@@ -89,7 +90,9 @@ def compilers(platform: Platform) -> dict[str, str]:
 
 def environment() -> dict[str, str]:
     # zig keeps what it makes of the C and C++ libraries in a folder of its own.
-    kept = {key: value for key, value in os.environ.items() if key not in ("CXX", "CC", "CXXFLAGS", "LDFLAGS")}
+    kept = {
+        key: value for key, value in os.environ.items() if key not in ("CXX", "CC", "CXXFLAGS", "LDFLAGS")
+    }
     return kept | {"ZIG_GLOBAL_CACHE_DIR": str(BUILD / "zig"), "SOURCE_DATE_EPOCH": "315532800"}
 
 
@@ -269,14 +272,15 @@ def record_line(name: str, data: bytes) -> str:
     return f"{name},sha256={digest},{len(data)}"
 
 
-def write_wheel(module: Path, tag: str, out: Path) -> Path:
+def write_wheel(module: Path, tag: str, described: dict[str, bytes], out: Path) -> Path:
+    """described: as of metadata()"""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     stem = f"sinew_skinning-{version}"
     info = f"{stem}.dist-info"
-    described = f"Wheel-Version: 1.0\nGenerator: sinew\nRoot-Is-Purelib: false\nTag: {tag}\n\n"
     files = package_files() | {f"sinew/{module.name}": module.read_bytes()}
-    files |= {f"{info}/{name}": data for name, data in metadata().items()}
-    files[f"{info}/WHEEL"] = described.encode()
+    files |= {f"{info}/{name}": data for name, data in described.items()}
+    built = f"Wheel-Version: 1.0\nGenerator: sinew\nRoot-Is-Purelib: false\nTag: {tag}\n\n"
+    files[f"{info}/WHEEL"] = built.encode()
     lines = [record_line(name, files[name]) for name in sorted(files)] + [f"{info}/RECORD,,"]
     files[f"{info}/RECORD"] = ("\n".join(lines) + "\n").encode()
     wheel = out / f"{stem}-{tag}.whl"
@@ -284,8 +288,10 @@ def write_wheel(module: Path, tag: str, out: Path) -> Path:
     return wheel
 
 
-AUDITED = re.compile(r'(?:consistent\s+with\s+the\s+following\s+platform\s+tag|constrains\s+the\s+platform\s+tag\s+to)'
-                     r'[:\s]+"(?P<tag>\w+)"')
+AUDITED = re.compile(
+    r"(?:consistent\s+with\s+the\s+following\s+platform\s+tag|constrains\s+the\s+platform\s+tag\s+to)"
+    r'[:\s]+"(?P<tag>\w+)"'
+)
 
 
 def audit(wheel: Path, platform: Platform) -> None:
@@ -302,10 +308,11 @@ def audit(wheel: Path, platform: Platform) -> None:
 
 def build_wheels(platform: Platform, pythons: list[Python], out: Path) -> list[Path]:
     log = start_log(platform)
+    described = metadata()
     made = []
     for python in pythons:
         module = build_module(platform, python, log)
-        wheel = write_wheel(module, platform.wheel_tag(python.version), out)
+        wheel = write_wheel(module, platform.wheel_tag(python.version), described, out)
         if platform.is_linux:
             audit(wheel, platform)
         made.append(wheel)
@@ -316,7 +323,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("platform", choices=PLATFORMS)
     parser.add_argument("--tests", action="store_true", help="the programs of the C++ tests")
-    parser.add_argument("--python", type=Path, action="append", default=[], help="a Python to make a wheel for")
+    parser.add_argument(
+        "--python", type=Path, action="append", default=[], help="a Python to make a wheel for"
+    )
     parser.add_argument("--out", type=Path, default=ROOT / "dist/platforms", help="folder for the wheels")
     options = parser.parse_args()
     platform = PLATFORMS[options.platform]

@@ -65,9 +65,7 @@ PLATFORMS = {
             "manylinux_2_28_aarch64",
             "cpython-{digits}-aarch64-linux-gnu.so",
         ),
-        Platform(
-            "windows-x64", "x86_64-windows-gnu", "Windows", "AMD64", "win_amd64", "{tag}-win_amd64.pyd"
-        ),
+        Platform("windows-x64", "x86_64-windows-gnu", "Windows", "AMD64", "win_amd64", "{tag}-win_amd64.pyd"),
         Platform(
             "windows-arm64", "aarch64-windows-gnu", "Windows", "ARM64", "win_arm64", "{tag}-win_arm64.pyd"
         ),

@@ -72,7 +72,9 @@ def split(package: Path, out: Path) -> list[Path]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("packages", type=Path, nargs="+", metavar="package", help="a zip that ./dev package made")
+    parser.add_argument(
+        "packages", type=Path, nargs="+", metavar="package", help="a zip that ./dev package made"
+    )
     parser.add_argument("--out", type=Path, help="folder for the zips")
     options = parser.parse_args()
     for package in options.packages:

@@ -29,13 +29,20 @@ __declspec(dllimport) int Py_Main(int count, wchar_t** words);
 int wmain(int count, wchar_t** words) { return Py_Main(count, words); }
 """
 # Of the standard library: what only Python's own tests and programs with windows need, and other systems' modules.
-LEFT_OUT = ("test", "idlelib", "tkinter", "turtledemo", "site-packages", "dist-packages", "lib-dynload", "__pycache__")
+LEFT_OUT = (
+    "test",
+    "idlelib",
+    "tkinter",
+    "turtledemo",
+    "site-packages",
+    "dist-packages",
+    "lib-dynload",
+    "__pycache__",
+)
 
 
 def pip(*words: str | Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pip", *words], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-m", "pip", *words], capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"windows_python: pip {words[0]} failed:\n{done.stdout}{done.stderr}")
 
@@ -91,7 +98,15 @@ def main() -> None:
         unfinished.rename(folder)
     if options.packages:
         target = folder / "Lib/site-packages"
-        pip("install", "--upgrade", "--no-compile", "--target", target, *for_windows(version), *options.packages)
+        pip(
+            "install",
+            "--upgrade",
+            "--no-compile",
+            "--target",
+            target,
+            *for_windows(version),
+            *options.packages,
+        )
     print(folder / "python.exe")
 
 
