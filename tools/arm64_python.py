@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes a Python for Linux on arm64, to be run by qemu, of Debian's packages: for tests on a Debian machine.
 
-The packages are unpacked into a folder of their own, of this Debian's release; nothing is installed on the machine.
-Packages of Python are installed beside it, as wheels for arm64. Prints a script that runs it. It needs this Debian's own
-Python, as that has the version of the release.
+The packages are unpacked into a folder of their own, of this Debian's release; nothing is installed on the
+machine. Packages of Python are installed beside it, as wheels for arm64. Prints a script that runs it. It
+needs this Debian's own Python, as that has the version of the release.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def main() -> None:
     options = parser.parse_args()
     if not shutil.which(QEMU):
         raise SystemExit(f"arm64_python: {QEMU} is not here.")
-    version = "%d.%d" % sys.version_info[:2]
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
     root = BUILD / f"arm64-python{version}"
     if not root.exists():
         unfinished = Path(tempfile.mkdtemp(dir=BUILD))

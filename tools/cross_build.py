@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the library for another platform by zig: wheels for several Pythons, or the C++ tests.
 
-The Python that runs this has ziglang, pybind11, scikit-build-core and auditwheel. Prints what it made. The module is
-one file with the library in it, as two files with the standard library in each could not throw to each other.
+The Python that runs this has ziglang, pybind11, scikit-build-core and auditwheel. Prints what it made. The
+module is one file with the library in it, as two files with the standard library in each could not throw
+to each other.
 """
 
 from __future__ import annotations

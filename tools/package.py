@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Puts the extension and the library's wheels into dist/sinew-VERSION.zip, and prints its path.
 
-Bundled are the wheels of this version in dist/wheels/, wherever they were built; or those of one platform, which
-tools/cross_build.py built, into dist/platforms/sinew-VERSION-PLATFORM.zip, as Blender names it. The zip's manifest
-names them (`wheels`) and their systems (`platforms`); the same files always give the same bytes.
+Bundled are the wheels of this version in dist/wheels/, wherever they were built; or those of one platform,
+which tools/cross_build.py built, into dist/platforms/sinew-VERSION-PLATFORM.zip, as Blender names it. The
+zip's manifest names them (`wheels`) and their systems (`platforms`); the same files always give the same
+bytes.
 """
 
 from __future__ import annotations

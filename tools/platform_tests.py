@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the tests of a platform that another system emulates: linux-arm64 by qemu, windows-x64 by wine.
 
-C++ tests, then the Python tests in a Python of that platform, then for Windows some of the Blender tests in Blender's
-own build of bpy. The Python that runs this has what tools/cross_build.py wants; wheels that it does not have are fetched
-from the registry.
+C++ tests, then the Python tests in a Python of that platform, then for Windows some of the Blender tests
+in Blender's own build of bpy. The Python that runs this has what tools/cross_build.py wants; wheels that
+it does not have are fetched from the registry.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splits the extension's zip into one for each platform, and validates them, both by Blender's own program. Without a
-folder for these, zips are validated as they are.
+"""Splits the extension's zip into one for each platform, and validates them, both by Blender's own program.
+Without a folder for these, zips are validated as they are.
 
 The Python that runs this needs bpy, as .venv has it: Blender's program for extensions lies within.
 """

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes a Python for Windows, to be run by wine, of what the Python registry has: for tests on other systems.
 
-python3xx.dll and the compiled part of the standard library come from a wheel of panda3d, which takes them along for the
-programs that it packs; the rest of the standard library is the same on all systems, and so a copy of this Python's;
-python.exe is a program of one line. Packages are installed beside it, as wheels for Windows. Prints python.exe.
+python3xx.dll and the compiled part of the standard library come from a wheel of panda3d, which takes them
+along for the programs that it packs; the rest of the standard library is the same on all systems, and so a
+copy of this Python's; python.exe is a program of one line. Packages are installed beside it, as wheels for
+Windows. Prints python.exe.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("packages", nargs="*", help="requirements, or wheels for Windows")
     options = parser.parse_args()
-    version = "%d.%d" % sys.version_info[:2]
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
     folder = BUILD / f"windows-python{version}"
     if not (folder / "python.exe").exists():
         unfinished = Path(tempfile.mkdtemp(dir=BUILD))
