@@ -68,7 +68,7 @@ def zig_program() -> Path:
 
 
 def compilers(platform: Platform) -> dict[str, str]:
-    """CMake's names of the tools, each a script: CMake takes a program where zig wants a program and a word."""
+    """CMake's names of the tools, each a script: it takes programs, and zig wants a word behind."""
     folder = BUILD / platform.name / "bin"
     folder.mkdir(parents=True, exist_ok=True)
     words = {
@@ -130,7 +130,7 @@ def collect_python_headers(python: Python) -> Path:
     return target
 
 
-EXPORTED = re.compile(r"\bPyAPI_(FUNC|DATA)\(\s*([^()]|\([^()]*\))*\)\s*(?P<name>\w+)")
+EXPORTED = re.compile(r"\bPyAPI_(FUNC|DATA)\(\s*([^()]|\([^()]*\))*\)\s*(?P<name>_{0,2}Py\w+)")
 
 
 def exported_names(include: Path) -> dict[str, bool]:

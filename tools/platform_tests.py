@@ -21,7 +21,7 @@ from cross_build import BUILD, ROOT, build_tests, build_wheels, python_of
 from platforms import PLATFORMS, Platform
 
 PARTS = ("native", "python", "blender")
-# Shapes as Blender's, Sinew added and removed, files saved and read; without windows and without other processes.
+# Shapes as Blender's, Sinew added and removed, files saved and read.
 BLENDER_TESTS = ("test_against_armature_modifier", "test_changes", "test_restore", "test_saved_files")
 BPY = "bpy==4.5.*"
 # As long as it takes on a machine of two processors, some times over.

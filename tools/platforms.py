@@ -14,7 +14,7 @@ class Platform:
     system      CMAKE_SYSTEM_NAME
     processor   CMAKE_SYSTEM_PROCESSOR
     wheel       the platform's tag in the name of a wheel
-    module      what follows "_native." in the name of a module of Python; {tag} is such as cp311, {digits} as 311
+    module      what follows "_native." in a module's name; {tag} is such as cp311, {digits} as 311
     """
 
     name: str
@@ -42,7 +42,7 @@ class Platform:
         return f"{tag}-{tag}-{self.wheel}"
 
 
-# The C library of Blender's own builds for Linux; the macOS that Blender 4.2 and later run on is 11.2 or newer.
+# The C library of Blender's own builds for Linux; its macOS is 11.2.
 LINUX = "linux-gnu.2.28"
 MACOS = "macos.11.0"
 

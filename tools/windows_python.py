@@ -29,7 +29,7 @@ PROGRAM = """\
 __declspec(dllimport) int Py_Main(int count, wchar_t** words);
 int wmain(int count, wchar_t** words) { return Py_Main(count, words); }
 """
-# Of the standard library: what only Python's own tests and programs with windows need, and other systems' modules.
+# Of the standard library: what only Python's own tests and windows need, and other systems' modules.
 LEFT_OUT = (
     "test",
     "idlelib",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The platforms that tools/cross_build.py builds for have one name and one place each. Nothing is built here."""
+"""The platforms that tools/cross_build.py builds for have one name each. Nothing is built here."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_modules_are_named_as_python_looks_for_them():
     assert suffixes["windows-x64"] == ".cp311-win_amd64.pyd"
     assert suffixes["macos-arm64"] == ".cpython-311-darwin.so"
     here = sysconfig.get_config_var("EXT_SUFFIX")
-    version = "%d.%d" % sys.version_info[:2]
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
     assert here in {platform.module_suffix(version) for platform in PLATFORMS.values()}
 
 
