@@ -37,6 +37,7 @@
 #define MS_WIN32
 #define MS_WIN64
 #define MS_WINDOWS
+#define NT_THREADS 1
 /* Python is a DLL: what is taken from it is declared as imported. */
 #define HAVE_DECLSPEC_DLL
 #define Py_ENABLE_SHARED 1
