@@ -11,9 +11,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,12 +40,36 @@ def environment() -> dict[str, str]:
 
 
 def run(words: Sequence[str | Path], limit: int) -> int:
-    """The exit code; 124 as timeout(1) has it where there is no end in time."""
+    """Runs a program and prints what it prints; its exit code, or 124, as timeout(1) has it, where there is no
+    end in time. Wine's programs fail where standard output is a file, so they have a pipe."""
+    process = subprocess.Popen(
+        words,
+        cwd=ROOT,
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    late = threading.Event()
+
+    def end() -> None:
+        late.set()
+        os.killpg(process.pid, signal.SIGKILL)
+
+    timer = threading.Timer(limit, end)
+    timer.start()
     try:
-        return subprocess.run(words, cwd=ROOT, env=environment(), timeout=limit, check=False).returncode
-    except subprocess.TimeoutExpired:
+        for line in process.stdout or ():
+            sys.stdout.buffer.write(line)
+            sys.stdout.flush()
+        status = process.wait()
+    finally:
+        timer.cancel()
+    if late.is_set():
         print(f"no end after {limit} s")
         return 124
+    return status
 
 
 def output_of(*words: str | Path) -> Path:
@@ -52,8 +79,6 @@ def output_of(*words: str | Path) -> Path:
 
 def requirements(chosen: Sequence[str]) -> list[str]:
     """Those of the extension, without Sinew and Blender, and of its tests."""
-    import tomllib
-
     project = tomllib.loads((ROOT / "addon/pyproject.toml").read_text())["project"]
     needed = [name for name in project["dependencies"] if not name.startswith(("sinew-skinning", "bpy"))]
     return [*needed, *chosen]
