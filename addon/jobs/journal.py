@@ -169,7 +169,8 @@ def _is_inside(path: object) -> bool:
     if not isinstance(path, str) or not path or "\0" in path:
         return False
     pure = PurePath(path)
-    return not pure.is_absolute() and not pure.drive and ".." not in pure.parts
+    # On Windows a path without a drive leads away, too, and is none that is absolute.
+    return not pure.anchor and ".." not in pure.parts
 
 
 def content_hash(path: Path) -> str | None:
