@@ -24,6 +24,12 @@ if(NOT HWY_INCLUDE_DIR)
   set(HWY_INCLUDE_DIR "${highway_SOURCE_DIR}")
 endif()
 target_include_directories(hwy_headers SYSTEM INTERFACE "${HWY_INCLUDE_DIR}")
+# Newer ones have several instruction sets for 64-bit ARM (targets.h), told apart here, as none of its headers may be
+# included before the choice.
+file(STRINGS "${HWY_INCLUDE_DIR}/hwy/detect_targets.h" several_neon REGEX "define HWY_NEON_WITHOUT_AES")
+if(several_neon)
+  target_compile_definitions(hwy_headers INTERFACE SINEW_HWY_HAS_NEON_WITHOUT_AES)
+endif()
 
 find_package(Threads REQUIRED)
 

@@ -36,8 +36,17 @@ public:
     [[nodiscard]] static constexpr Counted input(double value) { return {value, false}; }
     [[nodiscard]] double value() const { return value_; }
 
-    /// Counts go here until the next call.
-    static void count_in(Operations& operations) { counts_ = &operations; }
+    /// While it lives, counts go to its operations.
+    class CountIn {
+    public:
+        explicit CountIn(Operations& operations) : before_(counts_) { counts_ = &operations; }
+        CountIn(const CountIn&) = delete;
+        CountIn& operator=(const CountIn&) = delete;
+        ~CountIn() { counts_ = before_; }
+
+    private:
+        Operations* before_;
+    };
 
     friend Counted operator+(Counted a, Counted b) {
         if (a.is(0)) return b;

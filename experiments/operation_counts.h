@@ -66,7 +66,7 @@ std::array<Transform<Counted>, 3> inputs() {
 template <class Task>
 Operations counted(Task task) {
     Operations operations;
-    Counted::count_in(operations);
+    const Counted::CountIn counting(operations);
     task();
     return operations;
 }

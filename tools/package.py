@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Puts the extension and the library's wheels into dist/sinew-VERSION.zip, and prints its path.
 
-Bundled are the wheels of this version in dist/wheels/, wherever they were built. The zip's manifest names
-them (`wheels`) and their systems (`platforms`); the same files always give the same bytes.
+Bundled are the wheels of this version in dist/wheels/, wherever they were built; or those of one platform,
+which tools/cross_build.py built, into dist/platforms/sinew-VERSION-PLATFORM.zip, as Blender names it. The
+zip's manifest names them (`wheels`) and their systems (`platforms`); the same files always give the same
+bytes.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ PLATFORMS = {
     r"win_amd64": ["windows-x64"],
     r"win_arm64": ["windows-arm64"],
 }
+ALL_PLATFORMS = {name for names in PLATFORMS.values() for name in names}
 # The earliest date that a zip can hold.
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -72,10 +75,10 @@ def recorded_wheels(stamps: Path | None) -> dict[str, tuple[str, str]]:
     return records
 
 
-def select_wheels(version: str, stamps: Path | None, sources: str | None) -> list[Wheel]:
+def select_wheels(folder: Path, version: str, stamps: Path | None, sources: str | None) -> list[Wheel]:
     records = recorded_wheels(stamps)
     chosen: dict[tuple[str, tuple[str, ...]], Wheel] = {}
-    for path in sorted((ROOT / "dist/wheels").glob("*.whl")):
+    for path in sorted(folder.glob("*.whl")):
         wheel = Wheel(path)
         if wheel.version != version:
             continue
@@ -88,7 +91,7 @@ def select_wheels(version: str, stamps: Path | None, sources: str | None) -> lis
         if key not in chosen or wheel.is_portable:
             chosen[key] = wheel
     if not chosen:
-        raise SystemExit(f"package: dist/wheels/ holds no wheel of version {version}")
+        raise SystemExit(f"package: {folder.relative_to(ROOT)}/ holds no wheel of version {version}")
     return [chosen[key] for key in sorted(chosen)]
 
 
@@ -150,6 +153,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--stamps", type=Path, help="folder of ./dev's records of the wheels that it built")
     parser.add_argument("--sources", help="digest of the native sources as they are now")
+    parser.add_argument("--platform", choices=sorted(ALL_PLATFORMS), help="the only one that the zip is for")
     options = parser.parse_args()
 
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
@@ -157,14 +161,20 @@ def main() -> None:
     if tomllib.loads(manifest)["version"] != version:
         raise SystemExit(f"package: addon/blender_manifest.toml is not of pyproject.toml's version {version}")
 
-    wheels = select_wheels(version, options.stamps, options.sources)
+    folder, name = ROOT / "dist/wheels", f"sinew-{version}.zip"
+    if options.platform:
+        folder = ROOT / "dist/platforms" / options.platform
+        name = f"platforms/sinew-{version}-{options.platform.replace('-', '_')}.zip"
+    wheels = select_wheels(folder, version, options.stamps, options.sources)
+    if options.platform and any(wheel.platforms != [options.platform] for wheel in wheels):
+        raise SystemExit(f"package: {folder.relative_to(ROOT)}/ holds a wheel for another platform")
     warn_of_gaps(wheels)
     files = {path.relative_to(ADDON).as_posix(): path.read_bytes() for path in shipped_files(ADDON)}
     files["blender_manifest.toml"] = manifest_with_wheels(manifest, wheels).encode()
-    for name in ("LICENSE", "NOTICES.md"):
-        files[name] = (ROOT / name).read_bytes()
+    for notice in ("LICENSE", "NOTICES.md"):
+        files[notice] = (ROOT / notice).read_bytes()
     files |= {f"wheels/{wheel.path.name}": wheel.path.read_bytes() for wheel in wheels}
-    target = ROOT / "dist" / f"sinew-{version}.zip"
+    target = ROOT / "dist" / name
     write_zip(target, files)
     print(target.relative_to(ROOT).as_posix())
 

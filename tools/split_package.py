@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splits the extension's zip into one for each platform, and validates them, both by Blender's own program.
+Without a folder for these, zips are validated as they are.
 
 The Python that runs this needs bpy, as .venv has it: Blender's program for extensions lies within.
 """
@@ -71,12 +72,15 @@ def split(package: Path, out: Path) -> list[Path]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("package", type=Path, help="the zip that ./dev package made")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the zips")
+    parser.add_argument(
+        "packages", type=Path, nargs="+", metavar="package", help="a zip that ./dev package made"
+    )
+    parser.add_argument("--out", type=Path, help="folder for the zips")
     options = parser.parse_args()
-    validate(options.package)
-    for path in split(options.package, options.out):
-        print(path)
+    for package in options.packages:
+        validate(package)
+        for path in split(package, options.out) if options.out else []:
+            print(path)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import sys
@@ -192,4 +193,8 @@ def take_over_output() -> Console:
 
 def keep_output() -> Console:
     """Standard output and error shared with Blender, for `--verbose`."""
+    for stream in (sys.stdout, sys.stderr):
+        # Where there is no UTF-8, as in many of Windows' consoles: shown is what can be.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     return Console(sys.stdout, sys.stderr, verbose=True)

@@ -70,7 +70,7 @@ class Journal:
             os.fsync(self._file.fileno())
         except OSError as error:
             # Removes the part of the line that fitted on a full disk: only a last line may be half-written.
-            os.truncate(self.path, end)
+            self._file.truncate(end)
             raise SinewError(
                 f"{self.path}: can not be written: {error.strerror}; what was done is in it, --resume goes on"
             ) from None
@@ -127,7 +127,7 @@ class Journal:
         content = self._file.read()
         whole = content.rfind(b"\n") + 1
         if whole < len(content):
-            os.truncate(self.path, whole)
+            self._file.truncate(whole)
         latest = {}
         for line in content[:whole].splitlines():
             # After a loss of power, or in a folder made by somebody else, a line can be anything: it is
@@ -169,7 +169,8 @@ def _is_inside(path: object) -> bool:
     if not isinstance(path, str) or not path or "\0" in path:
         return False
     pure = PurePath(path)
-    return not pure.is_absolute() and not pure.drive and ".." not in pure.parts
+    # On Windows a path without a drive leads away, too, and is none that is absolute.
+    return not pure.anchor and ".." not in pure.parts
 
 
 def content_hash(path: Path) -> str | None:

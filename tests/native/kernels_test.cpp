@@ -9,6 +9,7 @@
 
 #include "scene.h"
 #include "sinew/deform/simd.h"
+#include "sinew/deform/x86_support.h"
 
 namespace sinew {
 namespace {
@@ -293,6 +294,21 @@ TEST_P(Kernels, write_no_other_point) {
     EXPECT_TRUE(same_bits(points.back(), mark));
     for (std::size_t i = 1; i + 1 < points.size(); ++i) ASSERT_FALSE(same_bits(points[i], mark));
 }
+
+#if defined(__x86_64__) && defined(__linux__)
+TEST(SimdTargets, x86_support_is_what_the_compiler_finds) {
+    __builtin_cpu_init();
+    const X86Support support = x86_support();
+    EXPECT_EQ(support.ssse3, __builtin_cpu_supports("ssse3") != 0);
+    EXPECT_EQ(support.sse4, support.ssse3 && __builtin_cpu_supports("sse4.2") &&
+                                __builtin_cpu_supports("aes") && __builtin_cpu_supports("pclmul"));
+    EXPECT_EQ(support.avx2, support.sse4 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                                __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"));
+    EXPECT_EQ(support.avx3, support.avx2 && __builtin_cpu_supports("avx512f") &&
+                                __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512bw") &&
+                                __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"));
+}
+#endif
 
 TEST(SimdTargets, one_is_in_use) {
     const auto targets = simd_targets();

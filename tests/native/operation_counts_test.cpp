@@ -23,7 +23,7 @@ std::pair<int, int> as_report(const Operations& o) { return {o.additions + o.dou
 
 TEST(Counted, CountsEachKindOnce) {
     Operations o;
-    Counted::count_in(o);
+    const Counted::CountIn counting(o);
     const Counted x = Counted::input(2.0);
     const Counted y = Counted::input(3.0);
     EXPECT_EQ((x * y + y / x - sqrt(x)).value(), 6.0 + 1.5 - std::sqrt(2.0));
@@ -42,13 +42,29 @@ TEST(Counted, CountsEachKindOnce) {
 
 TEST(Counted, ConstantsCostNothingButWhatTheyDoToOthers) {
     Operations o;
-    Counted::count_in(o);
+    const Counted::CountIn counting(o);
     const Counted x = Counted::input(0.0);  // a 0 that the source does not know
     EXPECT_EQ((Counted(1) * x + Counted(0) - Counted(0) * x).value(), 0.0);
     EXPECT_EQ((Counted(3) * Counted(5) + Counted(0.5)).value(), 15.5);
     EXPECT_EQ(o.total(), 0);
     static_cast<void>(x * x + x);
     EXPECT_EQ(o.total(), 2);
+}
+
+TEST(Counted, CountsWhileItIsTold) {
+    const Counted x = Counted::input(2.0);
+    Operations outer, inner;
+    {
+        const Counted::CountIn counting(outer);
+        {
+            const Counted::CountIn counting_inner(inner);
+            static_cast<void>(x * x);
+        }
+        static_cast<void>(x + x);
+    }
+    static_cast<void>(x + x);
+    EXPECT_EQ(inner.total(), 1);
+    EXPECT_EQ(outer.total(), 1);
 }
 
 TEST(Counted, ComputesWhatDoubleComputes) {

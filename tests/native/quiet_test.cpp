@@ -18,12 +18,32 @@
 #include <dlfcn.h>
 #include <pthread.h>
 #endif
+#ifdef _WIN32
+#include <malloc.h>
+#endif
 
 namespace {
 
 std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<std::size_t> bytes{0};
+
+// Windows has other functions for aligned memory, with an end of their own.
+void* allocate_aligned(std::size_t unit, std::size_t size) {
+#ifdef _WIN32
+    return _aligned_malloc(size, unit);
+#else
+    return std::aligned_alloc(unit, (size + unit - 1) / unit * unit);
+#endif
+}
+
+void free_aligned(void* memory) {
+#ifdef _WIN32
+    _aligned_free(memory);
+#else
+    std::free(memory);
+#endif
+}
 
 }  // namespace
 
@@ -41,7 +61,7 @@ void* operator new(std::size_t size) {
 void* operator new(std::size_t size, std::align_val_t alignment) {
     allocations.fetch_add(1);
     const auto unit = static_cast<std::size_t>(alignment);
-    if (void* const memory = std::aligned_alloc(unit, (size + unit - 1) / unit * unit)) return memory;
+    if (void* const memory = allocate_aligned(unit, size)) return memory;
     throw std::bad_alloc();
 }
 
@@ -50,12 +70,12 @@ void* operator new[](std::size_t size, std::align_val_t alignment) { return oper
 
 void operator delete[](void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { free_aligned(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { free_aligned(memory); }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { free_aligned(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { free_aligned(memory); }
 
 // The thread sanitizer defines its own.
 #if defined(__GLIBC__) && !defined(__SANITIZE_THREAD__)

@@ -7,6 +7,7 @@ It opens a copy of the open file, saved beside what is written, and does there w
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,7 @@ import bpy
 
 from ...blender_process import BlenderLost, BlenderProcess, Limits
 from ...core.errors import SinewError
-from ...core.output import remove
+from ...core.output import remove, sentence
 from ...io import files
 from . import bake, bake_export
 
@@ -91,7 +92,7 @@ def _copy(started: Export) -> Iterator[Path]:
         _link_caches(link)
         yield copy
     finally:
-        remove(link)
+        _remove_caches(link)
         remove(copy)
 
 
@@ -106,5 +107,16 @@ def _link_caches(link: Path) -> None:
         return
     try:
         link.symlink_to(caches, target_is_directory=True)
-    except OSError as error:
-        raise SinewError(f"{caches}: a copy of the file can not use it: {error.strerror}") from None
+    except OSError:
+        # Windows lets few users make links.
+        try:
+            shutil.copytree(caches, link)
+        except OSError as error:
+            raise SinewError(f"{caches}: a copy of the file can not use it: {sentence(error)}") from None
+
+
+def _remove_caches(link: Path) -> None:
+    if link.is_dir() and not link.is_symlink():
+        shutil.rmtree(link, ignore_errors=True)
+    else:
+        remove(link)

@@ -9,6 +9,7 @@
 #include "hwy/highway.h"
 #include "sinew/deform/kernels.h"
 #include "sinew/deform/simd.h"
+#include "sinew/deform/x86_support.h"
 
 namespace sinew {
 namespace {
@@ -21,23 +22,13 @@ std::string_view name_of_target(std::size_t target) { return hwy::TargetName(kTa
 bool runs_here(std::int64_t bit) {
     // What the compiler may use anywhere.
     if (bit == HWY_STATIC_TARGET) return true;
-#if HWY_ARCH_X86 && (HWY_COMPILER_GCC || HWY_COMPILER_CLANG)
-    __builtin_cpu_init();
-    const bool ssse3 = __builtin_cpu_supports("ssse3");
-    const bool sse4 = ssse3 && __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("sse4.2") &&
-                      __builtin_cpu_supports("pclmul") && __builtin_cpu_supports("aes");
-    // Highway also lets the compiler use LZCNT and F16C, which no processor with AVX2 and FMA lacks and
-    // not every compiler can ask for.
-    const bool avx2 = sse4 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                      __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
-    const bool avx3 = avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-                      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
-                      __builtin_cpu_supports("avx512cd");
+#if HWY_ARCH_X86
+    const X86Support support = x86_support();
     switch (bit) {
-        case HWY_SSSE3: return ssse3;
-        case HWY_SSE4: return sse4;
-        case HWY_AVX2: return avx2;
-        case HWY_AVX3: return avx3;
+        case HWY_SSSE3: return support.ssse3;
+        case HWY_SSE4: return support.sse4;
+        case HWY_AVX2: return support.avx2;
+        case HWY_AVX3: return support.avx3;
         default: return false;
     }
 #else

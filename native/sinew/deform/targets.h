@@ -4,8 +4,16 @@
 
 // Disabled are those that have the vectors of another and add integer instructions (AVX3_DL and after it),
 // or whose vectors have a size that the compiler does not know: they can not be members (SVE, RVV).
-#define HWY_DISABLED_TARGETS \
-    (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+// Of several NEON, whose vectors are the same, the one is left that every 64-bit ARM runs; Highway numbers the others
+// from SVE to NEON.
+#ifdef SINEW_HWY_HAS_NEON_WITHOUT_AES
+#define SINEW_OTHER_NEON (HWY_NEON | (HWY_NEON - HWY_SVE))
+#else
+#define SINEW_OTHER_NEON 0
+#endif
+#define HWY_DISABLED_TARGETS                                                                       \
+    (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | \
+     SINEW_OTHER_NEON)
 
 // Kernel::targets, the fastest first. The last is what the compiler may use anywhere.
 //

@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes a Python for Linux on arm64, to be run by qemu, of Debian's packages: for tests on a Debian machine.
+
+The packages are unpacked into a folder of their own, of this Debian's release; nothing is installed on the
+machine. Packages of Python are installed beside it, as wheels for arm64. Prints a script that runs it. It
+needs this Debian's own Python, as that has the version of the release.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from cross_build import BUILD
+from windows_python import pip
+
+QEMU = "qemu-aarch64-static"
+PACKAGES = (
+    *("python{0}-minimal", "libpython{0}-minimal", "libpython{0}-stdlib"),
+    *(
+        "libc6",
+        "libgcc-s1",
+        "libstdc++6",
+        "libexpat1",
+        "zlib1g",
+        "libssl3",
+        "libffi8",
+        "libbz2-1.0",
+        "liblzma5",
+    ),
+    *("libsqlite3-0", "libuuid1", "libcrypt1", "libncursesw6", "libtinfo6", "libreadline8"),
+)
+# apt with an architecture, lists and a cache of its own.
+APT_CONFIG = """\
+APT::Architecture "arm64";
+APT::Architectures {{"arm64";}};
+Dir::State "{0}";
+Dir::State::Lists "{0}/lists";
+Dir::State::status "{0}/status";
+Dir::Cache "{0}/cache";
+APT::Sandbox::User "root";
+"""
+# By its own name, the script: what Python starts as sys.executable is run by qemu, too.
+SCRIPT = """\
+#!/bin/sh
+export PYTHONHOME="{root}/usr"
+exec {qemu} -0 "$0" -L "{root}" "{root}/usr/bin/python{version}" "$@"
+"""
+
+
+def apt_get(folder: Path, *words: str) -> None:
+    config = folder / "apt.conf"
+    for name in ("lists/partial", "cache/archives/partial", "debs"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    (folder / "status").touch()
+    config.write_text(APT_CONFIG.format(folder))
+    done = subprocess.run(
+        ["apt-get", "-qq", *words],
+        cwd=folder / "debs",
+        env=os.environ | {"APT_CONFIG": str(config)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise SystemExit(f"arm64_python: apt-get {words[0]} failed:\n{done.stderr}")
+
+
+def make(version: str, root: Path) -> None:
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        apt_get(folder, "update")
+        apt_get(folder, "download", *(name.format(version) for name in PACKAGES))
+        for package in sorted((folder / "debs").glob("*.deb")):
+            subprocess.run(["dpkg-deb", "--extract", package, root], check=True)
+    (root / "usr/lib/python3/dist-packages").mkdir(parents=True, exist_ok=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("packages", nargs="*", help="requirements, or wheels for Linux on arm64")
+    options = parser.parse_args()
+    if not shutil.which(QEMU):
+        raise SystemExit(f"arm64_python: {QEMU} is not here.")
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    root = BUILD / f"arm64-python{version}"
+    if not root.exists():
+        unfinished = Path(tempfile.mkdtemp(dir=BUILD))
+        make(version, unfinished)
+        unfinished.rename(root)
+    script = root / "python"
+    script.write_text(SCRIPT.format(root=root, qemu=QEMU, version=version))
+    script.chmod(0o755)
+    if options.packages:
+        systems = [f"--platform=manylinux_2_{minor}_aarch64" for minor in (28, 27, 17)]
+        systems += ["--platform=manylinux2014_aarch64", "--python-version", version]
+        target = root / "usr/lib/python3/dist-packages"
+        words = ["--upgrade", "--no-compile", "--quiet", "--only-binary=:all:", *systems]
+        pip("install", "--target", target, *words, *options.packages)
+    print(script)
+
+
+if __name__ == "__main__":
+    main()

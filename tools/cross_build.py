@@ -1,0 +1,341 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds the library for another platform by zig: wheels for several Pythons, or the C++ tests.
+
+The Python that runs this has ziglang, pybind11, scikit-build-core and auditwheel. Prints what it made. The
+module is one file with the library in it, as two files with the standard library in each could not throw
+to each other.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import contextlib
+import hashlib
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from package import write_zip
+from platforms import PLATFORMS, Platform
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build" / "platforms"
+# Headers alone; the folder as a whole has the C library of this machine in it.
+HEADERS = {"glm": "glm", "hwy": "hwy", "Eigen": "eigen3/Eigen"}
+SYSTEM_HEADERS = [Path("/usr/include"), Path("/usr/local/include"), Path("/opt/homebrew/include")]
+GOOGLETEST = Path("/usr/src/googletest")
+TESTS = ("sinew_deform_tests", "sinew_tests", "sinew_quiet_tests")
+
+
+def fail(message: str) -> None:
+    raise SystemExit(f"cross_build: {message}")
+
+
+@dataclass(frozen=True)
+class Python:
+    """A Python of this machine: its version, such as 3.11, and its headers."""
+
+    executable: Path
+    version: str
+    include: Path
+
+
+def python_of(executable: Path) -> Python:
+    code = (
+        "import sys, sysconfig; print(sysconfig.get_path('include')); print('%d.%d' % sys.version_info[:2])"
+    )
+    done = subprocess.run([executable, "-I", "-c", code], capture_output=True, text=True, check=True)
+    include, version = done.stdout.splitlines()
+    return Python(executable, version, Path(include))
+
+
+# --- zig
+
+
+def zig_program() -> Path:
+    import ziglang
+
+    return Path(ziglang.__file__).with_name("zig")
+
+
+def compilers(platform: Platform) -> dict[str, str]:
+    """CMake's names of the tools, each a script: it takes programs, and zig wants a word behind."""
+    folder = BUILD / platform.name / "bin"
+    folder.mkdir(parents=True, exist_ok=True)
+    words = {
+        "CMAKE_CXX_COMPILER": f"c++ -target {platform.zig}",
+        "CMAKE_C_COMPILER": f"cc -target {platform.zig}",
+        "CMAKE_AR": "ar",
+        "CMAKE_RANLIB": "ranlib",
+        "CMAKE_RC_COMPILER": "rc",
+    }
+    paths = {}
+    for name, word in words.items():
+        path = folder / word.split()[0]
+        text = f'#!/bin/sh\nexec "{zig_program()}" {word} "$@"\n'
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)
+            path.chmod(0o755)
+        paths[name] = str(path)
+    return paths
+
+
+def environment() -> dict[str, str]:
+    # zig keeps what it makes of the C and C++ libraries in a folder of its own.
+    kept = {
+        key: value for key, value in os.environ.items() if key not in ("CXX", "CC", "CXXFLAGS", "LDFLAGS")
+    }
+    return kept | {"ZIG_GLOBAL_CACHE_DIR": str(BUILD / "zig"), "SOURCE_DATE_EPOCH": "315532800"}
+
+
+def run(words: list[str | Path], log: Path) -> None:
+    with log.open("a") as out:
+        done = subprocess.run(words, cwd=ROOT, stdout=out, stderr=out, env=environment(), check=False)
+    if done.returncode:
+        sys.stderr.write(log.read_text()[-4000:])
+        fail(f"{words[0]} failed; the log is {log}.")
+
+
+# --- Headers
+
+
+def collect_headers() -> Path:
+    target = BUILD / "headers"
+    for name, place in HEADERS.items():
+        found = next((folder / place for folder in SYSTEM_HEADERS if (folder / place).is_dir()), None)
+        if found is None:
+            fail(f"the headers of {name} are not here.")
+        if not (target / name).exists():
+            shutil.copytree(found, target / name)
+    return target
+
+
+def collect_python_headers(python: Python) -> Path:
+    target = BUILD / f"python{python.version}"
+    if not target.exists():
+        unfinished = Path(tempfile.mkdtemp(dir=BUILD))
+        shutil.copytree(python.include, unfinished, dirs_exist_ok=True)
+        shutil.copy(ROOT / "cmake/python/pyconfig.h", unfinished / "pyconfig.h")
+        unfinished.rename(target)
+    shutil.copy(ROOT / "cmake/python/pyconfig.h", target / "pyconfig.h")
+    return target
+
+
+EXPORTED = re.compile(r"\bPyAPI_(FUNC|DATA)\(\s*([^()]|\([^()]*\))*\)\s*(?P<name>_{0,2}Py\w+)")
+
+
+def exported_names(include: Path) -> dict[str, bool]:
+    """What Python's headers declare of its library: name -> whether it is data."""
+    names = {}
+    for header in sorted([*include.glob("*.h"), *include.glob("cpython/*.h")]):
+        for match in EXPORTED.finditer(header.read_text(encoding="utf-8")):
+            names[match["name"]] = match[1] == "DATA"
+    return names
+
+
+def import_library(platform: Platform, python: Python, include: Path) -> Path:
+    """What a module for Windows is linked with: the names that python3xx.dll gives."""
+    dll = f"python{python.version.replace('.', '')}"
+    lines = [f"LIBRARY {dll}.dll", "EXPORTS"]
+    lines += [name + (" DATA" if is_data else "") for name, is_data in exported_names(include).items()]
+    folder = BUILD / platform.name
+    definition, library = folder / f"{dll}.def", folder / f"lib{dll}.a"
+    definition.write_text("\n".join(lines) + "\n")
+    machine = {"AMD64": "i386:x86-64", "ARM64": "arm64"}[platform.processor]
+    words: list[str | Path] = [zig_program(), "dlltool", "-m", machine, "-d", definition, "-l", library]
+    run(words, folder / "build.log")
+    return library
+
+
+# --- The build
+
+
+def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
+    build = BUILD / platform.name / "build"
+    headers = str(collect_headers())
+    defined = compilers(platform) | {
+        "CMAKE_BUILD_TYPE": "Release",
+        "CMAKE_SYSTEM_NAME": platform.system,
+        "CMAKE_SYSTEM_PROCESSOR": platform.processor,
+        # Optimised as what CMake tries before the build, too: zig makes its libraries for each of both.
+        "CMAKE_C_FLAGS": "-O2",
+        "CMAKE_CXX_FLAGS": f"-O2 -ffile-prefix-map={ROOT}=.",
+        # No symbols; for Windows no time, either.
+        "CMAKE_EXE_LINKER_FLAGS": "-s",
+        "CMAKE_MODULE_LINKER_FLAGS": "-s",
+        "CMAKE_STRIP": "true",
+        "CMAKE_INSTALL_NAME_TOOL": "true",
+        "CMAKE_INTERPROCEDURAL_OPTIMIZATION": "OFF",
+        "CMAKE_SKIP_RPATH": "ON",
+        # A program that was built is not run by the build.
+        "CMAKE_GTEST_DISCOVER_TESTS_DISCOVERY_MODE": "PRE_TEST",
+        "CMAKE_DISABLE_FIND_PACKAGE_glm": "ON",
+        "CMAKE_DISABLE_FIND_PACKAGE_GTest": "ON",
+        "CMAKE_DISABLE_FIND_PACKAGE_Eigen3": "ON",
+        "FETCHCONTENT_FULLY_DISCONNECTED": "ON",
+        "FETCHCONTENT_SOURCE_DIR_GLM": headers,
+        "FETCHCONTENT_SOURCE_DIR_EIGEN": headers,
+        "FETCHCONTENT_SOURCE_DIR_GOOGLETEST": str(GOOGLETEST),
+        "HWY_INCLUDE_DIR": headers,
+        "BUILD_GMOCK": "OFF",
+        "INSTALL_GTEST": "OFF",
+        "SINEW_STATIC": "ON",
+        **options,
+    }
+    words: list[str | Path] = ["cmake", "-G", "Ninja", "-S", ROOT, "-B", build]
+    # What the last run found of another Python.
+    words += ["-U", "Python_*", "-U", "_Python_*", "-U", "PYTHON_*"]
+    run(words + [f"-D{name}={value}" for name, value in defined.items()], log)
+    return build
+
+
+def jobs() -> str:
+    return os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or str(os.cpu_count())
+
+
+def build_tests(platform: Platform) -> list[Path]:
+    if not GOOGLETEST.is_dir():
+        fail(f"the sources of googletest are not in {GOOGLETEST}.")
+    log = start_log(platform)
+    build = configure(platform, log, {"SINEW_BUILD_TESTS": "ON", "SINEW_BUILD_PYTHON": "OFF"})
+    run(["cmake", "--build", build, "--parallel", jobs(), "--target", *TESTS], log)
+    suffix = ".exe" if platform.is_windows else ""
+    return [build / "tests" / "native" / (name + suffix) for name in TESTS]
+
+
+def build_module(platform: Platform, python: Python, log: Path) -> Path:
+    import pybind11
+
+    include = collect_python_headers(python)
+    options = {
+        "SKBUILD": "ON",
+        "SINEW_BUILD_TESTS": "OFF",
+        "SINEW_BUILD_PYTHON": "ON",
+        "Python_EXECUTABLE": str(python.executable),
+        "Python_INCLUDE_DIR": str(include),
+        "PYTHON_MODULE_EXTENSION": platform.module_suffix(python.version),
+        "PYTHON_MODULE_DEBUG_POSTFIX": "",
+        "PYBIND11_FINDPYTHON": "ON",
+        "pybind11_DIR": pybind11.get_cmake_dir(),
+    }
+    if platform.is_windows:
+        options["Python_LIBRARY"] = str(import_library(platform, python, include))
+    build = configure(platform, log, options)
+    run(["cmake", "--build", build, "--parallel", jobs(), "--target", "_native"], log)
+    return build / "native" / "bindings" / ("_native" + platform.module_suffix(python.version))
+
+
+def start_log(platform: Platform) -> Path:
+    log = BUILD / platform.name / "build.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    log.write_text("")
+    return log
+
+
+# --- Wheels
+
+
+def metadata() -> dict[str, bytes]:
+    """METADATA and licences, as scikit-build-core writes them: name within .dist-info -> bytes."""
+    from scikit_build_core.build import prepare_metadata_for_build_wheel
+
+    with tempfile.TemporaryDirectory() as place, contextlib.chdir(ROOT):
+        with contextlib.redirect_stdout(io.StringIO()):
+            name = prepare_metadata_for_build_wheel(place)
+        files = {
+            path.relative_to(Path(place, name)).as_posix(): path.read_bytes()
+            for path in Path(place, name).rglob("*")
+            if path.is_file()
+        }
+    return {name: data for name, data in files.items() if name not in ("WHEEL", "RECORD")}
+
+
+def package_files() -> dict[str, bytes]:
+    folder = ROOT / "native" / "python"
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in (folder / "sinew").rglob("*")
+        if path.is_file() and (path.suffix in (".py", ".pyi") or path.name == "py.typed")
+    }
+
+
+def record_line(name: str, data: bytes) -> str:
+    digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+    return f"{name},sha256={digest},{len(data)}"
+
+
+def write_wheel(module: Path, tag: str, described: dict[str, bytes], out: Path) -> Path:
+    """described: as of metadata()"""
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    stem = f"sinew_skinning-{version}"
+    info = f"{stem}.dist-info"
+    files = package_files() | {f"sinew/{module.name}": module.read_bytes()}
+    files |= {f"{info}/{name}": data for name, data in described.items()}
+    built = f"Wheel-Version: 1.0\nGenerator: sinew\nRoot-Is-Purelib: false\nTag: {tag}\n\n"
+    files[f"{info}/WHEEL"] = built.encode()
+    lines = [record_line(name, files[name]) for name in sorted(files)] + [f"{info}/RECORD,,"]
+    files[f"{info}/RECORD"] = ("\n".join(lines) + "\n").encode()
+    wheel = out / f"{stem}-{tag}.whl"
+    write_zip(wheel, files)
+    return wheel
+
+
+AUDITED = re.compile(
+    r"(?:consistent\s+with\s+the\s+following\s+platform\s+tag|constrains\s+the\s+platform\s+tag\s+to)"
+    r'[:\s]+"(?P<tag>\w+)"'
+)
+
+
+def audit(wheel: Path, platform: Platform) -> None:
+    """That it runs on the systems that its name says, by auditwheel."""
+    done = subprocess.run(
+        [sys.executable, "-m", "auditwheel", "show", wheel], capture_output=True, text=True, check=False
+    )
+    found = AUDITED.search(done.stdout)
+    wanted = re.fullmatch(r"manylinux_2_(\d+)_(\w+)", platform.wheel)
+    is_from = found and re.fullmatch(r"manylinux_2_(\d+)_(\w+)", found["tag"])
+    if not is_from or is_from[2] != wanted[2] or int(is_from[1]) > int(wanted[1]):
+        fail(f"auditwheel does not find {wheel.name} to be {platform.wheel}:\n{done.stdout}{done.stderr}")
+
+
+def build_wheels(platform: Platform, pythons: list[Python], out: Path) -> list[Path]:
+    log = start_log(platform)
+    described = metadata()
+    made = []
+    for python in pythons:
+        module = build_module(platform, python, log)
+        wheel = write_wheel(module, platform.wheel_tag(python.version), described, out)
+        if platform.is_linux:
+            audit(wheel, platform)
+        made.append(wheel)
+    return made
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("platform", choices=PLATFORMS)
+    parser.add_argument("--tests", action="store_true", help="the programs of the C++ tests")
+    parser.add_argument(
+        "--python", type=Path, action="append", default=[], help="a Python to make a wheel for"
+    )
+    parser.add_argument("--out", type=Path, default=ROOT / "dist/platforms", help="folder for the wheels")
+    options = parser.parse_args()
+    platform = PLATFORMS[options.platform]
+    if options.tests:
+        print(*build_tests(platform), sep="\n")
+    if options.python:
+        out = options.out / platform.name
+        print(*build_wheels(platform, [python_of(path) for path in options.python], out), sep="\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the tests of a platform that another system emulates: linux-arm64 by qemu, windows-x64 by wine.
+
+C++ tests, then the Python tests in a Python of that platform, then for Windows some of the Blender tests
+in Blender's own build of bpy. The Python that runs this has what tools/cross_build.py wants; wheels that
+it does not have are fetched from the registry.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from cross_build import BUILD, ROOT, build_tests, build_wheels, python_of
+from platforms import PLATFORMS, Platform
+
+PARTS = ("native", "python", "blender")
+# Shapes as Blender's, Sinew added and removed, files saved and read.
+BLENDER_TESTS = ("test_against_armature_modifier", "test_changes", "test_restore", "test_saved_files")
+BPY = "bpy==4.5.*"
+# As Blender 4.5 has it, whose compiled code wants this one.
+NUMPY = "numpy==1.26.*"
+# Complex logarithms of scipy's call what wine 8 lacks (ucrtbase.dll.carg), and end the process.
+WITHOUT_LOGARITHMS = ("-k", "not log")
+# As long as it takes on a machine of two processors, some times over.
+LIMITS = {"native": 900, "python": 2400, "blender": 2400}
+
+
+def environment() -> dict[str, str]:
+    kept = {
+        name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))
+    }
+    # Wine's own remarks off; a folder for what it keeps of Windows.
+    return kept | {"WINEPREFIX": str(BUILD / "wine"), "WINEDEBUG": "-all", "SINEW_RIGS": ""}
+
+
+def run(words: Sequence[str | Path], limit: int) -> int:
+    """Runs a program and prints what it prints. Returns its exit code; where there is no end in
+    time 124, as timeout(1). Wine's programs fail where standard output is a file, so they have a pipe."""
+    process = subprocess.Popen(
+        words,
+        cwd=ROOT,
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    late = threading.Event()
+
+    def end() -> None:
+        late.set()
+        os.killpg(process.pid, signal.SIGKILL)
+
+    timer = threading.Timer(limit, end)
+    timer.start()
+    try:
+        for line in process.stdout or ():
+            sys.stdout.buffer.write(line)
+            sys.stdout.flush()
+        status = process.wait()
+    finally:
+        timer.cancel()
+    if late.is_set():
+        print(f"no end after {limit} s")
+        return 124
+    return status
+
+
+def output_of(*words: str | Path) -> Path:
+    done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    return Path(done.stdout.splitlines()[-1])
+
+
+def requirements(chosen: Sequence[str]) -> list[str]:
+    """Those of the extension, without Sinew and Blender, and of its tests."""
+    project = tomllib.loads((ROOT / "addon/pyproject.toml").read_text())["project"]
+    needed = [name for name in project["dependencies"] if not name.startswith(("sinew-skinning", "bpy"))]
+    return [*needed, *chosen]
+
+
+class Emulated:
+    """How programs of a platform are run, and its Python.
+
+    native   words before a C++ program
+    tool     makes the Python, prints its path and installs packages
+    """
+
+    def __init__(self, platform: Platform, test_requirements: Sequence[str]) -> None:
+        self.platform = platform
+        self.test_requirements = test_requirements
+        is_windows = platform.is_windows
+        self.tool = ROOT / "tools" / ("windows_python.py" if is_windows else "arm64_python.py")
+        self._python: Path | None = None
+
+    @property
+    def native(self) -> list[str | Path]:
+        if self.platform.is_windows:
+            return ["wine"]
+        # Its C library is that of its Python.
+        return ["qemu-aarch64-static", "-L", self.python.parent]
+
+    @property
+    def python(self) -> Path:
+        if self._python is None:
+            self._python = output_of(sys.executable, self.tool)
+        return self._python
+
+    def install(self, *packages: str | Path) -> None:
+        output_of(sys.executable, self.tool, *packages)
+
+    def set_up_python(self) -> None:
+        (wheel,) = build_wheels(
+            self.platform, [python_of(Path(sys.executable))], ROOT / "dist/platforms/tested"
+        )
+        wanted = requirements([*self.test_requirements, *([NUMPY] if self.platform.is_windows else [])])
+        stamp = self.python.parent / "requirements"
+        if not stamp.exists() or stamp.read_text() != " ".join(wanted):
+            self.install(*wanted)
+            stamp.write_text(" ".join(wanted))
+        self.install("--no-deps", wheel)
+        site = self.site_packages()
+        link = site / "sinew_addon"
+        if not link.is_symlink():
+            link.symlink_to(ROOT / "addon", target_is_directory=True)
+
+    def site_packages(self) -> Path:
+        place = "Lib/site-packages" if self.platform.is_windows else "usr/lib/python3/dist-packages"
+        return self.python.parent / place
+
+    def pytest(self, limit: int, *options: str) -> int:
+        words: list[str | Path] = ["wine"] if self.platform.is_windows else []
+        words += [self.python, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
+        return run(words, limit)
+
+
+def native_tests(emulated: Emulated) -> int:
+    worst = 0
+    for program in build_tests(emulated.platform):
+        start = time.monotonic()
+        status = run([*emulated.native, program, "--gtest_brief=1"], LIMITS["native"])
+        print(f"{program.name}: exit {status}, {time.monotonic() - start:.0f} s", flush=True)
+        worst = worst or status
+    return worst
+
+
+def python_tests(emulated: Emulated, options: Sequence[str]) -> int:
+    emulated.set_up_python()
+    all_tests = ["tests/python", *(WITHOUT_LOGARITHMS if emulated.platform.is_windows else ())]
+    return emulated.pytest(LIMITS["python"], *(options or all_tests))
+
+
+def blender_tests(emulated: Emulated, options: Sequence[str]) -> int:
+    emulated.set_up_python()
+    if not (emulated.site_packages() / "bpy").is_dir():
+        emulated.install(BPY)
+    return emulated.pytest(
+        LIMITS["blender"], *(options or [f"tests/blender/{name}.py" for name in BLENDER_TESTS])
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("platform", choices=("linux-arm64", "windows-x64"))
+    parser.add_argument("--part", choices=PARTS, action="append", help="only this (may be said again)")
+    parser.add_argument("--require", action="append", default=[], help="what the tests want of the registry")
+    parser.add_argument("options", nargs="*", help="for pytest, behind --, in place of all tests of a part")
+    options = parser.parse_args()
+    emulated = Emulated(PLATFORMS[options.platform], options.require)
+    parts = options.part or (PARTS if emulated.platform.is_windows else PARTS[:2])
+    results = {}
+    for part in parts:
+        print(f"\n== {options.platform}: {part} ==", flush=True)
+        if part == "native":
+            results[part] = native_tests(emulated)
+        else:
+            tests = python_tests if part == "python" else blender_tests
+            results[part] = tests(emulated, options.options)
+    print("\n== Summary ==")
+    for part, status in results.items():
+        print(f"  {options.platform} {part:8} {'passed' if status == 0 else f'FAILED ({status})'}")
+    sys.exit(any(results.values()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The platforms that Blender's extensions are for, and how zig and Python name them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Platform:
+    """
+    name        as Blender names it in a manifest's `platforms`
+    zig         zig's name of the target, with the oldest system that it is for
+    system      CMAKE_SYSTEM_NAME
+    processor   CMAKE_SYSTEM_PROCESSOR
+    wheel       the platform's tag in the name of a wheel
+    module      what follows "_native." in a module's name; {tag} is such as cp311, {digits} as 311
+    """
+
+    name: str
+    zig: str
+    system: str
+    processor: str
+    wheel: str
+    module: str
+
+    @property
+    def is_windows(self) -> bool:
+        return self.system == "Windows"
+
+    @property
+    def is_linux(self) -> bool:
+        return self.system == "Linux"
+
+    def module_suffix(self, version: str) -> str:
+        """version: of Python, such as 3.11"""
+        digits = version.replace(".", "")
+        return "." + self.module.format(tag=f"cp{digits}", digits=digits)
+
+    def wheel_tag(self, version: str) -> str:
+        tag = "cp" + version.replace(".", "")
+        return f"{tag}-{tag}-{self.wheel}"
+
+
+# The C library of Blender's own builds for Linux; its macOS is 11.2.
+LINUX = "linux-gnu.2.28"
+MACOS = "macos.11.0"
+
+PLATFORMS = {
+    platform.name: platform
+    for platform in (
+        Platform(
+            "linux-x64",
+            f"x86_64-{LINUX}",
+            "Linux",
+            "x86_64",
+            "manylinux_2_28_x86_64",
+            "cpython-{digits}-x86_64-linux-gnu.so",
+        ),
+        Platform(
+            "linux-arm64",
+            f"aarch64-{LINUX}",
+            "Linux",
+            "aarch64",
+            "manylinux_2_28_aarch64",
+            "cpython-{digits}-aarch64-linux-gnu.so",
+        ),
+        Platform("windows-x64", "x86_64-windows-gnu", "Windows", "AMD64", "win_amd64", "{tag}-win_amd64.pyd"),
+        Platform(
+            "windows-arm64", "aarch64-windows-gnu", "Windows", "ARM64", "win_arm64", "{tag}-win_arm64.pyd"
+        ),
+        Platform(
+            "macos-arm64",
+            f"aarch64-{MACOS}",
+            "Darwin",
+            "arm64",
+            "macosx_11_0_arm64",
+            "cpython-{digits}-darwin.so",
+        ),
+        Platform(
+            "macos-x64",
+            f"x86_64-{MACOS}",
+            "Darwin",
+            "x86_64",
+            "macosx_11_0_x86_64",
+            "cpython-{digits}-darwin.so",
+        ),
+    )
+}
