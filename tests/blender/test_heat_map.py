@@ -19,7 +19,7 @@ from sinew_addon.commands.console import Console
 from sinew_addon.core.heat import HeatScale, linear
 from sinew_addon.core.metrics import METRICS
 from sinew_addon.deform import evaluate, session
-from sinew_addon.features.heat import heat_legend, heat_nodes, live, measures
+from sinew_addon.features.heat import heat_legend, heat_map, heat_nodes, live, measures
 from sinew_addon.features.pages import measure
 
 
@@ -357,6 +357,22 @@ def test_a_duplicate_has_colours_of_its_own():
     assert heat_nodes.NAME in obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes
     carriers = [properties.of(each).point_buffer for each in (obj, twin)]
     assert [heat_nodes.COLOURS in point_buffer.data.attributes for point_buffer in carriers] == [True, False]
+
+
+def test_a_point_buffer_that_is_not_filled_yet_is_left_alone():
+    """As a copy's own is, until the copy is deformed."""
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).heat = True
+    bpy.context.scene.frame_set(8)
+    before = shown_colours(obj)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    pairs = session.states_of([obj], depsgraph)
+    properties.of(obj).point_buffer.data.clear_geometry()
+    heat_map.update(pairs, depsgraph)
+    session.rebind(obj, bpy.context)
+    bpy.context.view_layer.update()
+    assert np.array_equal(shown_colours(obj), before)
 
 
 def test_a_render_shows_it(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 from ...attach import properties
 from ...core.heat import HeatScale
 from ...core.metrics import Measured
+from ...deform.skinned_object import SkinnedObject
 from ...ui.translations import joined, tr
 from . import heat_legend, heat_nodes, live, measures
 from .measures import SinewMeasures
@@ -30,7 +31,7 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
     shown = [
         (obj, skinned)
         for obj, skinned in heated
-        if obj.evaluated_get(depsgraph).is_evaluated and properties.of(obj).point_buffer is not None
+        if obj.evaluated_get(depsgraph).is_evaluated and _has_points(obj, skinned)
     ]
     if not shown:
         _last.pop(scene, None)
@@ -51,6 +52,12 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
         heat_nodes.write_colours(obj, own)
     _last[scene] = inputs
     heat_legend.contents[scene] = heat_legend.Content(scale, _title(settings, shown))
+
+
+def _has_points(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
+    """Whether its point buffer is filled: that of a copy of an object is not, until the copy is deformed."""
+    buffer = properties.of(obj).point_buffer
+    return buffer is not None and len(buffer.data.vertices) == len(skinned.bound.source.points)
 
 
 def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) -> HeatScale:
