@@ -179,8 +179,14 @@ void SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
     state.move_steps(posed_from_rest, options);
     state.move_normals(points, normals, options.threads);
     if (tangents.empty()) return;
-    const auto part = [&](std::size_t begin, std::size_t end) {
-        state.move_tangents(points, tangents, begin, end);
+    // One reference: a function that refers to more allocates.
+    struct Work {
+        const State& state;
+        std::span<const Vec3<float>> points;
+        std::span<Vec3<float>> tangents;
+    } const work{state, points, tangents};
+    const auto part = [&work](std::size_t begin, std::size_t end) {
+        work.state.move_tangents(work.points, work.tangents, begin, end);
     };
     parallel_for(tangents.size(), threads_for(options.threads, tangents.size()), part);
 }
