@@ -176,8 +176,6 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         "CMAKE_INSTALL_NAME_TOOL": "true",
         "CMAKE_INTERPROCEDURAL_OPTIMIZATION": "OFF",
         "CMAKE_SKIP_RPATH": "ON",
-        # A program that was built is not run by the build.
-        "CMAKE_GTEST_DISCOVER_TESTS_DISCOVERY_MODE": "PRE_TEST",
         "CMAKE_DISABLE_FIND_PACKAGE_glm": "ON",
         "CMAKE_DISABLE_FIND_PACKAGE_GTest": "ON",
         "CMAKE_DISABLE_FIND_PACKAGE_Eigen3": "ON",
