@@ -45,6 +45,16 @@ def is_needed(obj: bpy.types.Object) -> bool:
     return absolute or stack.parent_deforms(obj) or bool(stack.upstream_changes(obj))
 
 
+def check_not_needed(obj: bpy.types.Object, why: str) -> None:
+    """Raises SinewError where there is anything else.
+
+    why  a clause: what can not go with it, and what to do
+    """
+    if is_needed(obj):
+        names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
+        raise SinewError(f"{obj.name}: {names} changes the mesh ahead of the armature, {why}")
+
+
 def check(obj: bpy.types.Object) -> None:
     """Raises SinewError where what stands in front can not be evaluated apart."""
     first = stack.armature_modifier(obj)

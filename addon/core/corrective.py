@@ -17,9 +17,9 @@ LEAST_WIDTH = 0.05
 
 def offsets(
     rest_points: np.ndarray, wanted: np.ndarray, skin: Callable[[np.ndarray], np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The offsets of rest points, float64 [vertices, 3], and how far from `wanted` each then is, [vertices].
-    One that can not be brought there has no offset.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The offsets of rest points, float64 [vertices, 3], and how far from `wanted` each is without them and
+    with them, [vertices]. One that can not be brought there has no offset.
 
     rest_points  float32 [vertices, 3]
     wanted       float32 [vertices, 3], the shape
@@ -28,28 +28,29 @@ def offsets(
     rest, goal = rest_points.astype(np.float64), wanted.astype(np.float64)
     found = np.zeros_like(rest)
     if not len(rest):
-        return found, np.zeros(0)
+        return found, np.zeros(0), np.zeros(0)
 
     def shape(moved: np.ndarray) -> np.ndarray:
         return skin((rest + moved).astype(np.float32)).astype(np.float64)
 
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0))) or 1.0
     now = shape(found)
-    start = distances(goal, now)
+    start = left = _distances(goal, now)
     for _step in range(STEPS):
-        if distances(goal, now).max() <= NEAR * diagonal:
+        if left.max() <= NEAR * diagonal:
             break
         axes = [
             (shape(found + PROBE * diagonal * axis) - now) / (PROBE * diagonal) for axis in np.identity(3)
         ]
         found += _solve(np.stack(axes, axis=-1), goal - now)
         now = shape(found)
+        left = _distances(goal, now)
     # Not one that came no nearer.
-    found[distances(goal, now) > start] = 0.0
-    return found, distances(goal, shape(found))
+    found[left > start] = 0.0
+    return found, start, np.minimum(left, start)
 
 
-def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.linalg.norm(a - b, axis=1)
 
 

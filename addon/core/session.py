@@ -92,6 +92,10 @@ class Binding:
         # The last frame was written to another array than _points.
         self._points_outdated = False
 
+    def another(self) -> Binding:
+        """The same for shapes of its own."""
+        return Binding(self.weighting, self.mix_weights, self.vertex_data)
+
     @cached_property
     def moving_bones(self) -> list[str]:
         """Names of the bones that can move a vertex."""
@@ -350,6 +354,11 @@ class SkinStack:
         """Those before the stages."""
         return self._points if self._end is None else self._end.points
 
+    def another(self) -> SkinStack:
+        """The same for shapes of its own."""
+        stages = [SkinStage(one.binding.another(), one.mask, one.multi) for one in self.skin_stages]
+        return SkinStack(stages, None if self.stages_after is None else self.stages_after.another())
+
     def set_stage_mesh(self, mesh: StageMesh) -> None:
         """For a mesh of other points or faces."""
         if self.stages_after is not None and self.stages_after.set_mesh(mesh) and self._values:
@@ -432,16 +441,9 @@ class SkinStack:
                 starts[behind] = result
             start = starts.get(number, result)
             is_end = skin_stage.binding is self._end
+            own = (frame.scale_rule, frame.mix, frame.parameters)
             changed |= skin_stage.binding.deform(
-                Frame(
-                    frame.method,
-                    frame.pose,
-                    frame.bones_from_model,
-                    start,
-                    frame.scale_rule,
-                    frame.mix,
-                    frame.parameters,
-                ),
+                Frame(frame.method, frame.pose, frame.bones_from_model, start, *own),
                 out if is_end else None,
             )
             if skin_stage.mask is not None:

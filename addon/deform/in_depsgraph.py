@@ -135,12 +135,12 @@ def _memory_to_write(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Of the points and of the normals, none where Blender computes these: in the evaluated mesh, or in the
     evaluated point buffer. None where it is not there, or not for as many."""
-    points, domain = len(skinned.bound.source.points), skinned.plan.normals.domain
-    count = skinned.normal_count if domain else 0
+    points, count = len(skinned.bound.source.points), skinned.normal_count
     if not skinned.plan.in_buffer:
         to_points = mesh_io.vectors_in(mesh, skinned.attribute)
         to_normals = _NO_NORMALS
         if count:
+            domain = skinned.plan.normals.domain
             to_normals = mesh_io.vectors_in(mesh, skinned.normals_attribute, domain)
         if to_points is None or to_normals is None:
             return None

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 
 from ..attach import attach, properties, stage_settings
 from ..core import parameters
 from ..core.errors import SinewError
+from ..core.scale_rule import BLENDER_4
 from ..core.session import SkinStageFrame
 from ..core.stages import ORDER, StageValues
 from ..io import armature_io
@@ -67,6 +70,15 @@ def read(
         values = _parameters(evaluated, settings, own, mix)
         frames.append(SkinStageFrame(own, pose, space, scale_rule, mix, values))
     return frames
+
+
+def of_modifiers(obj: bpy.types.Object, frames: Frames) -> Frames:
+    """The same poses as its Armature modifiers themselves deform by them, without a stage behind."""
+    methods = [attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj)]
+    return [
+        frame and replace(frame, method=method, mix="", parameters={}, scale_rule=BLENDER_4.name)
+        for frame, method in zip(frames, methods, strict=False)
+    ]
 
 
 def _parameters(

@@ -168,13 +168,7 @@ def write_weights(
 
 def write_errors(mesh: bpy.types.Mesh, errors: np.ndarray) -> None:
     """Stores float32 [vertices] as an attribute, which overlays and materials can show."""
-    active = mesh.attributes.active_index
-    attribute = mesh.attributes.get(ERRORS)
-    if attribute is not None:
-        mesh.attributes.remove(attribute)
-    mesh.attributes.new(ERRORS, "FLOAT", "POINT").data.foreach_set("value", errors)
-    # A new attribute becomes the active one, which is the artist's choice.
-    mesh.attributes.active_index = active
+    mesh_io.write_values(mesh, ERRORS, errors)
 
 
 def _used(names: Sequence[str], slots: np.ndarray) -> list[str]:

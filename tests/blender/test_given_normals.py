@@ -99,6 +99,13 @@ def both(obj, read=corners):
     return given, left
 
 
+def check_given(obj):
+    """They are there, and Blender's."""
+    assert has_given(obj)
+    given, left = both(obj)
+    np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+
+
 def make(shading=smooth, frame=7):
     obj, armature = scenes.make_arm()
     shading(obj)
@@ -202,9 +209,7 @@ def test_shape_keys_and_scaled_or_mirrored_objects():
         armature.scale = (1, 1, -1) if scale[0] < 0 else (1, 1, 1)
         for frame in (3, 11):
             bpy.context.scene.frame_set(frame)
-            assert has_given(obj)
-            given, left = both(obj)
-            np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+            check_given(obj)
 
 
 @needs_support
@@ -358,9 +363,7 @@ def test_modifiers_that_leave_normals_to_sinew(place, kind, set_up, shading):
     scenes.add_sinew(obj, "dq")
     for frame in (3, 11):
         bpy.context.scene.frame_set(frame)
-        assert has_given(obj)
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        check_given(obj)
 
 
 @needs_support
@@ -712,18 +715,14 @@ def test_objects_with_one_mesh_and_painted_ones():
     for mode in ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT"):
         bpy.ops.object.mode_set(mode=mode)
         bpy.context.scene.frame_set(6)
-        assert has_given(obj)
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        check_given(obj)
         bpy.ops.object.mode_set(mode="OBJECT")
     for mode in ("EDIT", "SCULPT"):
         bpy.ops.object.mode_set(mode=mode)
         bpy.context.scene.frame_set(8)
         assert session.state_of(obj) is None
         bpy.ops.object.mode_set(mode="OBJECT")
-        assert has_given(obj)
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        check_given(obj)
 
 
 @needs_support
@@ -845,6 +844,4 @@ def test_every_method_and_stage(method):
     settings.delta_mush.enabled = True
     for frame in (4, 9):
         bpy.context.scene.frame_set(frame)
-        assert has_given(obj)
-        given, left = both(obj)
-        np.testing.assert_allclose(given, left, rtol=0, atol=NEAR)
+        check_given(obj)

@@ -14,15 +14,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, stack, upstream_proxy
+from ...attach import attach, stack, upstream_proxy
 from ...core import bake
 from ...core.errors import SinewError
 from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...deform import evaluate, session
-from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...io import files
 from ...io.animation_paths import curves_of
-from . import bake_export, shape_animation
+from . import bake_export, driven, shape_animation
 from .bake_bones import BoneBake
 from .take_off import take_off
 
@@ -31,11 +30,7 @@ SHAPE_KEYS = "shape-keys"
 
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
-    # As it was evaluated with the frame: what Sinew wrote since would be evaluated for nothing.
-    pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
-    if not pairs or obj.mode in MODES_OF_THE_MODIFIER:
-        raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
-    return pairs[0][1].points
+    return driven.state_of(obj).points
 
 
 class ShapeKeys:
@@ -46,12 +41,7 @@ class ShapeKeys:
             raise SinewError(
                 f"{obj.name}: a library override can not have shape keys of its own; bake a cache"
             )
-        if upstream_proxy.is_needed(obj):
-            names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
-            raise SinewError(
-                f"{obj.name}: {names} changes the mesh ahead of the armature, where shape keys can not "
-                "follow; bake to mdd or pc2"
-            )
+        upstream_proxy.check_not_needed(obj, "where shape keys can not follow; bake to mdd or pc2")
         bake.check_space(Path(bpy.data.filepath or ".").parent, 12 * len(obj.data.vertices) * len(frames))
         self.obj, self.frames = obj, frames
         self.samples: list[np.ndarray] = []

@@ -21,10 +21,9 @@ from ...core.helper_bones import HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
 from ...core.spaces import transformed
 from ...deform import evaluate, session
-from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io
-from . import shape_animation
+from . import driven, shape_animation
 from .take_off import take_off
 
 # Of the time that a bake takes, until the frames are read.
@@ -46,7 +45,7 @@ class BoneBake:
         try:
             rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
             for obj in meshes:
-                _check_bones(obj, _state_of(obj))
+                _check_bones(obj, driven.posed_state_of(obj))
                 rigs.setdefault(_rig_of(obj), []).append(obj)
         finally:
             evaluate.set_frame(scene, before)
@@ -104,7 +103,7 @@ class _Rig:
 
     def take(self) -> None:
         """The frame as it is evaluated."""
-        states = [_state_of(obj) for obj in self.meshes]
+        states = [driven.posed_state_of(obj) for obj in self.meshes]
         frames = [state.shown.frames[0] for state in states]
         bindings = [state.bound.binding for state in states]
         targets, rest = [], []
@@ -193,12 +192,7 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
     for each in (obj, rig):
         if each.override_library is not None or each.library is not None:
             raise SinewError(f"{each.name}: is linked, and can not have bones of its own; make it local")
-    if upstream_proxy.is_needed(obj):
-        names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
-        raise SinewError(
-            f"{obj.name}: {names} changes the mesh ahead of the armature, which has no weights of its own; "
-            "bake to mdd or pc2"
-        )
+    upstream_proxy.check_not_needed(obj, "which has no weights of its own; bake to mdd or pc2")
     animation = rig.animation_data
     if animation is not None and animation.use_tweak_mode:
         raise SinewError(f"{rig.name}: a strip of its NLA is being edited; leave tweak mode first")
@@ -216,10 +210,3 @@ def _check_bones(obj: bpy.types.Object, state: SkinnedObject) -> None:
     found = [name for name in bendy if name in binding.moving_bones]
     if found:
         raise SinewError(f"{obj.name}: {', '.join(found)} bends in segments; bake to mdd or pc2")
-
-
-def _state_of(obj: bpy.types.Object) -> SkinnedObject:
-    pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
-    if not pairs or obj.mode in MODES_OF_THE_MODIFIER or pairs[0][1].shown.frames[0] is None:
-        raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on to bake what it shows")
-    return pairs[0][1]

@@ -22,7 +22,7 @@ from ...core.output import remove, writing
 from ...core.spaces import transformed
 from ...deform import evaluate, session
 from ...io import files
-from . import shape_animation, usd_textures
+from . import driven, shape_animation, usd_textures
 
 
 def _alembic(path: str, first: int, last: int) -> None:
@@ -136,7 +136,7 @@ class SceneExport(_Export):
                 with _told_frames(self, 0.0):
                     _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
             for obj in self.meshes:
-                _check_driven(obj)
+                driven.check_on(obj)
             yield 1.0
         except BaseException:
             self.discard()
@@ -177,7 +177,7 @@ class MorphExport(_Export):
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
                 for obj in self.meshes:
-                    _check_driven(obj)
+                    driven.check_on(obj)
                 for obj, samples in self.samples.items():
                     points = self._in_first_space(obj)
                     if samples and len(points) != len(samples[0]):
@@ -286,7 +286,7 @@ def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
 def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
     """Where the export goes at first; raises SinewError where there is no room for it."""
     for obj in export.meshes:
-        _check_driven(obj)
+        driven.check_on(obj)
     vertices = sum(len(evaluate.final_points(obj)) for obj in (*export.meshes, *export.carried))
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(export.frames))
@@ -298,11 +298,6 @@ def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
         unfinished.touch()
         unfinished.unlink()
     return unfinished
-
-
-def _check_driven(obj: bpy.types.Object) -> None:
-    if not obj.sinew.enabled:
-        raise SinewError(obj.sinew.error or f"{obj.name}: switch Sinew on to bake what it shows")
 
 
 def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> None:

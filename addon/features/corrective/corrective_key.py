@@ -4,17 +4,16 @@ that is to do without Sinew, or for an engine."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, stack, upstream_proxy
-from ...core.corrective import NEAR, distances, offsets
+from ...attach import properties, upstream_proxy
+from ...core.corrective import NEAR, offsets
 from ...core.errors import SinewError
-from ...core.scale_rule import BLENDER_4
-from ...core.session import Binding, SkinStack, SkinStage
-from ...deform import session
+from ...deform import pose, session
 from ...deform.plan import MODES_OF_THE_MODIFIER
 from ...deform.skinned_object import SkinnedObject
 
@@ -47,11 +46,11 @@ def add(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, bone: bpy.types.P
     if not pairs:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on, as its shape is wanted")
     turns = None if bone is None else _turns(bone)
-    wanted, rest = pairs[0][1].points.copy(), pairs[0][1].shown.rest_points
-    modifiers = _Modifiers(obj, pairs[0][1])
-    found, left = offsets(rest, wanted, modifiers.shape)
-    before = float(distances(modifiers.shape(rest), wanted).max(initial=0.0))
-    if before <= NEAR * np.linalg.norm(np.ptp(rest, axis=0)):
+    skinned = pairs[0][1]
+    rest = skinned.shown.rest_points
+    found, without, left = offsets(rest, skinned.points, _by_modifiers(obj, skinned))
+    before = float(without.max(initial=0.0))
+    if not len(rest) or before <= NEAR * np.linalg.norm(np.ptp(rest, axis=0)):
         raise SinewError(f"{obj.name}: its Armature modifier has the same shape in this pose")
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis", from_mix=False)
@@ -76,29 +75,20 @@ def _check(obj: bpy.types.Object) -> None:
         )
     if keys is not None and not keys.use_relative:
         raise SinewError(f"{obj.name}: its shape keys are absolute; a corrective key is a relative one")
-    if upstream_proxy.is_needed(obj):
-        names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "its parent"
-        raise SinewError(
-            f"{obj.name}: {names} changes the mesh ahead of the armature, where shape keys can not follow"
-        )
+    upstream_proxy.check_not_needed(obj, "where shape keys can not follow")
 
 
-class _Modifiers:
-    """The object's Armature modifiers, as they deform by themselves in the pose that is shown."""
+def _by_modifiers(obj: bpy.types.Object, skinned: SkinnedObject) -> Callable[[np.ndarray], np.ndarray]:
+    """What makes of rest points, float32 [vertices, 3], the shape that the object's Armature modifiers give
+    them in the pose that is shown."""
+    skin_stack = skinned.bound.skin_stack.another()
+    frames = pose.of_modifiers(obj, skinned.shown.frames or [])
 
-    def __init__(self, obj: bpy.types.Object, skinned: SkinnedObject) -> None:
-        stages = skinned.bound.skin_stack.skin_stages
-        self._stack = SkinStack([SkinStage(Binding(s.binding.weighting), s.mask, s.multi) for s in stages])
-        methods = [attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj)]
-        self._frames = [
-            frame and replace(frame, method=method, mix="", parameters={}, scale_rule=BLENDER_4.name)
-            for frame, method in zip(skinned.shown.frames or (), methods, strict=True)
-        ]
+    def shape(rest_points: np.ndarray) -> np.ndarray:
+        skin_stack.deform(rest_points, frames)
+        return np.array(skin_stack.points)
 
-    def shape(self, rest_points: np.ndarray) -> np.ndarray:
-        """float32 [vertices, 3], object space"""
-        self._stack.deform(rest_points, self._frames)
-        return np.array(self._stack.points)
+    return shape
 
 
 # --- By a bone

@@ -15,11 +15,11 @@ import numpy as np
 from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
 from ...core import influences
 from ...core.metrics import FrameOfRig, Gauge, Measured, bone_axes
-from ...core.scale_rule import BLENDER_4
-from ...core.session import Binding, SkinStack, SkinStage, SkinStageFrame
+from ...core.session import SkinStack
 from ...core.spaces import is_same_space, transformed, transformed_axes
 from ...core.stages import StageValues
 from ...core.surface import Surface, joined
+from ...deform import pose
 from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
 from ...io import armature_io, mesh_io
@@ -128,19 +128,13 @@ def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> 
         shown = skinned.shown
         if mesh is None or shown.frames is None or len(mesh.vertices) != len(shown.rest_points):
             return None
-        known = [(stage, stage.binding) for stage in skinned.bound.skin_stack.skin_stages]
+        skin_stack = skinned.bound.skin_stack
         surface = mesh_io.read_surface(mesh)
-        for _stage, binding in known:
-            if binding.vertex_data is not None:
+        for stage in skin_stack.skin_stages:
+            if stage.binding.vertex_data is not None:
                 # Distances may be measured to a method that needs them.
-                binding.vertex_data.add_triangles(surface.triangles)
-        stages = [
-            SkinStage(Binding(b.weighting, b.mix_weights, b.vertex_data), stage.mask, stage.multi)
-            for stage, b in known
-        ]
-        after = skinned.bound.skin_stack.stages_after
-        own_stack = SkinStack(stages, None if after is None else after.another())
-        parts.append(Part(obj, skinned, skinned.bound, surface, own_stack))
+                stage.binding.vertex_data.add_triangles(surface.triangles)
+        parts.append(Part(obj, skinned, skinned.bound, surface, skin_stack.another()))
     if not parts:
         return None
     if old is not None and all(map(_is_alike, parts, old.parts)):
@@ -191,23 +185,22 @@ class _Other:
 
     skin_stack: SkinStack
     rest_points: np.ndarray
-    frames: list[SkinStageFrame | None]
+    frames: pose.Frames
     stage_values: StageValues
 
     @classmethod
     def of(cls, part: Part, other: str) -> _Other:
-        shown, methods = part.skinned.shown, _modifiers_methods(part.obj, other)
-        values = stage_settings.method_values(properties.of(part.obj), (other,))
-        frames: list[SkinStageFrame | None] = []
-        for number, frame in enumerate(shown.frames):
-            if frame is not None:
-                method = methods[number] if methods else other
-                frame = replace(frame, method=method, mix="", parameters=values)
-                if methods:
-                    frame.scale_rule = BLENDER_4.name
-            frames.append(frame)
-        values = corrective_smooth.stage_values(part.obj) if methods else shown.stage_values
-        return cls(part.skin_stack, shown.rest_points, frames, values)
+        shown = part.skinned.shown
+        if other == properties.BLENDER:
+            frames = pose.of_modifiers(part.obj, shown.frames)
+            stage_values = corrective_smooth.stage_values(part.obj)
+        else:
+            own = stage_settings.method_values(properties.of(part.obj), (other,))
+            frames = [
+                frame and replace(frame, method=other, mix="", parameters=own) for frame in shown.frames
+            ]
+            stage_values = shown.stage_values
+        return cls(part.skin_stack, shown.rest_points, frames, stage_values)
 
     def points(self) -> np.ndarray:
         """float32 [vertices, 3], object space."""
