@@ -19,7 +19,7 @@ file(REMOVE_RECURSE "${folder}")
 if(GLM)
   file(COPY "${GLM}/glm" DESTINATION "${folder}/fetched")
   run(${CMAKE_COMMAND} -S "${SOURCE}" -B "${build}" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DSINEW_BUILD_TESTS=OFF
-    ${without_glm} "-DFETCHCONTENT_SOURCE_DIR_GLM=${folder}/fetched" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+    -DSINEW_ONE_TARGET=ON ${without_glm} "-DFETCHCONTENT_SOURCE_DIR_GLM=${folder}/fetched" "-DCMAKE_CXX_FLAGS=${FLAGS}")
   run(${CMAKE_COMMAND} --build "${build}")
 endif()
 
