@@ -61,7 +61,9 @@ def lbs(x, of, w, pose, kept):
     return w @ by_whole_bones(x, of, pose)
 
 
-def translations(x, of, pose):  # [n, 3]: with its rotation about the origin, each bone's that moves x as the whole bone
+def translations(
+    x, of, pose
+):  # [n, 3]: with its rotation about the origin, each bone's that moves x as the whole bone
     return by_whole_bones(x, of, pose) - np.array([pose.rotation[b] @ x for b in of])
 
 
@@ -87,16 +89,17 @@ def cor(x, of, w, pose, kept):
 
 
 def sbs(x, of, w, pose, kept):
-    """The centre is the point that the bones move most alike; of several the one nearest to the mean of their heads."""
-    start, count = pose.head[of].mean(axis=0), len(of)
-    if count == 1:
-        return about(start, x, of, w, pose)
-    a, b = np.triu_indices(count, 1)
+    """The centre is the point that the bones move most alike; of several the nearest to their heads' mean."""
+    centre, count = pose.head[of].mean(axis=0), len(of)
+    first, second = np.triu_indices(count, 1)
     r, t = pose.rotation[of], pose.translation[of]
-    equations, wanted = (r[a] - r[b]).reshape(-1, 3), (t[b] - t[a]).ravel()
+    equations = (r[first] - r[second]).reshape(-1, 3)
+    wanted = (t[second] - t[first]).ravel() - equations @ centre
     # Directions along which rotations agree are free.
-    inverse = np.linalg.pinv(equations, rcond=1e-3 * count / np.linalg.norm(equations, 2)) if equations.any() else 0
-    centre = start + inverse @ (wanted - equations @ start) if equations.any() else start
+    u, sizes, vt = np.linalg.svd(equations, full_matrices=False)
+    for left, size, right in zip(u.T, sizes, vt, strict=True):
+        if size > 1e-3 * count:
+            centre = centre + (left @ wanted) / size * right
     return about(centre, x, of, w, pose)
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skinning of this folder's cases in numpy, float64, one vertex at a time, as README.md says it; run, it says how far
-it is from what the files hold. methods.py has the methods, stages.py what may follow them."""
+"""The skinning of this folder's cases in numpy, float64, one vertex at a time, as README.md says it; run, it
+says how far it is from what the files hold. methods.py has the methods, stages.py what may follow them."""
 
 import json
 import sys
@@ -40,8 +40,8 @@ def quaternion(r):  # (w, x, y, z) of a rotation, w >= 0
 
 
 def bones(case):
-    """Of every bone, then of every joint of bendy bones: its motion, the rotation in it (3x3 and quaternion), the
-    translation that goes with the rotation where the bone is not scaled, and its head at rest."""
+    """Of every bone, then of every joint of bendy bones: its motion, the rotation in it (3x3 and quaternion),
+    the translation that goes with the rotation where the bone is not scaled, and its head at rest."""
     rest, posed = case["rest"], case["posed"]
     motion = posed @ np.linalg.inv(rest)
     rotation = np.array([axes(p) @ axes(r).T for p, r in zip(posed, rest, strict=True)])
@@ -71,7 +71,9 @@ def influences(case, vertex, point):
     """Bones or joints, and their weights of sum 1, in stored order; none where the vertex stays."""
     span = range(case["offsets"][vertex], case["offsets"][vertex + 1])
     pairs = [
-        (bone, case["weights"][i] * share) for i in span for bone, share in joints(case, case["bones"][i], point)
+        (bone, case["weights"][i] * share)
+        for i in span
+        for bone, share in joints(case, case["bones"][i], point)
     ]
     pairs = [(bone, weight) for bone, weight in pairs if weight > 0]
     total = sum(weight for _bone, weight in pairs)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may follow a method: each takes a case, deformed points in the mesh object's space and its parameters, whose
-vertex group is the name of an array, and gives the points back changed."""
+"""What may follow a method: each takes a case, deformed points in the mesh object's space and its parameters,
+whose vertex group is the name of an array, and gives the points back changed."""
 
 import numpy as np
 import skin
@@ -26,7 +26,7 @@ def nearest(head, tail, point):  # of a segment
 
 
 def segments(case):
-    """Head and tail of each bone at rest; of a joint of a bendy bone the ends of the two segments beside it, as one."""
+    """Head and tail of each bone at rest; of a bendy bone's joint the ends of the two segments beside it."""
     heads = case["rest"][:, :3, 3].copy()
     tails = heads.copy()
     for bone, n in enumerate(case["segments"]):
@@ -40,7 +40,9 @@ def segments(case):
     return heads, tails
 
 
-def stretch(linear, axis):  # how much longer the motion makes what is across the bone, seen along its image, at most
+def stretch(
+    linear, axis
+):  # how much longer the motion makes what is across the bone, seen along its image, at most
     if not axis.any():
         return np.linalg.norm(linear) / np.sqrt(3)
     axis = axis / np.linalg.norm(axis)
@@ -53,7 +55,9 @@ def bulge_limit(case, points, strength, form, group):
     to, motion, result = case["armature_from_mesh"], skin.bones(case).motion, points.copy()
     heads, tails = segments(case)
     stretches = [stretch(m[:3, :3], t - h) for m, h, t in zip(motion, heads, tails, strict=True)]
-    for v, (rest, x) in enumerate(zip(skin.moved_by(to, case["points"]), skin.moved_by(to, points), strict=True)):
+    for v, (rest, x) in enumerate(
+        zip(skin.moved_by(to, case["points"]), skin.moved_by(to, points), strict=True)
+    ):
         of, w = skin.influences(case, v, rest)
         if len(of) < 2:
             continue
