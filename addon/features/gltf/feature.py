@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender gets of it: a check box in the glTF exporter, kept in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+
+class SinewGltf(bpy.types.PropertyGroup):
+    """What the glTF exporter writes besides."""
+
+    skinning: bpy.props.BoolProperty(
+        name="Skinning Data",
+        description="Write for engines how Sinew deforms each mesh: its method, and the centres of rotation "
+        "and the shares of the painted mix of its vertices",
+        default=False,
+        options=set(),
+    )
+
+
+CLASSES = (SinewGltf,)
+
+
+def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """In the side bar of the exporter."""
+    header, body = layout.panel("GLTF_sinew", default_closed=False)
+    header.label(text="Sinew", translate=False)
+    if body is not None:
+        body.use_property_split = True
+        body.prop(context.scene.sinew_gltf, "skinning")
+
+
+def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) -> None:
+    """settings: the exporter's own. begin_export: from there on Sinew deforms nothing."""
+    from . import export
+
+    context = bpy.context
+    found, left_out = export.collect(context) if context.scene.sinew_gltf.skinning else ([], [])
+    begin_export()
+    left_out += export.begin(found, settings)
+    for sentence in left_out:
+        settings["log"].warning(sentence)
+
+
+def register() -> None:
+    bpy.types.Scene.sinew_gltf = bpy.props.PointerProperty(type=SinewGltf)
+
+
+def unregister() -> None:
+    from . import export
+
+    export.end()
+    del bpy.types.Scene.sinew_gltf
