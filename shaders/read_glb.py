@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character of a .glb, skinned as the shaders do, with numpy: the mesh and its attributes as trimesh reads them,
-the skin and the animation by glTF 2.0.
+"""A character of a .glb, skinned as the shaders do, with numpy: the mesh and its attributes as trimesh reads
+them, the skin and the animation by glTF 2.0.
 
     python read_glb.py character.glb points.npz --times 0,0.5,1
 
-points.npz has for each skinned mesh the points [times, vertices, 3] in Blender's axes, by the name of its node.
+points.npz has for each skinned mesh the points [times, vertices, 3] in Blender's axes, by the name of its
+node.
 """
 
 import argparse
@@ -70,7 +71,8 @@ def influences(file, attributes):
     """Joints and weights [vertices, 4 n]."""
     sets = range(sum(name.startswith("JOINTS_") for name in attributes))
     joints, weights = (
-        np.hstack([file.array(attributes[f"{name}_{number}"]) for number in sets]) for name in ("JOINTS", "WEIGHTS")
+        np.hstack([file.array(attributes[f"{name}_{number}"]) for number in sets])
+        for name in ("JOINTS", "WEIGHTS")
     )
     return joints, weights.astype(np.float64)
 
@@ -102,15 +104,23 @@ def skinned(method, points, centres, joints, weights, bones):
         signed = np.where((q * real).sum(axis=1, keepdims=True) < 0.0, -weight, weight)
         t = moved(bone, points) - rotated(q, points)
         real += signed * q
-        dual += 0.5 * signed * np.column_stack([q[:, 3:] * t + np.cross(t, q[:, :3]), -(t * q[:, :3]).sum(axis=1)])
+        dual += (
+            0.5
+            * signed
+            * np.column_stack([q[:, 3:] * t + np.cross(t, q[:, :3]), -(t * q[:, :3]).sum(axis=1)])
+        )
     length = np.linalg.norm(real, axis=1, keepdims=True)
     real, dual = real / length, dual / length
     if method == "dq":
-        translation = real[:, 3:] * dual[:, :3] - dual[:, 3:] * real[:, :3] + np.cross(real[:, :3], dual[:, :3])
+        translation = (
+            real[:, 3:] * dual[:, :3] - dual[:, 3:] * real[:, :3] + np.cross(real[:, :3], dual[:, :3])
+        )
         return rotated(real, points) + 2.0 * translation
     if method == "cor":
         arms = points - centres
-        return linear + rotated(real, arms) - sum(weight * rotated(bone[:, 3], arms) for bone, weight in slots)
+        return (
+            linear + rotated(real, arms) - sum(weight * rotated(bone[:, 3], arms) for bone, weight in slots)
+        )
     raise SystemExit(f"{method}: these shaders have lbs, dq and cor alone")
 
 
@@ -133,11 +143,11 @@ def _mesh_at(file, scene, node, world):
     from_rest = file.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
     bones = bone_buffer(world[skin["joints"]], np.linalg.inv(from_rest.astype(np.float64)))
     extras = mesh.get("extras", {}).get("sinew", {"method": "lbs"})
-    # trimesh has a geometry for each primitive.
-    names = [mesh["name"]] if len(mesh["primitives"]) == 1 else None
+    # trimesh has a geometry for each primitive, in the order of the file.
+    before = sum(len(each["primitives"]) for each in file.header["meshes"][: node["mesh"]])
+    geometries = list(scene.geometry.values())[before:]
     parts = []
-    for number, primitive in enumerate(mesh["primitives"]):
-        geometry = scene.geometry[names[number] if names else f"{mesh['name']}_{number}"]
+    for primitive, geometry in zip(mesh["primitives"], geometries, strict=False):
         own = geometry.vertex_attributes
         joints, weights = influences(file, primitive["attributes"])
         arguments = (np.asarray(geometry.vertices), own.get("_SINEW_CENTRE"), joints, weights, bones)
@@ -151,7 +161,9 @@ def _mesh_at(file, scene, node, world):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("glb", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--times", default="0", help="in seconds, at keys")

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How Sinew deforms a mesh, in a glTF file: extras of the mesh name the method, and application-specific attributes
-of its vertices (glTF 2.0, 3.7.2.1: names that begin with an underscore) have what the method keeps of each.
+"""How Sinew deforms a mesh, in a glTF file: extras of the mesh name the method, and application-specific
+attributes of its vertices (glTF 2.0, 3.7.2.1: names that begin with an underscore) have what the method keeps
+of each.
 
-Meshes have these attributes for the time of an export, as the exporter splits vertices at seams and knows best which
-is which. They are made where it calls before an export and removed where it calls after it.
+Meshes have these attributes for the time of an export, as the exporter splits vertices at seams and knows
+best which is which. They are made where it calls before an export and removed where it calls after it.
 """
 
 from __future__ import annotations
@@ -47,14 +48,16 @@ class Skinning:
 
 @dataclass
 class _Export:
-    """The one that runs.
+    """The one that runs, or the last.
 
-    written     by the names of objects
+    written     extras by the names of objects
+    left_out    a sentence for each object that the file says nothing of
     meshes      that have attributes for its time
     all_custom  the artist wants the meshes' other attributes that begin with an underscore, too
     """
 
-    written: dict[str, Skinning] = field(default_factory=dict)
+    written: dict[str, dict[str, Any]] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
     meshes: list[bpy.types.Mesh] = field(default_factory=list)
     all_custom: bool = True
 
@@ -67,7 +70,9 @@ def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
     of. While Sinew still deforms them."""
     found, left_out = [], []
     depsgraph = context.evaluated_depsgraph_get()
-    objects = [obj for obj in context.scene.objects if properties.has_sinew(obj) and not properties.is_copy(obj)]
+    objects = [
+        obj for obj in context.scene.objects if properties.has_sinew(obj) and not properties.is_copy(obj)
+    ]
     for obj in objects:
         if not properties.of(obj).enabled:
             continue
@@ -97,7 +102,9 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
         skinning.shares = binding.mix_weights
     parameters = stage_settings.method_values(settings, [settings.method, mixed])
     stages = [name for name in stage_settings.names_on(settings) if name != "mix"]
-    skinning.extras |= {name: value for name, value in (("parameters", parameters), ("stages", stages)) if value}
+    skinning.extras |= {
+        name: value for name, value in (("parameters", parameters), ("stages", stages)) if value
+    }
     if "cor" in (settings.method, mixed):
         armature = settings.armature
         assert armature is not None
@@ -107,48 +114,62 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
     return skinning
 
 
-def begin(found: Sequence[Skinning], settings: dict[str, Any]) -> list[str]:
-    """Gives meshes their attributes; a sentence for each that could not have them.
+def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str, Any]) -> None:
+    """Gives meshes their attributes.
 
-    settings  the exporter's own
+    found, left_out  of collect()
+    settings         the exporter's own
     """
     end()
-    left_out = []
+    _current.written, _current.left_out = {}, list(left_out)
+    _current.all_custom = settings["gltf_attributes"]
     for skinning in found:
-        obj, mesh = skinning.obj, skinning.obj.data
-        if mesh in _current.meshes and (skinning.centres is not None or skinning.shares is not None):
-            left_out.append(
-                f"{obj.name}: exported without Sinew's skinning data: another object has its mesh; make it a "
-                "single user (Object > Relations)"
-            )
-            continue
-        _current.written[obj.name] = skinning
-        if skinning.centres is not None:
-            # As the exporter has the positions of a skin: in world space.
-            space = np.array(obj.matrix_world, dtype=np.float64)
-            space = _Y_UP @ space if settings["gltf_yup"] else space
-            mesh_io.write_vectors(mesh, CENTRE, transformed(skinning.centres, space).astype(np.float32))
-        if skinning.shares is not None:
-            mesh_io.write_values(mesh, SHARE, np.clip(skinning.shares, 0.0, 1.0))
-        if skinning.centres is not None or skinning.shares is not None:
-            _current.meshes.append(mesh)
+        _add(skinning, y_up=settings["gltf_yup"])
     if _current.meshes:
-        _current.all_custom = settings["gltf_attributes"]
         settings["gltf_attributes"] = True
+    for sentence in _current.left_out:
+        settings["log"].warning(sentence)
     if not bpy.app.background:
         # An exporter that fails does not say that it has ended.
         bpy.app.timers.register(end, first_interval=0.0)
-    return left_out
+
+
+def _add(skinning: Skinning, y_up: bool) -> None:
+    obj, mesh = skinning.obj, skinning.obj.data
+    if mesh in _current.meshes:
+        _current.left_out.append(
+            f"{obj.name}: exported without Sinew's skinning data: another object has its mesh; make it a "
+            "single user (Object > Relations)"
+        )
+        return
+    _current.written[obj.name] = skinning.extras
+    if skinning.centres is not None:
+        # As the exporter has the positions of a skin: in world space.
+        space = np.array(obj.matrix_world, dtype=np.float64)
+        space = _Y_UP @ space if y_up else space
+        mesh_io.write_vectors(mesh, CENTRE, transformed(skinning.centres, space).astype(np.float32))
+    if skinning.shares is not None:
+        mesh_io.write_values(mesh, SHARE, np.clip(skinning.shares, 0.0, 1.0))
+    if skinning.centres is not None or skinning.shares is not None:
+        _current.meshes.append(mesh)
 
 
 def end() -> None:
     """Takes the attributes off again."""
     meshes, _current.meshes = _current.meshes, []
-    _current.written.clear()
-    _current.all_custom = True
     for mesh in meshes:
         for name in (CENTRE, SHARE):
             mesh_io.remove_attribute(mesh, name)
+
+
+def written() -> dict[str, dict[str, Any]]:
+    """Of the last export the extras, by the names of objects."""
+    return dict(_current.written)
+
+
+def left_out() -> list[str]:
+    """Of the last export a sentence for each object that the file says nothing of."""
+    return list(_current.left_out)
 
 
 class GltfExtension:
@@ -159,11 +180,13 @@ class GltfExtension:
         if not _current.all_custom and attribute.attr_name not in (CENTRE, SHARE):
             attribute.keep = False
 
-    def gather_mesh_hook(self, gltf_mesh: Any, _mesh: bpy.types.Mesh, obj: bpy.types.Object | None, *_: Any) -> None:
+    def gather_mesh_hook(
+        self, gltf_mesh: Any, _mesh: bpy.types.Mesh, obj: bpy.types.Object | None, *_: Any
+    ) -> None:
         """obj: that the mesh is exported for, None for one without a skin."""
-        skinning = _current.written.get(obj.name) if obj is not None else None
-        if skinning is not None:
-            gltf_mesh.extras = {**(gltf_mesh.extras or {}), EXTRAS: skinning.extras}
+        extras = _current.written.get(obj.name) if obj is not None else None
+        if extras is not None:
+            gltf_mesh.extras = {**(gltf_mesh.extras or {}), EXTRAS: extras}
             return
         # Of another object with this mesh.
         for primitive in gltf_mesh.primitives:

@@ -40,9 +40,7 @@ def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) ->
     context = bpy.context
     found, left_out = export.collect(context) if context.scene.sinew_gltf.skinning else ([], [])
     begin_export()
-    left_out += export.begin(found, settings)
-    for sentence in left_out:
-        settings["log"].warning(sentence)
+    export.begin(found, left_out, settings)
 
 
 def register() -> None:
