@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -238,6 +241,20 @@ def test_command(tmp_path, capfd):
     nearest = np.linalg.norm(got[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
     assert set(nearest) == set(range(expected.shape[1]))
     assert scenes.worst(got, expected[:, nearest]) <= 1e-5 * np.linalg.norm(np.ptp(expected[0], axis=0))
+
+
+def test_the_example_of_the_documentation(tmp_path, monkeypatch, capfd):
+    text = (REPOSITORY / "docs" / "engines.md").read_text(encoding="utf-8")
+    example = text[text.index("### An example") :]
+    shutil.copy(REPOSITORY / "blend_files" / "wrist.blend", tmp_path / "human.blend")
+    monkeypatch.chdir(tmp_path)
+    # Where Blender looks.
+    monkeypatch.setenv("PWD", str(tmp_path))
+    for line in re.findall(r"^    (sinew .*)$", example, re.MULTILINE):
+        program, *words = shlex.split(line)
+        subprocess.run([Path(sys.executable).with_name(program), *words], check=True, timeout=120)
+    exec(re.search(r"```python\n(.*?)```", example, re.DOTALL)[1], {})
+    assert "of the diagonal" in capfd.readouterr().out
 
 
 def test_command_errors(tmp_path, capfd):
