@@ -19,6 +19,8 @@ import sinew_addon
 from sinew_addon.deform import small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+# The reader of glTF for engines.
+sys.path.append(str(REPOSITORY / "shaders"))
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 # What commands write: left to 4.2 and the newest, between which the others lie. These run all other tests:
 # how Blender evaluates, stores and edits.

@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+import read_glb
 import scenes
 import sinew_addon
 from conftest import REPOSITORY
@@ -20,9 +21,6 @@ from mathutils import Euler
 from sinew_addon import cli
 from sinew_addon.deform import evaluate
 from sinew_addon.features.gltf import export
-
-sys.path.append(str(REPOSITORY / "shaders"))
-import read_glb
 
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
