@@ -23,6 +23,8 @@ class SinewGltf(bpy.types.PropertyGroup):
 
 CLASSES = (SinewGltf,)
 
+_ADDON = __package__.rpartition(".features")[0]
+
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     """In the side bar of the exporter."""
@@ -45,10 +47,23 @@ def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) ->
 
 def register() -> None:
     bpy.types.Scene.sinew_gltf = bpy.props.PointerProperty(type=SinewGltf)
+    _exporters_panels()[_ADDON] = draw
 
 
 def unregister() -> None:
     from . import export
 
     export.end()
+    _exporters_panels().pop(_ADDON, None)
     del bpy.types.Scene.sinew_gltf
+
+
+def _exporters_panels() -> dict[str, Callable]:
+    """What draws in the exporter's side bar, by the names of extensions. Blender 4.2 finds draw_export() of
+    an extension by itself, and keeps it here; newer ones expect it here."""
+    try:
+        import io_scene_gltf2
+    except ImportError:
+        # Blender can be built without.
+        return {}
+    return getattr(io_scene_gltf2, "exporter_extension_layout_draw", {})
