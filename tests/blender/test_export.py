@@ -30,10 +30,16 @@ GROUP = "Painted"
 @pytest.fixture(autouse=True)
 def switched_on(empty_file):
     """Exporters look for extensions among those that are."""
-    entry = bpy.context.preferences.addons.new()
-    entry.module = sinew_addon.__name__
+    switch_on()
     yield
-    bpy.context.preferences.addons.remove(entry)
+    addons = bpy.context.preferences.addons
+    addons.remove(addons[sinew_addon.__name__])
+
+
+def switch_on() -> None:
+    addons = bpy.context.preferences.addons
+    if sinew_addon.__name__ not in addons:
+        addons.new().module = sinew_addon.__name__
 
 
 def make_character(materials: int = 1) -> bpy.types.Object:
@@ -170,6 +176,36 @@ def test_sinew_deforms_on_after_the_export(tmp_path):
     write(tmp_path / "a.glb")
     assert np.array_equal(world_shapes(obj, FRAMES), before)
     assert obj.sinew.enabled
+
+
+def test_after_an_export_that_failed(tmp_path):
+    """Nobody says that it has ended: the next one finds meshes that are no longer there, or are."""
+    obj = make_character()
+    use(obj, "cor")
+    found, left_out = export.collect(bpy.context)
+    assert left_out == []
+    export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
+    assert "_SINEW_CENTRE" in obj.data.attributes
+    write(tmp_path / "a.glb")
+    assert "_SINEW_CENTRE" not in obj.data.attributes
+    export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    switch_on()
+    obj = make_character()
+    use(obj, "cor")
+    write(tmp_path / "b.glb")
+    assert_plays(tmp_path / "b.glb", obj, FRAMES)
+
+
+def test_custom_properties_stay(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    obj.data["tailor"] = "Ann"
+    # Saved files keep centres in the mesh.
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    extras = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]["extras"]
+    assert extras.pop("sinew") == {"version": 1, "method": "cor"}
+    assert extras["tailor"] == "Ann"
 
 
 def test_off_is_not_exported(tmp_path):

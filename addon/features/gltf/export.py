@@ -10,6 +10,7 @@ best which is which. They are made where it calls before an export and removed w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -158,8 +159,10 @@ def end() -> None:
     """Takes the attributes off again."""
     meshes, _current.meshes = _current.meshes, []
     for mesh in meshes:
-        for name in (CENTRE, SHARE):
-            mesh_io.remove_attribute(mesh, name)
+        # After an export that failed, the file may be another one.
+        with suppress(ReferenceError):
+            for name in (CENTRE, SHARE):
+                mesh_io.remove_attribute(mesh, name)
 
 
 def written() -> dict[str, dict[str, Any]]:
