@@ -16,15 +16,35 @@ def unregister() -> None:
     registration.unregister()
 
 
-def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
-    """Blender's glTF exporter calls this before an export."""
-    from .deform import exporters
+# --- What Blender's glTF exporter looks for in an extension
 
-    exporters.before_export(export_settings)
+
+def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
+    """Called before an export."""
+    from .deform import exporters
+    from .features.gltf import feature
+
+    feature.before_export(export_settings, exporters.before_export)
 
 
 def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
-    """Blender's glTF exporter calls this after an export."""
+    """Called after an export."""
     from .deform import exporters
+    from .features.gltf import export
 
+    export.end()
     exporters.after_export(export_settings)
+
+
+def glTF2ExportUserExtension() -> object:  # noqa: N802
+    """Taken for a class, whose object is asked during an export."""
+    from .features.gltf import export
+
+    return export.GltfExtension()
+
+
+def draw_export(context: object, layout: object) -> None:
+    """Called to draw in the exporter's side bar."""
+    from .features.gltf import feature
+
+    feature.draw(context, layout)

@@ -27,6 +27,7 @@ def register() -> None:
     from .features.compare import feature as compare
     from .features.corrective import feature as corrective
     from .features.diagnose import feature as diagnose
+    from .features.gltf import feature as gltf
     from .features.heat import feature as heat
     from .features.inbetween import feature as inbetween
     from .features.suggest import feature as suggest
@@ -49,7 +50,7 @@ def register() -> None:
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
         *(character_operators, presets, menus, main_panel, meshes_panel),
-        *(suggest, inbetween, bake, corrective, compare, heat, diagnose),
+        *(suggest, inbetween, bake, corrective, compare, heat, diagnose, gltf),
     ):
         _register_classes(owner.CLASSES)
     translations.register()
@@ -64,7 +65,7 @@ def register() -> None:
     inbetween.register()
     handlers.register()
     exporters.register()
-    for feature in (suggest, bake, compare, heat, diagnose):
+    for feature in (suggest, bake, compare, heat, diagnose, gltf):
         feature.register()
     handlers.adopt_open_file()
     atexit.unregister(_end)
@@ -78,6 +79,7 @@ def unregister() -> None:
         from .features.bake import feature as bake
         from .features.compare import feature as compare
         from .features.diagnose import feature as diagnose
+        from .features.gltf import feature as gltf
         from .features.heat import feature as heat
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
@@ -86,7 +88,7 @@ def unregister() -> None:
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
-        for feature in (diagnose, heat, compare, bake, suggest):
+        for feature in (gltf, diagnose, heat, compare, bake, suggest):
             feature.unregister()
         exporters.unregister()
         handlers.unregister()

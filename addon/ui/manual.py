@@ -33,6 +33,7 @@ _SECTIONS = {
     "bpy.types.scene.sinew_most_influences*": "diagnostics",
     "bpy.types.sinewmeasures*": "heat-map",
     "bpy.types.sinewcomparison*": "compare",
+    "bpy.types.sinewgltf*": "bake",
     "bpy.types.sinewpreferences*": "preferences",
     "bpy.types.sinew*.scale_rule*": "stages",
     "bpy.types.sinew*.normals*": "stages",

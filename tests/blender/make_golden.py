@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small rigs and what Blender's Armature modifier makes of them, for engines that want to match it.
+"""Small rigs and what Blender's Armature modifier and Sinew make of them, for engines that want to match it.
 
     python tests/blender/make_golden.py [FOLDER]
 
@@ -8,18 +8,42 @@ FOLDER, by default tests/golden, holds the README that says what is in a case.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
 import numpy as np
 import scenes
+import sinew
+import sinew_addon
 from mathutils import Euler, Quaternion
+from sinew_addon.attach.properties import METHODS
+from sinew_addon.core.parameters import Value
+from sinew_addon.core.sdef import KEYS
+from sinew_addon.deform import evaluate, session
+from sinew_addon.io import mesh_io
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
+# Raised where a reader of the files before would not read these rightly.
+FORMAT = 2
+GROUP = "painted"
+
+# Blender's own methods, by the names of their arrays.
+BLENDERS = {"lbs": "linear", "dq": "preserve_volume"}
+# Of methods' parameters that are no choice, where the default suits no mesh as coarse as these.
+METHOD_VALUES: dict[str, dict[str, Value]] = {"ddm": {"radius": 0.3}}
+# For each stage the methods that it follows, with its parameters but for choices.
+STAGE_VALUES: dict[str, list[tuple[str, dict[str, Value]]]] = {
+    "mix": [(a, {"method": b, "group": GROUP}) for a, b in (("lbs", "dq"), ("dq", "cor"), ("cor", "lbs"))],
+    "bulge_limit": [("dq", {"strength": 0.8, "group": GROUP})],
+    "delta_mush": [("lbs", {"iterations": 4, "factor": 0.6, "scale": 0.9, "group": GROUP})],
+}
 
 
 def turned(obj: bpy.types.Object, armature: bpy.types.Object, degrees: float = 80.0) -> None:
@@ -87,7 +111,7 @@ def bendy(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
         bone.bbone_curveinx, bone.bbone_curveoutz, bone.bbone_rollout = 0.2, -0.15, 0.6
 
 
-CASES: tuple[Callable[[bpy.types.Object, bpy.types.Object], None], ...] = (
+CASES = (
     rotated,
     weights,
     scaled,
@@ -97,32 +121,148 @@ CASES: tuple[Callable[[bpy.types.Object, bpy.types.Object], None], ...] = (
 )
 
 
-def make(set_up: Callable[[bpy.types.Object, bpy.types.Object], None]) -> tuple[dict, dict[str, np.ndarray]]:
+@dataclass
+class Result:
+    """What an array of points is: an entry of the JSON's `results`."""
+
+    array: str
+    by: str
+    method: str
+    parameters: dict[str, Value] = field(default_factory=dict)
+    stages: dict[str, dict[str, Value]] = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Of all parameters, by full names."""
+        owners = {self.method: self.parameters, **self.stages}
+        values = {f"{owner}.{name}": value for owner, own in owners.items() for name, value in own.items()}
+        switches = {f"{stage}.enabled": True for stage in self.stages if stage != "mix"}
+        return values | switches
+
+
+def results() -> list[Result]:
+    """By the lists of methods and stages, each with all its choices."""
+    return [
+        *(Result(array, "Blender", method) for method, array in BLENDERS.items()),
+        *(
+            Result(array, "Sinew", method.name, METHOD_VALUES.get(method.name, {}) | chosen)
+            for method in METHODS.values()
+            if method.name not in BLENDERS
+            for array, chosen in choices(method)
+        ),
+        *(
+            Result(f"{array}_after_{first}", "Sinew", first, {}, {stage.name: values | chosen})
+            for stage in sinew.stages()
+            for first, values in STAGE_VALUES[stage.name]
+            for array, chosen in choices(stage)
+        ),
+    ]
+
+
+def choices(owner: sinew.Method | sinew.Stage) -> Iterator[tuple[str, dict[str, Value]]]:
+    """Each with the name of its array."""
+    kinds = [parameter for parameter in owner.parameters if parameter.kind == "enum"]
+    for chosen in itertools.product(*(kind.choices for kind in kinds)):
+        yield "_".join([owner.name, *chosen]), {k.id: c for k, c in zip(kinds, chosen, strict=True)}
+
+
+SetUp = Callable[[bpy.types.Object, bpy.types.Object], None]
+
+
+def make(set_up: SetUp) -> tuple[dict, dict[str, np.ndarray]]:
     """One case: what its JSON says, and the arrays of its npz."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    obj, armature = scenes.make_arm(bones=3, sides=6, rings=10)
-    set_up(obj, armature)
-    bpy.context.view_layer.update()
-    linear, preserve_volume = (scenes.modifier_shapes(obj, [1], flag)[0] for flag in (False, True))
-    arrays = {**influences(obj, armature), **bones(armature)}
+    obj, armature = make_rig(set_up)
+    arrays = {**influences(obj, armature), **bones(armature), **topology(obj.data)}
     arrays["points"] = scenes.rest_points(obj)
     arrays["armature_from_mesh"] = np.array(
         armature.matrix_world.inverted() @ obj.matrix_world, dtype=np.float32
     )
-    arrays["linear"], arrays["preserve_volume"] = linear, preserve_volume
+    arrays[GROUP] = shares(obj)
+    names = [bone.name for bone in armature.data.bones]
+    made = results()
+    for result in made:
+        obj, _armature = make_rig(set_up)
+        if result.by == "Blender":
+            arrays[result.array] = scenes.modifier_shapes(obj, [1], result.method == "dq")[0]
+            continue
+        evaluate.set_parameters(result.values)
+        evaluate.use_method(obj, result.method)
+        arrays[result.array] = scenes.final_points(obj)
+        data = vertex_data(obj, result.method)
+        if data is not None:
+            arrays[f"data_{result.method}"] = data
     about = {
+        "format": FORMAT,
         "about": set_up.__doc__,
         "blender": bpy.app.version_string,
-        "bones": [bone.name for bone in armature.data.bones],
+        "bones": names,
+        "results": [vars(result) for result in made],
         "arrays": {name: f"{a.dtype} {list(a.shape)}" for name, a in sorted(arrays.items())},
     }
     return about, arrays
 
 
+def make_rig(set_up: SetUp) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """In an empty file: a posed arm with a painted vertex group, and with the shape keys that sdef reads."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj, armature = scenes.make_arm(bones=3, sides=6, rings=10)
+    set_up(obj, armature)
+    paint(obj)
+    make_spheres(obj)
+    bpy.context.view_layer.update()
+    return obj, armature
+
+
+def paint(obj: bpy.types.Object) -> None:
+    """A vertex group of stretches of 0 and of 1, and all between."""
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex, share in enumerate(np.random.default_rng(2).uniform(-0.5, 1.5, len(obj.data.vertices))):
+        if share > 0.0:
+            group.add([vertex], min(float(share), 1.0), "REPLACE")
+
+
+def shares(obj: bpy.types.Object) -> np.ndarray:
+    index = obj.vertex_groups[GROUP].index
+    own = [[e.weight for e in vertex.groups if e.group == index] for vertex in obj.data.vertices]
+    return np.array([sum(weights) for weights in own], dtype=np.float32)
+
+
+def make_spheres(obj: bpy.types.Object) -> None:
+    """C, R0 and R1 of every vertex but each seventh, as shape keys that change nothing by themselves."""
+    rng = np.random.default_rng(3)
+    obj.shape_key_add(name="Basis")
+    keys = [obj.shape_key_add(name=name) for name in KEYS]
+    for key in keys:
+        # In Blender 5.2 a new key has the value 1.
+        key.value = 0.0
+    for vertex in obj.data.vertices:
+        if vertex.index % 7:
+            centre = np.array([round(vertex.co.x), 0.02, -0.03])
+            for key, point in zip(keys, (centre, *(centre + rng.uniform(-0.2, 0.2, (2, 3)))), strict=True):
+                key.data[vertex.index].co = point
+
+
+def vertex_data(obj: bpy.types.Object, method: str) -> np.ndarray | None:
+    """What the method keeps of vertices, as the library takes it."""
+    state = session.state_of(obj)
+    assert state is not None
+    kept = state.bound.binding.vertex_data
+    return None if kept is None else kept.of(method, np.eye(4))
+
+
+def topology(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
+    read = mesh_io.read_topology(mesh)
+    return {"face_offsets": read.face_offsets, "corner_vertices": read.corner_vertices, "edges": read.edges}
+
+
 def influences(obj: bpy.types.Object, armature: bpy.types.Object) -> dict[str, np.ndarray]:
     names = [bone.name for bone in armature.data.bones]
     entries = [
-        [(names.index(obj.vertex_groups[e.group].name), e.weight) for e in vertex.groups]
+        [
+            (names.index(obj.vertex_groups[e.group].name), e.weight)
+            for e in vertex.groups
+            if obj.vertex_groups[e.group].name != GROUP
+        ]
         for vertex in obj.data.vertices
     ]
     flat = [entry for of_vertex in entries for entry in of_vertex]
@@ -157,6 +297,9 @@ def bones(armature: bpy.types.Object) -> dict[str, np.ndarray]:
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
+    # What another run has computed is not what this one makes.
+    os.environ["SINEW_CACHE"] = "0"
+    sinew_addon.register()
     for set_up in CASES:
         about, arrays = make(set_up)
         (folder / f"{set_up.__name__}.json").write_text(json.dumps(about, indent=2) + "\n")

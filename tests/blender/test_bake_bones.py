@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 import json
-import struct
 import subprocess
 import sys
 
 import bpy
 import numpy as np
 import pytest
+import read_glb
 import scenes
-import trimesh
 from program import run_sinew
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
@@ -125,69 +124,14 @@ def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     assert report["after"]["rms"] < 0.3 * report["before"]["rms"]
 
 
-def accessors_of(glb):
-    """The header of a .glb, and a function that reads one of its accessors as an array."""
-    data = glb.read_bytes()
-    length = struct.unpack("<I", data[12:16])[0]
-    header, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
-    types = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-    widths = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-
-    def read(number):
-        accessor = header["accessors"][number]
-        view = header["bufferViews"][accessor["bufferView"]]
-        width = widths[accessor["type"]]
-        assert "byteStride" not in view
-        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        kind = types[accessor["componentType"]]
-        return np.frombuffer(binary, kind, accessor["count"] * width, start).reshape(-1, width)
-
-    return header, read
-
-
-def local_matrix(node):
-    quaternion = np.roll(np.asarray(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64), 1)
-    matrix = trimesh.transformations.quaternion_matrix(quaternion)
-    matrix[:3, :3] *= np.asarray(node.get("scale", (1.0, 1.0, 1.0)))
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix
-
-
 def skinned_by_gltf(glb, frames, rate):
-    """World points [frames, vertices, 3] in Blender's axes: vertices and hierarchy as trimesh reads them, the
-    skin and the animation by the specification of glTF 2.0."""
-    header, read = accessors_of(glb)
-    scene = trimesh.load(glb, process=False)
-    (rest,) = (geometry.vertices for geometry in scene.geometry.values())
-    (mesh,) = header["meshes"]
-    attributes = mesh["primitives"][0]["attributes"]
-    assert "JOINTS_1" not in attributes
-    slots, weights = read(attributes["JOINTS_0"]), read(attributes["WEIGHTS_0"]).astype(np.float64)
-    (skin,) = header["skins"]
-    # By columns.
-    from_rest = read(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2).astype(np.float64)
-    nodes = [dict(node) for node in header["nodes"]]
-    parents = {child: node for node in nodes for child in node.get("children", ())}
+    """World points [frames, vertices, 3] in Blender's axes, blended linearly by the reader for engines."""
+    header = read_glb.File(glb).header
+    assert "JOINTS_1" not in header["meshes"][0]["primitives"][0]["attributes"]
     # The action without helper bones stays in the file, and is exported, too.
-    (animation,) = (each for each in header["animations"] if each["name"].endswith("Helpers"))
-    homogeneous = np.column_stack([rest, np.ones(len(rest))])
-    shapes = []
-    for frame in frames:
-        for channel in animation["channels"]:
-            sampler = animation["samplers"][channel["sampler"]]
-            times, values = read(sampler["input"])[:, 0], read(sampler["output"])
-            assert sampler.get("interpolation", "LINEAR") == "LINEAR" or len(times) <= 2
-            # At a key, or between equal ones.
-            at = [np.interp(frame / rate, times, column) for column in values.T]
-            nodes[channel["target"]["node"]][channel["target"]["path"]] = at
-        for joint in skin["joints"]:
-            name, above = nodes[joint]["name"], parents[joint]["name"]
-            scene.graph.update(frame_to=name, frame_from=above, matrix=local_matrix(nodes[joint]))
-        joints = np.array([scene.graph.get(nodes[joint]["name"])[0] for joint in skin["joints"]])
-        blended = np.einsum("vs,vsij->vij", weights, (joints @ from_rest)[slots])
-        x, y, z = np.einsum("vij,vj->vi", blended, homogeneous)[:, :3].T
-        shapes.append(np.column_stack([x, -z, y]))
-    return np.array(shapes)
+    (name,) = (each["name"] for each in header["animations"] if each["name"].endswith("Helpers"))
+    (points,) = read_glb.points_at(glb, np.array(frames) / rate, name).values()
+    return points
 
 
 def test_gltf_plays_to_the_stated_error(arm, tmp_path):

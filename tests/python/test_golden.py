@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The golden set's reader reproduces it, and so does the library."""
 
-import runpy
+import importlib
+import itertools
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +16,26 @@ ORACLES = [("lbs", "linear"), ("dq", "preserve_volume")]
 TOLERANCE = 1e-5
 
 
+@pytest.fixture
+def reader(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    yield importlib.import_module("skin")
+    for name in ("skin", "methods", "stages"):
+        sys.modules.pop(name, None)
+
+
 def read(path):
     case = dict(np.load(path))
     return case, TOLERANCE * np.linalg.norm(np.ptp(case["points"], axis=0))
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
-def test_reader(path):
-    skin = runpy.run_path(str(FOLDER / "skin.py"))["skin"]
-    case, tolerance = read(path)
-    for preserve_volume, name in ((False, "linear"), (True, "preserve_volume")):
-        assert np.abs(skin(case, preserve_volume) - case[name]).max() <= tolerance
+def test_reader(reader, path):
+    _arrays, tolerance = read(path)
+    case, about = reader.read(path)
+    for result in about["results"]:
+        points = reader.result_of(case, result)
+        assert np.abs(points - case[result["array"]]).max() <= tolerance, result
 
 
 @pytest.mark.parametrize("path", [p for p in CASES if p.stem != "bendy"], ids=lambda path: path.stem)
@@ -44,3 +55,28 @@ def test_library(path, method, name):
 
 def test_there_are_cases():
     assert {"rotated", "scaled", "mirrored", "antipodal", "bendy"} <= {path.stem for path in CASES}
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_every_method_and_stage_is_there(reader, path):
+    _case, about = reader.read(path)
+    results = about["results"]
+    found = {
+        **{m: [r["parameters"] for r in results if r["method"] == m.name] for m in sinew.methods()},
+        **{s: [r["stages"][s.name] for r in results if s.name in r["stages"]] for s in sinew.stages()},
+    }
+    for owner, values in found.items():
+        assert values, owner.name
+        for parameter in owner.parameters:
+            if parameter.kind == "enum":
+                assert {each[parameter.id] for each in values} == set(parameter.choices)
+    listed = {name: f"{array.dtype} {list(array.shape)}" for name, array in np.load(path).items()}
+    assert about["arrays"] == listed
+
+
+def test_no_two_results_of_a_case_are_the_same(reader):
+    """So that a reader that takes one method for another is found."""
+    case, about = reader.read(FOLDER / "weights.npz")
+    names = [result["array"] for result in about["results"]]
+    for a, b in itertools.combinations(names, 2):
+        assert np.abs(case[a] - case[b]).max() > 1e-3, (a, b)

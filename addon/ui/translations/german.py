@@ -705,6 +705,13 @@ TEXTS = {
     ),
     "Sinew bakes": "Sinew backt",
     "Bake stopped; nothing was written": "Backen angehalten; nichts wurde geschrieben",
+    # glTF
+    "Skinning Data": "Skinning-Daten",
+    "Write for engines how Sinew deforms each mesh: its method, and the centres of rotation and the shares "
+    "of the painted mix of its vertices": (
+        "Für Engines schreiben, wie Sinew jede Masche verformt: ihre Methode, und die Drehzentren und die "
+        "Anteile der gemalten Mischung ihrer Punkte"
+    ),
     # Compare
     "Compare": "Vergleichen",
     "Compare…": "Vergleichen…",

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`sinew export`: a .glb by Blender's own exporter, with what engines need to skin as Sinew does."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+from ..core.errors import SinewError, WrongUse
+from ..core.output import file_to_write, write_whole
+from .arguments import add_file, add_set, count
+from .console import Console
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "export",
+        help="write a .glb whose skins have Sinew's method and centres of rotation",
+        description="Writes a .glb by Blender's own exporter: bones, weights and actions as ever, and in "
+        "extras and attributes of each mesh that an armature deforms what an engine needs to skin it as "
+        "Sinew does.",
+    )
+    add_file(parser)
+    parser.add_argument(
+        "--out", required=True, type=partial(file_to_write, endings=(".glb",)), metavar="OUT.glb"
+    )
+    parser.add_argument(
+        "--method", help="a method of `sinew methods`, for all meshes (default: each as the file has it)"
+    )
+    parser.add_argument(
+        "--influences", type=count, default=4, metavar="N", help="of a vertex, at most (default: 4)"
+    )
+    add_set(parser)
+    return parser
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    import bpy
+    import sinew
+
+    from ..attach import attach, properties
+    from ..deform import evaluate
+    from ..features.gltf import export
+    from ..io import files
+
+    names = [method.name for method in sinew.methods()]
+    if args.method is not None and args.method not in names:
+        raise WrongUse(f"method: expected one of {', '.join(names)}, got {args.method!r}")
+    files.open_file(args.file)
+    scene = bpy.context.scene
+    meshes = attach.deformed_meshes(list(scene.objects))
+    left_out: list[str] = []
+    # Blender does not evaluate what is hidden.
+    with evaluate.shown(meshes):
+        if args.method is not None:
+            evaluate.set_parameters(args.set)
+            errors = evaluate.use_methods([(obj, args.method) for obj in meshes])
+            left_out += [str(error) for error in errors if error is not None]
+        if not any(properties.has_sinew(obj) and properties.of(obj).enabled for obj in meshes):
+            reason = left_out[0] if left_out else "no mesh has Sinew; choose a method by --method"
+            raise SinewError(f"{args.file}: {reason}")
+        scene.sinew_gltf.skinning = True
+        with _known_to_exporters():
+            write_whole(args.out, lambda path: _write(path, args.influences))
+    left_out += export.left_out()
+    for sentence in left_out:
+        console.complain(f"{args.file}: {sentence}")
+    for name, extras in export.written().items():
+        console.note(
+            f"{name}: {extras['method']}" + (f", mixed with {extras['mix']}" if "mix" in extras else "")
+        )
+    console.say(str(args.out))
+    return 1 if left_out else 0
+
+
+def _write(path: Path, influences: int) -> None:
+    import bpy
+
+    try:
+        bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_influence_nb=influences)
+    except RuntimeError as error:
+        raise SinewError(f"{path}: the glTF exporter failed: {error}") from None
+
+
+@contextmanager
+def _known_to_exporters() -> Iterator[None]:
+    """They look for extensions among those that are switched on, where Sinew is not with bpy as a module."""
+    import bpy
+
+    module = __package__.rpartition(".")[0]
+    addons = bpy.context.preferences.addons
+    if module in addons:
+        yield
+        return
+    entry = addons.new()
+    entry.module = module
+    try:
+        yield
+    finally:
+        addons.remove(entry)

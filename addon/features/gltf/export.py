@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How Sinew deforms a mesh, in a glTF file: extras of the mesh name the method, and application-specific
+attributes of its vertices (glTF 2.0, 3.7.2.1: names that begin with an underscore) have what the method keeps
+of each.
+
+Meshes have these attributes for the time of an export, as the exporter splits vertices at seams and knows
+best which is which. They are made where it calls before an export and removed where it calls after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...attach import properties, stage_settings
+from ...core.errors import SinewError
+from ...core.spaces import transformed
+from ...deform import session
+from ...io import armature_io, mesh_io
+
+# Raised where a reader of the files before would not read these rightly.
+VERSION = 1
+CENTRE, SHARE = "_SINEW_CENTRE", "_SINEW_MIX"
+EXTRAS = "sinew"
+
+# By glTF's axes: x, z, -y.
+_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
+
+
+@dataclass
+class Skinning:
+    """How one mesh is deformed.
+
+    extras   in the file's words
+    centres  float32 [vertices, 3], object space; None where its methods have none
+    shares   float32 [vertices], of the mixed method; None without one
+    """
+
+    obj: bpy.types.Object
+    extras: dict[str, Any]
+    centres: np.ndarray | None = None
+    shares: np.ndarray | None = None
+
+
+@dataclass
+class _Export:
+    """The one that runs, or the last.
+
+    written     extras by the names of objects
+    left_out    a sentence for each object that the file says nothing of
+    meshes      that have attributes for its time
+    all_custom  the artist wants the meshes' other attributes that begin with an underscore, too
+    """
+
+    written: dict[str, dict[str, Any]] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    meshes: list[bpy.types.Mesh] = field(default_factory=list)
+    all_custom: bool = True
+
+
+_current = _Export()
+
+
+def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
+    """How the meshes that Sinew deforms now are deformed, and a sentence for each that no file can say it
+    of. While Sinew still deforms them."""
+    found, left_out = [], []
+    depsgraph = context.evaluated_depsgraph_get()
+    objects = [
+        obj for obj in context.scene.objects if properties.has_sinew(obj) and not properties.is_copy(obj)
+    ]
+    for obj in objects:
+        if not properties.of(obj).enabled:
+            continue
+        try:
+            found.append(_skinning_of(obj, depsgraph))
+        except SinewError as error:
+            left_out.append(f"{obj.name}: exported without Sinew's skinning data: {error}")
+    return found, left_out
+
+
+def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinning:
+    states = session.states_of([obj], depsgraph)
+    if not states or properties.of(obj).armature is None:
+        raise SinewError("Sinew does not deform it")
+    if len(properties.of(obj).replaced_modifiers) != 1:
+        raise SinewError("several Armature modifiers deform it")
+    if obj.data.library is not None or obj.mode == "EDIT":
+        raise SinewError("its mesh is linked or in edit mode")
+    settings = properties.of(obj)
+    binding = states[0][1].bound.binding
+    mixed = settings.mixed_method
+    if binding.mix_weights is None or mixed == settings.method:
+        mixed = ""
+    skinning = Skinning(obj, {"version": VERSION, "method": settings.method})
+    if mixed:
+        skinning.extras["mix"] = mixed
+        skinning.shares = binding.mix_weights
+    parameters = stage_settings.method_values(settings, [settings.method, mixed])
+    stages = [name for name in stage_settings.names_on(settings) if name != "mix"]
+    skinning.extras |= {
+        name: value for name, value in (("parameters", parameters), ("stages", stages)) if value
+    }
+    if "cor" in (settings.method, mixed):
+        armature = settings.armature
+        assert armature is not None
+        assert binding.vertex_data is not None
+        space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
+        skinning.centres = binding.vertex_data.of("cor", space)
+    return skinning
+
+
+def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str, Any]) -> None:
+    """Gives meshes their attributes.
+
+    found, left_out  of collect()
+    settings         the exporter's own
+    """
+    end()
+    _current.written, _current.left_out = {}, list(left_out)
+    _current.all_custom = settings["gltf_attributes"]
+    for skinning in found:
+        _add(skinning, y_up=settings["gltf_yup"])
+    if _current.meshes:
+        settings["gltf_attributes"] = True
+    for sentence in _current.left_out:
+        settings["log"].warning(sentence)
+    if not bpy.app.background:
+        # An exporter that fails does not say that it has ended.
+        bpy.app.timers.register(end, first_interval=0.0)
+
+
+def _add(skinning: Skinning, y_up: bool) -> None:
+    obj, mesh = skinning.obj, skinning.obj.data
+    if mesh in _current.meshes:
+        _current.left_out.append(
+            f"{obj.name}: exported without Sinew's skinning data: another object has its mesh; make it a "
+            "single user (Object > Relations)"
+        )
+        return
+    _current.written[obj.name] = skinning.extras
+    if skinning.centres is not None:
+        # As the exporter has the positions of a skin: in world space.
+        space = np.array(obj.matrix_world, dtype=np.float64)
+        space = _Y_UP @ space if y_up else space
+        mesh_io.write_vectors(mesh, CENTRE, transformed(skinning.centres, space).astype(np.float32))
+    if skinning.shares is not None:
+        mesh_io.write_values(mesh, SHARE, np.clip(skinning.shares, 0.0, 1.0))
+    if skinning.centres is not None or skinning.shares is not None:
+        _current.meshes.append(mesh)
+
+
+def end() -> None:
+    """Takes the attributes off again."""
+    meshes, _current.meshes = _current.meshes, []
+    for mesh in meshes:
+        # After an export that failed, the file may be another one.
+        with suppress(ReferenceError):
+            for name in (CENTRE, SHARE):
+                mesh_io.remove_attribute(mesh, name)
+
+
+def written() -> dict[str, dict[str, Any]]:
+    """Of the last export the extras, by the names of objects."""
+    return dict(_current.written)
+
+
+def left_out() -> list[str]:
+    """Of the last export a sentence for each object that the file says nothing of."""
+    return list(_current.left_out)
+
+
+class GltfExtension:
+    """What the exporter asks while it reads meshes."""
+
+    def gather_attribute_keep(self, attribute: Any, _settings: dict[str, Any]) -> None:
+        """Of those that begin with an underscore, by the artist's choice all or these alone."""
+        if not _current.all_custom and attribute.attr_name not in (CENTRE, SHARE):
+            attribute.keep = False
+
+    def gather_mesh_hook(
+        self, gltf_mesh: Any, _mesh: bpy.types.Mesh, obj: bpy.types.Object | None, *_: Any
+    ) -> None:
+        """obj: that the mesh is exported for, None for one without a skin."""
+        extras = _current.written.get(obj.name) if obj is not None else None
+        if extras is not None:
+            gltf_mesh.extras = {**(gltf_mesh.extras or {}), EXTRAS: extras}
+            return
+        # Of another object with this mesh.
+        for primitive in gltf_mesh.primitives:
+            for name in (CENTRE, SHARE):
+                primitive.attributes.pop(name, None)

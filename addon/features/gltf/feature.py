@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender gets of it: a check box in the glTF exporter, kept in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+
+class SinewGltf(bpy.types.PropertyGroup):
+    """What the glTF exporter writes besides."""
+
+    skinning: bpy.props.BoolProperty(
+        name="Skinning Data",
+        description="Write for engines how Sinew deforms each mesh: its method, and the centres of rotation "
+        "and the shares of the painted mix of its vertices",
+        default=False,
+        options=set(),
+    )
+
+
+CLASSES = (SinewGltf,)
+
+_ADDON = __package__.rpartition(".features")[0]
+
+
+def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """In the side bar of the exporter."""
+    header, body = layout.panel("GLTF_sinew", default_closed=False)
+    header.label(text="Sinew", translate=False)
+    if body is not None:
+        body.use_property_split = True
+        body.prop(context.scene.sinew_gltf, "skinning")
+
+
+def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) -> None:
+    """settings: the exporter's own. begin_export: from there on Sinew deforms nothing."""
+    from . import export
+
+    context = bpy.context
+    found, left_out = export.collect(context) if context.scene.sinew_gltf.skinning else ([], [])
+    begin_export()
+    export.begin(found, left_out, settings)
+
+
+def register() -> None:
+    bpy.types.Scene.sinew_gltf = bpy.props.PointerProperty(type=SinewGltf)
+    _exporters_panels()[_ADDON] = draw
+
+
+def unregister() -> None:
+    from . import export
+
+    export.end()
+    _exporters_panels().pop(_ADDON, None)
+    del bpy.types.Scene.sinew_gltf
+
+
+def _exporters_panels() -> dict[str, Callable]:
+    """What draws in the exporter's side bar, by the names of extensions. Blender 4.2 finds draw_export() of
+    an extension by itself, and keeps it here; newer ones expect it here."""
+    try:
+        import io_scene_gltf2
+    except ImportError:
+        # Blender can be built without.
+        return {}
+    return getattr(io_scene_gltf2, "exporter_extension_layout_draw", {})

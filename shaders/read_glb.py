@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A character of a .glb, skinned as the shaders do, with numpy: the mesh and its attributes as trimesh reads
+them, the skin and the animation by glTF 2.0.
+
+    python read_glb.py character.glb points.npz --times 0,0.5,1
+
+points.npz has for each skinned mesh the points [times, vertices, 3] in Blender's axes, by the name of its
+node.
+"""
+
+import argparse
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from bone_buffer import bone_buffer
+
+COMPONENTS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+class File:
+    """The header of a .glb and its accessors."""
+
+    def __init__(self, path):
+        data = Path(path).read_bytes()
+        length = struct.unpack("<I", data[12:16])[0]
+        self.header, self._binary = json.loads(data[20 : 20 + length]), data[28 + length :]
+
+    def array(self, number):
+        accessor = self.header["accessors"][number]
+        view = self.header["bufferViews"][accessor["bufferView"]]
+        assert "byteStride" not in view, "interleaved attributes are left out here"
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        kind, width = COMPONENTS[accessor["componentType"]], WIDTHS[accessor["type"]]
+        return np.frombuffer(self._binary, kind, accessor["count"] * width, start).reshape(-1, width)
+
+
+def local_matrix(node):
+    quaternion = np.roll(np.asarray(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64), 1)
+    matrix = trimesh.transformations.quaternion_matrix(quaternion)
+    matrix[:3, :3] *= np.asarray(node.get("scale", (1.0, 1.0, 1.0)))
+    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return matrix
+
+
+def world_matrices(file, animation, time):
+    """float64 [nodes, 4, 4] at a time in seconds."""
+    nodes = [dict(node) for node in file.header["nodes"]]
+    for channel in animation["channels"] if animation else ():
+        sampler = animation["samplers"][channel["sampler"]]
+        times, values = file.array(sampler["input"])[:, 0], file.array(sampler["output"])
+        # At a key. Between two, rotations are to be blended on the sphere.
+        at = [np.interp(time, times, column) for column in values.T]
+        nodes[channel["target"]["node"]][channel["target"]["path"]] = at
+    parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", ())}
+    found = {}
+
+    def world(number):
+        if number not in found:
+            own = local_matrix(nodes[number])
+            found[number] = world(parents[number]) @ own if number in parents else own
+        return found[number]
+
+    return np.array([world(number) for number in range(len(nodes))])
+
+
+def influences(file, attributes):
+    """Joints and weights [vertices, 4 n]."""
+    sets = range(sum(name.startswith("JOINTS_") for name in attributes))
+    joints, weights = (
+        np.hstack([file.array(attributes[f"{name}_{number}"]) for number in sets])
+        for name in ("JOINTS", "WEIGHTS")
+    )
+    return joints, weights.astype(np.float64)
+
+
+def rotated(quaternions, vectors):
+    """Vectors [n, 3] by quaternions [n, 4], x, y, z, w."""
+    axes, real = quaternions[:, :3], quaternions[:, 3:]
+    return vectors + 2.0 * np.cross(axes, np.cross(axes, vectors) + real * vectors)
+
+
+def moved(bones, points):
+    """Points [n, 3] by the matrices of bones [n, 4, 4] of the bone buffer."""
+    return np.einsum("nij,nj->ni", bones[:, :3, :3], points) + bones[:, :3, 3]
+
+
+def skinned(method, points, centres, joints, weights, bones):
+    """As the shaders: points [vertices, 3] by lbs, dq or cor.
+
+    bones  float [bones, 4, 4], of bone_buffer()
+    """
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    slots = [(bones[joints[:, k]].astype(np.float64), weights[:, k, None]) for k in range(joints.shape[1])]
+    linear = sum(weight * moved(bone, points) for bone, weight in slots)
+    if method == "lbs":
+        return linear
+    real, dual = np.zeros((len(points), 4)), np.zeros((len(points), 4))
+    for bone, weight in slots:
+        q = bone[:, 3]
+        signed = np.where((q * real).sum(axis=1, keepdims=True) < 0.0, -weight, weight)
+        t = moved(bone, points) - rotated(q, points)
+        real += signed * q
+        dual += (
+            0.5
+            * signed
+            * np.column_stack([q[:, 3:] * t + np.cross(t, q[:, :3]), -(t * q[:, :3]).sum(axis=1)])
+        )
+    length = np.linalg.norm(real, axis=1, keepdims=True)
+    real, dual = real / length, dual / length
+    if method == "dq":
+        translation = (
+            real[:, 3:] * dual[:, :3] - dual[:, 3:] * real[:, :3] + np.cross(real[:, :3], dual[:, :3])
+        )
+        return rotated(real, points) + 2.0 * translation
+    if method == "cor":
+        arms = points - centres
+        return (
+            linear + rotated(real, arms) - sum(weight * rotated(bone[:, 3], arms) for bone, weight in slots)
+        )
+    raise SystemExit(f"{method}: these shaders have lbs, dq and cor alone")
+
+
+def points_at(path, times, animation_name=None):
+    """For each skinned mesh float64 [times, vertices, 3], in Blender's axes, by the name of its node."""
+    file, scene = File(path), trimesh.load(path, process=False)
+    animations = file.header.get("animations", [])
+    chosen = [each for each in animations if animation_name in (None, each["name"])]
+    worlds = [world_matrices(file, chosen[0] if chosen else None, time) for time in times]
+    result = {}
+    for node in file.header["nodes"]:
+        if "skin" in node:
+            result[node["name"]] = np.array([_mesh_at(file, scene, node, world) for world in worlds])
+    return result
+
+
+def _mesh_at(file, scene, node, world):
+    mesh, skin = file.header["meshes"][node["mesh"]], file.header["skins"][node["skin"]]
+    # By columns; their inverses are the joints' axes at rest.
+    from_rest = file.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
+    bones = bone_buffer(world[skin["joints"]], np.linalg.inv(from_rest.astype(np.float64)))
+    extras = mesh.get("extras", {}).get("sinew", {"method": "lbs"})
+    # trimesh has a geometry for each primitive, in the order of the file.
+    before = sum(len(each["primitives"]) for each in file.header["meshes"][: node["mesh"]])
+    geometries = list(scene.geometry.values())[before:]
+    parts = []
+    for primitive, geometry in zip(mesh["primitives"], geometries, strict=False):
+        own = geometry.vertex_attributes
+        joints, weights = influences(file, primitive["attributes"])
+        arguments = (np.asarray(geometry.vertices), own.get("_SINEW_CENTRE"), joints, weights, bones)
+        points = skinned(extras["method"], *arguments)
+        if "mix" in extras:
+            share = np.asarray(own["_SINEW_MIX"]).reshape(-1, 1)
+            points += share * (skinned(extras["mix"], *arguments) - points)
+        parts.append(points)
+    x, y, z = np.vstack(parts).T
+    return np.column_stack([x, -z, y])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("glb", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--times", default="0", help="in seconds, at keys")
+    parser.add_argument("--animation", help="its name (default: the first)")
+    args = parser.parse_args()
+    times = [float(time) for time in args.times.split(",")]
+    np.savez(args.out, **points_at(args.glb, times, args.animation))

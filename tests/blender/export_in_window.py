@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In Blender's window, with Sinew's zip: exports glTF by the file browser, whose side bar has a check box.
+Prints "FACTS" and a line of JSON; pictures of the browser lie in the folder.
+
+    blender --factory-startup --enable-event-simulate --python export_in_window.py -- sinew.zip FOLDER
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import five_meshes
+import window
+
+ZIP, FOLDER = window.arguments()
+# In the picture of a window of 1280 x 800.
+CHECK_BOX, EXPORT = (1145, 307), (1207, 757)
+
+
+def header(path: Path) -> dict:
+    data = path.read_bytes()
+    return json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
+
+
+def export(path: Path, clicked: tuple[tuple[int, int], ...]) -> Iterator[None]:
+    with window.in_view3d("WINDOW"):
+        bpy.ops.export_scene.gltf("INVOKE_DEFAULT", filepath=str(path))
+    yield
+    yield
+    for place in clicked:
+        yield from window.click(place)
+    window.photograph(path.with_suffix(".png"))
+    yield from window.click(EXPORT)
+    for _tick in range(20):
+        if any(area.type == "VIEW_3D" for area in bpy.context.window_manager.windows[0].screen.areas):
+            break
+        yield
+
+
+def of_sinew(path: Path) -> dict[str, object]:
+    return {
+        mesh["name"]: [
+            mesh.get("extras", {}).get("sinew", {}).get("method"),
+            "_SINEW_CENTRE" in mesh["primitives"][0]["attributes"],
+        ]
+        for mesh in header(path)["meshes"]
+    }
+
+
+def steps() -> Iterator[None]:
+    # In the window itself, where a picture of the screen has it.
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    window.install(ZIP)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    five_meshes.make(vertices=2000)
+    with window.in_view3d():
+        bpy.ops.sinew.add()
+    for obj in bpy.data.objects:
+        if obj.type == "MESH":
+            obj.sinew.method = "cor"
+    yield
+    yield
+    yield from export(FOLDER / "without.glb", ())
+    yield from export(FOLDER / "with.glb", (CHECK_BOX,))
+    facts = {name: of_sinew(FOLDER / f"{name}.glb") for name in ("without", "with")}
+    facts["attributes"] = [
+        a.name for mesh in bpy.data.meshes for a in mesh.attributes if a.name.startswith("_SINEW")
+    ]
+    facts["on"] = [obj.sinew.enabled for obj in bpy.data.objects if obj.sinew.stand_ins]
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+window.run(steps())

@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""glTF with Sinew's skinning data, read and skinned by a program of its own: shaders/read_glb.py."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import in_window
+import numpy as np
+import pytest
+import read_glb
+import scenes
+import sinew_addon
+from conftest import REPOSITORY
+from mathutils import Euler
+from sinew_addon import cli
+from sinew_addon.deform import evaluate
+from sinew_addon.features.gltf import export
+
+FRAMES = [1, 6, 11]
+GROUP = "Painted"
+
+
+@pytest.fixture(autouse=True)
+def switched_on(empty_file):
+    """Exporters look for extensions among those that are."""
+    switch_on()
+    yield
+    addons = bpy.context.preferences.addons
+    addons.remove(addons[sinew_addon.__name__])
+
+
+def switch_on() -> None:
+    addons = bpy.context.preferences.addons
+    if sinew_addon.__name__ not in addons:
+        addons.new().module = sinew_addon.__name__
+
+
+def make_character(materials: int = 1) -> bpy.types.Object:
+    """An arm, moved, rotated and scaled; faces of some materials, and vertices that know their number."""
+    obj, armature = scenes.make_arm(bones=3)
+    armature.location, armature.rotation_euler = (0.3, -0.4, 0.2), Euler((0.5, 0.2, -0.3))
+    armature.scale = (1.3, 1.3, 1.3)
+    obj.parent = armature
+    obj.location, obj.rotation_euler, obj.scale = (0.1, 0.0, 0.05), Euler((0.0, 0.1, 0.2)), (1.1, 0.9, 1.0)
+    numbers = obj.data.attributes.new("_NUMBER", "FLOAT", "POINT")
+    numbers.data.foreach_set("value", np.arange(len(obj.data.vertices), dtype=np.float32))
+    for number in range(materials):
+        obj.data.materials.append(bpy.data.materials.new(f"Skin {number}"))
+    for face in obj.data.polygons:
+        face.material_index = face.index % materials
+    bpy.context.view_layer.update()
+    return obj
+
+
+def paint(obj: bpy.types.Object) -> None:
+    group = obj.vertex_groups.new(name=GROUP)
+    for vertex, share in enumerate(np.random.default_rng(1).uniform(-0.5, 1.5, len(obj.data.vertices))):
+        group.add([vertex], float(np.clip(share, 0.0, 1.0)), "REPLACE")
+
+
+def use(obj: bpy.types.Object, method: str, mixed: str = "") -> None:
+    if mixed:
+        paint(obj)
+    evaluate.set_parameters({"mix.method": mixed, "mix.group": GROUP} if mixed else {})
+    evaluate.use_method(obj, method)
+
+
+def write(path: Path, **options: object) -> read_glb.File:
+    bpy.context.scene.sinew_gltf.skinning = True
+    bpy.ops.export_scene.gltf(**{"filepath": str(path), "export_attributes": True, **options})
+    return read_glb.File(path)
+
+
+def world_shapes(obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
+    shapes = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        shapes.append(evaluate.world_points([obj]))
+    return np.array(shapes)
+
+
+def numbers_in(file: read_glb.File, mesh: int = 0) -> np.ndarray:
+    """Of the vertices in Blender."""
+    primitives = file.header["meshes"][mesh]["primitives"]
+    return np.concatenate([file.array(p["attributes"]["_NUMBER"])[:, 0] for p in primitives]).astype(int)
+
+
+def assert_plays(path: Path, obj: bpy.types.Object, frames: list[int]) -> np.ndarray:
+    """To 1e-5 of the diagonal. Returns what was read."""
+    expected = world_shapes(obj, frames)
+    times = [frame / bpy.context.scene.render.fps for frame in frames]
+    got = read_glb.points_at(path, times)[obj.name]
+    diagonal = np.linalg.norm(np.ptp(expected[0], axis=0))
+    assert scenes.worst(got, expected[:, numbers_in(read_glb.File(path))]) <= 1e-5 * diagonal
+    assert scenes.worst(got[0], got[-1]) > 0.1 * diagonal
+    return got
+
+
+@pytest.mark.parametrize(
+    ("method", "mixed"), [("lbs", ""), ("dq", ""), ("cor", ""), ("lbs", "dq"), ("dq", "cor"), ("cor", "lbs")]
+)
+def test_it_plays_elsewhere_as_here(tmp_path, method, mixed):
+    obj = make_character()
+    use(obj, method, mixed)
+    file = write(tmp_path / "a.glb")
+    (mesh,) = file.header["meshes"]
+    assert mesh["extras"]["sinew"] == {"version": 1, "method": method, **({"mix": mixed} if mixed else {})}
+    (primitive,) = mesh["primitives"]
+    assert ("_SINEW_CENTRE" in primitive["attributes"]) == ("cor" in (method, mixed))
+    assert ("_SINEW_MIX" in primitive["attributes"]) == bool(mixed)
+    assert_plays(tmp_path / "a.glb", obj, FRAMES)
+
+
+def test_centres_matter_and_are_of_each_primitive(tmp_path):
+    obj = make_character(materials=3)
+    use(obj, "cor")
+    file = write(tmp_path / "a.glb")
+    assert len(file.header["meshes"][0]["primitives"]) == 3
+    got = assert_plays(tmp_path / "a.glb", obj, FRAMES)
+    use(obj, "dq")
+    assert scenes.worst(got[-1], world_shapes(obj, FRAMES)[-1][numbers_in(file)]) > 0.01
+
+
+def test_modifiers_applied(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    write(tmp_path / "a.glb", export_apply=True)
+    assert_plays(tmp_path / "a.glb", obj, FRAMES)
+
+
+def test_z_up(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    file = write(tmp_path / "a.glb", export_yup=False)
+    times = [frame / bpy.context.scene.render.fps for frame in FRAMES]
+    # The reader takes it for Y up.
+    x, y, z = np.moveaxis(read_glb.points_at(tmp_path / "a.glb", times)[obj.name], 2, 0)
+    expected = world_shapes(obj, FRAMES)[:, numbers_in(file)]
+    assert scenes.worst(np.stack([x, z, -y], axis=2), expected) <= 1e-5 * np.linalg.norm(
+        np.ptp(expected[0], axis=0)
+    )
+
+
+def test_without_the_check_box_the_file_is_as_before(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "a.glb"), export_attributes=True)
+    header = read_glb.File(tmp_path / "a.glb").header
+    assert "sinew" not in header["meshes"][0].get("extras", {})
+    assert {"_NUMBER"} == {n for n in header["meshes"][0]["primitives"][0]["attributes"] if n.startswith("_")}
+
+
+def test_other_attributes_are_the_artists_choice(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    names = [attribute.name for attribute in obj.data.attributes]
+    active = obj.data.attributes.active_index
+    file = write(tmp_path / "a.glb", export_attributes=False)
+    attributes = file.header["meshes"][0]["primitives"][0]["attributes"]
+    assert {name for name in attributes if name.startswith("_")} == {"_SINEW_CENTRE"}
+    assert [attribute.name for attribute in obj.data.attributes] == names
+    assert obj.data.attributes.active_index == active
+
+
+def test_sinew_deforms_on_after_the_export(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    before = world_shapes(obj, FRAMES)
+    write(tmp_path / "a.glb")
+    assert np.array_equal(world_shapes(obj, FRAMES), before)
+    assert obj.sinew.enabled
+
+
+def test_after_an_export_that_failed(tmp_path):
+    """Nobody says that it has ended: the next one finds meshes that are no longer there, or are."""
+    obj = make_character()
+    use(obj, "cor")
+    found, left_out = export.collect(bpy.context)
+    assert left_out == []
+    export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
+    assert "_SINEW_CENTRE" in obj.data.attributes
+    write(tmp_path / "a.glb")
+    assert "_SINEW_CENTRE" not in obj.data.attributes
+    export.begin(found, [], {"gltf_attributes": True, "gltf_yup": True})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    switch_on()
+    obj = make_character()
+    use(obj, "cor")
+    write(tmp_path / "b.glb")
+    assert_plays(tmp_path / "b.glb", obj, FRAMES)
+
+
+def test_custom_properties_stay(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    obj.data["tailor"] = "Ann"
+    # Saved files keep centres in the mesh.
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    extras = write(tmp_path / "a.glb", export_extras=True).header["meshes"][0]["extras"]
+    assert extras.pop("sinew") == {"version": 1, "method": "cor"}
+    assert extras["tailor"] == "Ann"
+
+
+def test_off_is_not_exported(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    obj.sinew.enabled = False
+    file = write(tmp_path / "a.glb")
+    assert "sinew" not in file.header["meshes"][0].get("extras", {})
+    assert export.left_out() == []
+
+
+def test_of_objects_with_one_mesh_the_first_has_it(tmp_path):
+    obj = make_character()
+    other = obj.copy()
+    other.name = "Other"
+    bpy.context.scene.collection.objects.link(other)
+    other.location.x += 2.0
+    use(obj, "cor")
+    use(other, "cor")
+    file = write(tmp_path / "a.glb")
+    (sentence,) = export.left_out()
+    assert sentence.startswith("Other: exported without Sinew's skinning data: another object has its mesh")
+    nodes = {
+        node["name"]: file.header["meshes"][node["mesh"]] for node in file.header["nodes"] if "mesh" in node
+    }
+    assert "_SINEW_CENTRE" in nodes["Arm"]["primitives"][0]["attributes"]
+    assert "_SINEW_CENTRE" not in nodes["Other"]["primitives"][0]["attributes"]
+    assert "sinew" not in nodes["Other"].get("extras", {})
+
+
+def test_parameters_and_stages_are_named(tmp_path):
+    obj = make_character()
+    evaluate.set_parameters({"ddm.variant": "2", "ddm.radius": 0.25, "bulge_limit.enabled": True})
+    evaluate.use_method(obj, "ddm")
+    extras = write(tmp_path / "a.glb").header["meshes"][0]["extras"]["sinew"]
+    assert extras == {
+        "version": 1,
+        "method": "ddm",
+        "parameters": {"ddm.variant": "2", "ddm.radius": 0.25},
+        "stages": ["bulge_limit"],
+    }
+
+
+def test_command(tmp_path, capfd):
+    """As docs/engines.md has it: exported, read by the program there, compared with `sinew points`."""
+    obj = make_character()
+    name = obj.name
+    world = np.array(obj.matrix_world)
+    file, glb = tmp_path / "arm.blend", tmp_path / "arm.glb"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    fps = bpy.context.scene.render.fps
+    assert cli.main(["export", str(file), "--method", "cor", "--out", str(glb)]) == 0
+    assert f"{name}: cor" in capfd.readouterr().err
+    times = ",".join(str(frame / fps) for frame in FRAMES)
+    reader = [
+        sys.executable,
+        str(REPOSITORY / "shaders" / "read_glb.py"),
+        str(glb),
+        str(tmp_path / "read.npz"),
+    ]
+    subprocess.run([*reader, "--times", times], check=True, timeout=60)
+    points = tmp_path / "points.npz"
+    frames = ",".join(map(str, FRAMES))
+    assert cli.main(["points", str(file), "--method", "cor", "--frames", frames, "--out", str(points)]) == 0
+    expected = np.load(points)[name] @ world[:3, :3].T + world[:3, 3]
+    got = np.load(tmp_path / "read.npz")[name]
+    # The command writes no numbers of vertices: the nearest at rest.
+    nearest = np.linalg.norm(got[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
+    assert set(nearest) == set(range(expected.shape[1]))
+    assert scenes.worst(got, expected[:, nearest]) <= 1e-5 * np.linalg.norm(np.ptp(expected[0], axis=0))
+
+
+def test_the_example_of_the_documentation(tmp_path, monkeypatch, capfd):
+    text = (REPOSITORY / "docs" / "engines.md").read_text(encoding="utf-8")
+    example = text[text.index("### An example") :]
+    shutil.copy(REPOSITORY / "blend_files" / "wrist.blend", tmp_path / "human.blend")
+    monkeypatch.chdir(tmp_path)
+    # Where Blender looks.
+    monkeypatch.setenv("PWD", str(tmp_path))
+    for line in re.findall(r"^    (sinew .*)$", example, re.MULTILINE):
+        program, *words = shlex.split(line)
+        subprocess.run([Path(sys.executable).with_name(program), *words], check=True, timeout=120)
+    exec(re.search(r"```python\n(.*?)```", example, re.DOTALL)[1], {})
+    assert "of the diagonal" in capfd.readouterr().out
+
+
+def test_command_errors(tmp_path, capfd):
+    make_character()
+    file = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    assert cli.main(["export", str(file), "--out", str(tmp_path / "a.glb")]) == 1
+    assert "no mesh has Sinew; choose a method by --method" in capfd.readouterr().err
+    assert cli.main(["export", str(file), "--method", "magic", "--out", str(tmp_path / "a.glb")]) == 2
+    assert not (tmp_path / "a.glb").exists()
+
+
+def test_human(tmp_path, real_rig):
+    file, glb = real_rig("human.blend"), tmp_path / "human.glb"
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    obj = max((o for o in bpy.data.objects if o.type == "MESH"), key=lambda o: len(o.data.vertices))
+    numbers = obj.data.attributes.new("_NUMBER", "FLOAT", "POINT")
+    numbers.data.foreach_set("value", np.arange(len(obj.data.vertices), dtype=np.float32))
+    use(obj, "cor")
+    write(glb, export_all_influences=True)
+    assert_plays(glb, obj, [1, 16, 32])
+
+
+@pytest.mark.once
+def test_in_a_window(tmp_path_factory):
+    """By the exporter's own browser, with the extension installed."""
+    facts = in_window.facts_of("export_in_window", tmp_path_factory.mktemp("window"), "five_meshes")
+    assert facts["printed"] == []
+    assert facts["with"].keys() == facts["without"].keys()
+    assert set(map(tuple, facts["without"].values())) == {(None, False)}
+    assert ["cor", True] in facts["with"].values()
+    # Bone-parented ones have no skin.
+    assert set(map(tuple, facts["with"].values())) <= {("cor", True), (None, False)}
+    assert facts["attributes"] == []
+    assert facts["on"]
+    assert all(facts["on"])

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What may follow a method: each takes a case, deformed points in the mesh object's space and its parameters,
+whose vertex group is the name of an array, and gives the points back changed."""
+
+import numpy as np
+import skin
+
+EPSILON = 10 * np.finfo(np.float32).eps
+
+
+# --- The painted mix of two methods
+
+
+def mix(case, points, method, group):
+    share = case[group].clip(0, 1)[:, None]
+    return (1 - share) * points + share * skin.skin(case, method, {})
+
+
+# --- Limit Bulge
+
+
+def nearest(head, tail, point):  # of a segment
+    along = tail - head
+    share = np.clip((point - head) @ along / max(along @ along, 1e-300), 0, 1)
+    return head + share * along
+
+
+def segments(case):
+    """Head and tail of each bone at rest; of a bendy bone's joint the ends of the two segments beside it."""
+    heads = case["rest"][:, :3, 3].copy()
+    tails = heads.copy()
+    for bone, n in enumerate(case["segments"]):
+        y = case["rest"][bone, :3, 1]
+        tails[bone] += case["lengths"][bone] * y
+        first = case["first_joint"][bone]
+        if n > 1:
+            own = case["rest"][first : first + n + 1, :3, 3]
+            heads[first : first + n + 1] = own[[0, *range(n)]]
+            tails[first : first + n + 1] = own[[*range(1, n + 1), n]]
+    return heads, tails
+
+
+def stretch(
+    linear, axis
+):  # how much longer the motion makes what is across the bone, seen along its image, at most
+    if not axis.any():
+        return np.linalg.norm(linear) / np.sqrt(3)
+    axis = axis / np.linalg.norm(axis)
+    image = linear @ axis
+    across = np.eye(3) - np.outer(image, image) / (image @ image)
+    return np.linalg.svd(across @ linear @ (np.eye(3) - np.outer(axis, axis)))[1][0]
+
+
+def bulge_limit(case, points, strength, form, group):
+    to, motion, result = case["armature_from_mesh"], skin.bones(case).motion, points.copy()
+    heads, tails = segments(case)
+    stretches = [stretch(m[:3, :3], t - h) for m, h, t in zip(motion, heads, tails, strict=True)]
+    for v, (rest, x) in enumerate(
+        zip(skin.moved_by(to, case["points"]), skin.moved_by(to, points), strict=True)
+    ):
+        of, w = skin.influences(case, v, rest)
+        if len(of) < 2:
+            continue
+        if form == "kim_han":  # the heaviest bone alone
+            of, w = of[[w.argmax()]], np.ones(1)
+        at_rest = w @ [np.linalg.norm(rest - nearest(heads[b], tails[b], rest)) for b in of]
+        allowed = at_rest * (w @ [stretches[b] for b in of])
+        ends = [skin.moved_by(motion[b], np.array([heads[b], tails[b]])) for b in of]
+        centre = w @ [nearest(*end, x) for end in ends]
+        distance = np.linalg.norm(x - centre)
+        if distance > allowed:
+            amount = strength * np.clip(case[group][v], 0, 1)
+            x = x + amount * (1 - allowed / distance) * (centre - x)
+            result[v] = skin.moved_by(np.linalg.inv(to), x)
+    return result
+
+
+# --- Delta Mush
+
+
+def smoothed(points, edges, factors, iterations, smooth_type):
+    points, (a, b) = points.copy(), edges.T
+    valence = np.bincount(edges.ravel(), minlength=len(points))
+    for _iteration in range(iterations):
+        along = points[b] - points[a]
+        lengths = np.linalg.norm(along, axis=1) if smooth_type == "length_weighted" else np.ones(len(along))
+        total, weight = np.zeros_like(points), np.zeros(len(points))
+        for ends, sign in ((a, 1.0), (b, -1.0)):
+            np.add.at(total, ends, sign * lengths[:, None] * along)
+            np.add.at(weight, ends, lengths)
+        if smooth_type == "length_weighted":
+            divisor, moves = weight * valence, weight * valence > EPSILON
+            points[moves] += (2 * factors[moves] / divisor[moves])[:, None] * total[moves]
+        else:
+            points += (factors / np.maximum(valence, 1))[:, None] * total
+    return points
+
+
+def unit(vector):
+    length = np.linalg.norm(vector)
+    return vector / length if length > 0 else vector
+
+
+def angle(cosine):  # by Blender's polynomial
+    m = min(abs(cosine), 1.0)
+    size = np.sqrt(1 - m) * (1.5707963267 + m * (-0.213300989 + m * (0.077980478 + m * -0.02164095)))
+    return np.pi - size if cosine < 0 else size
+
+
+def corner_axes(before, at, after):  # in columns, and how much the corner counts at its vertex
+    a, b = unit(before - at), unit(at - after)
+    if (np.abs(a - b) <= EPSILON).all():
+        return np.eye(3), 0.0
+    z, x = unit(np.cross(a, b)), unit(a + b)
+    return np.column_stack([x, np.cross(z, x), z]), angle(a @ b)
+
+
+def delta_mush(case, points, iterations, factor, smooth_type, scale, group):
+    rest, edges = case["points"], case["edges"]
+    factors = factor * case[group].clip(0, 1)
+    rest_smoothed = smoothed(rest, edges, factors, iterations, smooth_type)
+    result = smoothed(points, edges, factors, iterations, smooth_type)
+    posed, details, sums = result.copy(), np.zeros_like(rest), np.zeros(len(rest))
+    for start, end in zip(case["face_offsets"][:-1], case["face_offsets"][1:], strict=True):
+        face = case["corner_vertices"][start:end]
+        for before, at, after in zip(np.roll(face, 1), face, np.roll(face, -1), strict=True):
+            rest_axes, _weight = corner_axes(*rest_smoothed[[before, at, after]])
+            posed_axes, weight = corner_axes(*posed[[before, at, after]])
+            details[at] += weight * posed_axes @ rest_axes.T @ (rest[at] - rest_smoothed[at])
+            sums[at] += weight
+    some = sums > 0
+    result[some] += scale * details[some] / sums[some, None]
+    return result
