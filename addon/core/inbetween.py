@@ -117,7 +117,7 @@ class Inbetweens(NamedTuple):
 def straight(a: Poses, b: Poses, progress: np.ndarray, method: interpolate.Method) -> Inbetweens:
     """Each bone from `a` to `b`, [bones], as far as `progress` [bones] says: 0 is a, 1 is b."""
     between = interpolate.between(
-        _in_layout_of(method, a.rigid), _in_layout_of(method, b.rigid), progress, method
+        in_layout_of(method, a.rigid), in_layout_of(method, b.rigid), progress, method
     )
     return _inbetweens(between, a.scale + progress[:, None] * (b.scale - a.scale), method)
 
@@ -128,7 +128,7 @@ def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Met
     keys  [4, bones]: two before `at` and two after; at an end of the keys one of them twice
     times [4]
     """
-    layout = np.ascontiguousarray(np.swapaxes(_in_layout_of(method, keys.rigid), 0, 1))
+    layout = np.ascontiguousarray(np.swapaxes(in_layout_of(method, keys.rigid), 0, 1))
     values = [spline.catmull_rom(bone, times, at, method) for bone in layout]
     blended = interpolate.Blended(
         np.array([value.transforms for value in values]), np.array([value.is_defined for value in values])
@@ -157,20 +157,30 @@ def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.clip(np.divide(covered, total, out=np.zeros_like(total), where=moves), *PROGRESS_RANGE)
 
 
-def _in_layout_of(method: str, rigid: np.ndarray) -> np.ndarray:
+def in_layout_of(method: str, rigid: np.ndarray) -> np.ndarray:
+    """Rigid transforms in the layout that a method of sinew.interpolate takes."""
     if method.startswith("matrix_"):
         return quat_vec.to_affine(rigid)
     return rigid if method.startswith("qv_") else quat_vec.to_dual_quat(rigid)
 
 
+def rigid_of(method: str, transforms: np.ndarray) -> np.ndarray:
+    """What in_layout_of() undoes; of a matrix that is not rigid the nearest rotation."""
+    if method == "matrix_linear":
+        transforms = affine.normalized(transforms)
+    if method.startswith("matrix_"):
+        return affine.to_quat_vec(transforms)
+    return transforms if method.startswith("qv_") else sinew.dual_quat.to_quat_vec(transforms)
+
+
+def axes_of(matrices: np.ndarray) -> np.ndarray:
+    """[.., 3]: the lengths of a matrix's axes. With the rotation they are what a bone can have of it, as it
+    has no shear."""
+    return np.linalg.norm(matrices[..., :3, :3], axis=-2)
+
+
 def _inbetweens(blended: interpolate.Blended, scale: np.ndarray, method: str) -> Inbetweens:
     transforms = blended.transforms
-    if method.startswith("matrix_"):
-        if method == "matrix_linear":
-            # A bone has no shear: only the rotation and the lengths of the axes of a matrix are used.
-            scale = scale * np.linalg.norm(transforms[..., :3, :3], axis=-2)
-            transforms = affine.normalized(transforms)
-        rigid = affine.to_quat_vec(transforms)
-    else:
-        rigid = transforms if method.startswith("qv_") else sinew.dual_quat.to_quat_vec(transforms)
-    return Inbetweens(Poses(rigid, scale), np.asarray(blended.is_defined))
+    if method == "matrix_linear":
+        scale = scale * axes_of(transforms)
+    return Inbetweens(Poses(rigid_of(method, transforms), scale), np.asarray(blended.is_defined))

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clips of one armature blended: `sinew.interpolate.blend` over all frames and bones at once.
+
+Smith 2013, section 4.1, asks for it. Rigid parts are blended by the method; the scale is the mean of the
+clips' scales, by the same weights, as Blender keeps a bone's scale apart from its rotation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from sinew import interpolate, quat_vec
+
+from ..errors import SinewError
+from ..inbetween import Poses, axes_of, in_layout_of, rigid_of
+from . import timing
+from .align import Warp, align, same_pace
+from .clip import Clip, Rig, common_rig
+from .root import Grounded, accumulated, carried, grounded, main_root, stay
+
+RELATIVE, ARMATURE = "relative", "armature"
+TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
+
+
+class Method(NamedTuple):
+    """A way to blend, named as in sinew.interpolate.METHODS; the numbers are stored in files."""
+
+    name: str
+    label: str
+    description: str
+    number: int
+
+
+# The one to recommend first, as menus have them. "sclerp" is that of two, "dib" of many: they are one.
+METHODS = {
+    method.name: method
+    for method in (
+        Method("dlb", "Dual Quaternions (recommended)", "Normalised sum: rigid, nearly a screw. DLB", 6),
+        Method("sclerp", "Screw", "The screw between two, at an even pace; of more as DIB. ScLERP", 7),
+        Method("dib", "Screw of Many", "Dual quaternions blended iteratively, evenly. DIB", 8),
+        Method("qv_nlerp", "Quaternion and Vector", "Normalised sum of rotations, mean location: rigid", 4),
+        Method("qv_slerp", "Quaternion and Vector, Even", "Mean rotation on the sphere, mean location", 5),
+        Method("matrix_polar", "Matrix Made Rigid", "Mean matrix, brought back to the nearest rotation", 2),
+        Method("matrix_log", "Log-Matrix", "Mean of logarithms: rigid, dependent on the rest pose", 3),
+        Method("matrix_linear", "Linear Matrix", "Mean matrix: bones shrink where clips differ", 1),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """method       of METHODS
+    space        RELATIVE, each bone relative to its parent; or ARMATURE, where bones leave their parents
+    align        whether clips are brought to the same moment; else each plays from its first frame
+    align_bones  those that say which moment it is; none: all below the root
+    root         the bone that carries the others; None: found by main_root()
+    root_motion  TRAVEL: blended and added up; IN_PLACE: taken out; KEYED: blended as any bone's pose
+    cycles       how often the blend goes round; of clips that do not repeat once
+    """
+
+    method: interpolate.Method = "dlb"
+    space: str = RELATIVE
+    align: bool = True
+    align_bones: tuple[str, ...] = ()
+    root: str | None = None
+    root_motion: str = TRAVEL
+    cycles: int = 1
+
+
+@dataclass(frozen=True)
+class Blend:
+    """poses      [frames, bones, ..], each bone relative to its parent and rest
+    volume     [frames, bones]: determinant of what the method gives; below 1 a bone shrinks
+    apart      [frames, bones]: how far heads would be from where their parents hold them
+    undefined  bool [frames, bones]: where sinew.interpolate.blend says that its result is not defined
+    timing     of each clip in each frame
+    warps      of the clips
+    root       the bone that carried the others, None where root motion is as keyed
+    is_cyclic  the last pose is the first again, but for its travel
+    """
+
+    rig: Rig
+    poses: Poses
+    volume: np.ndarray
+    apart: np.ndarray
+    undefined: np.ndarray
+    timing: timing.Timing
+    warps: list[Warp]
+    root: str | None
+    is_cyclic: bool
+
+    def clip(self, name: str) -> Clip:
+        return Clip(name, self.rig, self.poses, float(len(self.poses.rigid) - 1), self.is_cyclic)
+
+
+def blend(
+    clips: Sequence[Clip],
+    weights: Sequence[float],
+    settings: Settings = Settings(),
+    weights_from: Sequence[float] | None = None,
+    up: np.ndarray = np.array([0.0, 0.0, 1.0]),
+) -> Blend:
+    """The clips blended by `weights`, brought to sum 1; from `weights_from` at the first frame, if given.
+
+    Whether a clip is a cycle is found from its poses, or as `Clip.is_cyclic` says. Where not all are, all are
+    aligned from their first pose to their last. The heaviest clip at the beginning is the reference: the
+    blend begins where it does.
+
+    up  [3], the vertical in armature space, of length 1
+    Raises SinewError for other settings, weights or bones than can be.
+    """
+    rig = common_rig(clips)
+    last = timing.checked_weights(weights, len(clips))
+    first = last if weights_from is None else timing.checked_weights(weights_from, len(clips))
+    _check(settings)
+    reference = int(np.argmax(first))
+    root = rig.index(settings.root) if settings.root is not None else main_root(rig, list(clips))
+    travels = _in_place(clips, root, up, settings)
+    placed = [travel.clip for travel in travels]
+    warps = _warps(placed, reference, rig, root, settings)
+    cycles = settings.cycles if all(clip.is_cyclic for clip in placed) or not settings.align else 1
+    schedule = (
+        timing.aligned(placed, warps, first, last, cycles)
+        if settings.align
+        else timing.own_pace(placed, first, last, cycles)
+    )
+    sampled = [clip.at(times) for clip, times in zip(placed, schedule.times.T, strict=True)]
+    result = _blended(rig, sampled, schedule.weights, settings)
+    rigid = result.poses.rigid
+    if settings.root_motion != KEYED:
+        ground = _ground(travels, schedule, reference, settings)
+        rigid = carried(rig, root, rigid, ground)
+    return Blend(
+        rig,
+        Poses(rigid, result.poses.scale),
+        result.volume,
+        result.apart,
+        result.undefined,
+        schedule,
+        warps,
+        rig.names[root] if settings.root_motion != KEYED else None,
+        all(clip.is_cyclic for clip in placed) and weights_from is None and settings.align,
+    )
+
+
+def _check(settings: Settings) -> None:
+    for what, value, known in (
+        ("method", settings.method, tuple(METHODS)),
+        ("space", settings.space, (RELATIVE, ARMATURE)),
+        ("root motion", settings.root_motion, (TRAVEL, IN_PLACE, KEYED)),
+    ):
+        if value not in known:
+            raise SinewError(f"{what}: expected one of {', '.join(known)}, got {value!r}")
+    if settings.cycles < 1:
+        raise SinewError(f"cycles: expected 1 or more, got {settings.cycles}")
+
+
+def _in_place(clips: Sequence[Clip], root: int, up: np.ndarray, settings: Settings) -> list[Grounded]:
+    """The clips without their travel, which all are cycles or, to be aligned, none."""
+    take_out = stay if settings.root_motion == KEYED else grounded
+    found = [take_out(clip, root, up, clip.is_cyclic or None) for clip in clips]
+    if settings.align and not all(each.clip.is_cyclic for each in found):
+        found = [take_out(clip, root, up, False) for clip in clips]
+    return found
+
+
+def _warps(clips: Sequence[Clip], reference: int, rig: Rig, root: int, settings: Settings) -> list[Warp]:
+    if not settings.align:
+        return [same_pace() for _clip in clips]
+    bones = rig.below(root)
+    if settings.align_bones:
+        bones = np.isin(np.arange(len(rig.names)), [rig.index(name) for name in settings.align_bones])
+    return [
+        same_pace() if number == reference else align(clips[reference], clip, bones)
+        for number, clip in enumerate(clips)
+    ]
+
+
+def _ground(
+    travels: Sequence[Grounded], schedule: timing.Timing, reference: int, settings: Settings
+) -> np.ndarray:
+    """[frames, 7]: the ground frame of the blend, from where the reference begins."""
+    frames = [travel.at(times) for travel, times in zip(travels, schedule.times.T, strict=True)]
+    start = frames[reference][0]
+    count = len(schedule.times)
+    if settings.root_motion == IN_PLACE:
+        return np.repeat(start[None], count, axis=0)
+    steps = np.stack([quat_vec.compose(quat_vec.inverse(each[:-1]), each[1:]) for each in frames], axis=1)
+    # A step is blended by the weights of its middle.
+    weights = 0.5 * (schedule.weights[1:] + schedule.weights[:-1])
+    blended = interpolate.blend(in_layout_of(settings.method, steps), weights, settings.method)
+    return accumulated(start, rigid_of(settings.method, blended.transforms))
+
+
+class _Result(NamedTuple):
+    poses: Poses
+    volume: np.ndarray
+    apart: np.ndarray
+    undefined: np.ndarray
+
+
+def _blended(rig: Rig, sampled: Sequence[Poses], weights: np.ndarray, settings: Settings) -> _Result:
+    """Poses [frames, bones, ..] of clips blended by weights [frames, clips]."""
+    rigid = np.stack([poses.rigid for poses in sampled], axis=2)
+    scale = np.einsum("fc,fcbk->fbk", weights, np.stack([poses.scale for poses in sampled], axis=1))
+    shares = np.broadcast_to(weights[:, None], rigid.shape[:3])
+    heads = np.einsum("fbc,fbck->fbk", shares, rigid[..., 4:])
+    inside = rigid
+    if settings.space == ARMATURE:
+        inside = np.stack([rig.to_armature(poses.rigid) for poses in sampled], axis=2)
+    blended = interpolate.blend(in_layout_of(settings.method, inside), shares, settings.method)
+    volume = np.ones(shares.shape[:2])
+    if settings.method == "matrix_linear":
+        volume = np.linalg.det(blended.transforms[..., :3, :3])
+    found = rigid_of(settings.method, blended.transforms)
+    apart = np.zeros(volume.shape)
+    if settings.space == ARMATURE:
+        found = rig.to_relative(found)
+        apart = np.linalg.norm(found[..., 4:] - heads, axis=-1)
+        # Such a bone has no location in Blender.
+        found[:, rig.connected, 4:] = 0.0
+    if settings.method == "matrix_linear":
+        scale = scale * _stretch(rig, blended.transforms, volume, settings.space)
+    return _Result(Poses(found, scale), volume, apart, ~np.asarray(blended.is_defined))
+
+
+def _stretch(rig: Rig, matrices: np.ndarray, volume: np.ndarray, space: str) -> np.ndarray:
+    """[frames, bones, 3]: what a bone's scale can have of matrices that are not rigid: the lengths of their
+    axes. Of matrices in armature space, where bones have their parents' scale already, the size alone."""
+    if space == RELATIVE:
+        return axes_of(matrices)
+    size = np.cbrt(np.maximum(volume, 0.0))
+    above = np.where(rig.parents >= 0, size[:, np.maximum(rig.parents, 0)], 1.0)
+    return np.repeat((size / np.maximum(above, 1e-6))[..., None], 3, axis=-1)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Root motion: how a clip carries its root bone over the ground, apart from how it poses it.
+
+A ground frame is a rotation about the vertical and a horizontal translation, in armature space. Of a cycle it
+moves by the screw that its last pose is from its first, at an even pace: sway and bounce stay in the pose.
+Of another clip it is under the root at every sample. Taken out of all clips it leaves motions in place, which
+can be compared and blended; what is blended of it are its changes from frame to frame, which are added up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from sinew import quat, quat_vec
+
+from ..inbetween import Poses
+from .clip import Clip, Rig, closes
+
+
+@dataclass(frozen=True)
+class Grounded:
+    """A clip in place, and how it travels.
+
+    clip    its root is over the origin and faces as at rest
+    start   [7], the ground frame at the beginning
+    twist   [6] of the screw of a whole cycle in armature space; of a clip that is none, None
+    frames  [samples, 7], the ground frames of such a clip; else None
+    """
+
+    clip: Clip
+    start: np.ndarray
+    twist: np.ndarray | None
+    frames: np.ndarray | None
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """[times, 7]: the ground frames so many frames after the clip's first; a cycle goes on for ever."""
+        if self.twist is not None:
+            share = np.asarray(times) / self.clip.length if self.clip.length else np.zeros(len(times))
+            return quat_vec.compose(quat_vec.from_twist(share[:, None] * self.twist), self.start)
+        assert self.frames is not None
+        scale = np.ones((len(self.frames), 1, 3))
+        return replace(self.clip, poses=Poses(self.frames[:, None], scale)).at(times).rigid[:, 0]
+
+
+def main_root(rig: Rig, clips: list[Clip]) -> int:
+    """The bone that carries the others: of those without parent that with most below it, or the first below
+    that moves."""
+    sizes = np.array([rig.below(bone).sum() for bone in range(len(rig.names))])
+    moving = np.any([clip.moves for clip in clips], axis=0)
+    found = int(np.argmax(np.where(rig.parents < 0, sizes, 0)))
+    while not moving[found] and (rig.parents == found).any() and (moving & rig.below(found)).any():
+        found = int(np.argmax(np.where(rig.parents == found, sizes, 0)))
+    return found
+
+
+def ground_frames(rig: Rig, root: int, posed: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """[samples, 7]: of posed bones [samples, bones, 7] in armature space, the root's rotation from its rest
+    about `up`, a unit vector, and its place without its height."""
+    rest = rig.to_armature(np.broadcast_to(quat_vec.identity(), rig.rest.shape))[root]
+    turned = quat_vec.compose(posed[:, root], quat_vec.inverse(rest))[:, :4]
+    # The part of a rotation about an axis: the others of its four numbers left out. Half a turn about a
+    # horizontal axis has none.
+    about = np.column_stack([turned[:, 0], turned[:, 1:] @ up])
+    about = np.where(np.hypot(*about.T)[:, None] > 1e-9, about, (1.0, 0.0))
+    heading = quat.normalized(np.column_stack([about[:, 0], about[:, 1:] * up]))
+    place = posed[:, root, 4:]
+    return np.column_stack([heading, place - (place @ up)[:, None] * up])
+
+
+def grounded(clip: Clip, root: int, up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
+    """The clip without its travel; it is a cycle where it closes then, or as `is_cyclic` says."""
+    rig = clip.rig
+    posed = rig.to_armature(clip.poses.rigid)
+    frames = ground_frames(rig, root, posed, up)
+    whole = quat_vec.compose(frames[-1], quat_vec.inverse(frames[0]))
+    twist = quat_vec.to_twist(whole)
+    shares = np.linspace(0.0, 1.0, len(frames)) if len(frames) > 1 else np.zeros(1)
+    screws = quat_vec.from_twist(shares[:, None] * twist)
+    # The middle of what the root sways about the screw: no matter at which step the cycle begins.
+    around = quat_vec.compose(quat_vec.inverse(screws), frames)[: max(len(frames) - 1, 1)]
+    middle = _mean_ground(around, up)
+    cycle = _carried(rig, root, posed, quat_vec.inverse(quat_vec.compose(screws, middle)))
+    if is_cyclic is None:
+        is_cyclic = closes(rig, cycle[0], cycle[-1])
+    if is_cyclic:
+        placed = replace(clip, poses=Poses(cycle, clip.poses.scale), is_cyclic=True)
+        return Grounded(placed, middle, twist, None)
+    once = _carried(rig, root, posed, quat_vec.inverse(frames))
+    placed = replace(clip, poses=Poses(once, clip.poses.scale), is_cyclic=False)
+    return Grounded(placed, frames[0], None, frames)
+
+
+def stay(clip: Clip, _root: int, _up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
+    """The clip as it is keyed, as one that does not travel; as of grounded()."""
+    if is_cyclic is None:
+        is_cyclic = closes(clip.rig, clip.poses.rigid[0], clip.poses.rigid[-1])
+    return Grounded(replace(clip, is_cyclic=is_cyclic), quat_vec.identity(), np.zeros(6), None)
+
+
+def carried(rig: Rig, root: int, relative: np.ndarray, ground: np.ndarray) -> np.ndarray:
+    """Poses [frames, bones, 7] with the root, and all below it, carried by ground frames [frames, 7]."""
+    return _carried(rig, root, rig.to_armature(relative), ground, relative)
+
+
+def accumulated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """[steps + 1, 7]: `start` [7] moved on by one step [7] after the other, each in the frame before it."""
+    found = [start]
+    for step in steps:
+        found.append(quat_vec.compose(found[-1], step))
+    return np.array(found)
+
+
+def _carried(
+    rig: Rig, root: int, posed: np.ndarray, ground: np.ndarray, relative: np.ndarray | None = None
+) -> np.ndarray:
+    relative = rig.to_relative(posed) if relative is None else relative.copy()
+    parent = rig.parents[root]
+    above = quat_vec.compose(posed[:, parent], rig.rest[root]) if parent >= 0 else rig.rest[root]
+    moved = quat_vec.compose(ground, posed[:, root])
+    relative[:, root] = quat_vec.compose(quat_vec.inverse(above), moved)
+    return relative
+
+
+def _mean_ground(frames: np.ndarray, up: np.ndarray) -> np.ndarray:
+    signs = np.where(frames[:, :4] @ frames[0, :4] < 0.0, -1.0, 1.0)[:, None]
+    heading = quat.normalized((signs * frames[:, :4]).sum(axis=0))
+    return np.concatenate([heading, frames[:, 4:].mean(axis=0)])

@@ -1,0 +1,571 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clips blended: against formulas in numpy and scipy, and against walks whose contacts are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sinew
+import walks
+from scipy.linalg import expm, logm
+from sinew import affine, dual_quat, quat_vec
+from sinew_addon.core.errors import SinewError
+from sinew_addon.core.inbetween import Poses
+from sinew_addon.core.motion import measure
+from sinew_addon.core.motion.align import PHASES, align
+from sinew_addon.core.motion.blend import ARMATURE, IN_PLACE, KEYED, METHODS, TRAVEL, Settings, blend
+from sinew_addon.core.motion.clip import Clip
+from sinew_addon.core.motion.root import grounded, main_root
+
+UP = walks.UP
+ROOT_MOTIONS = (TRAVEL, IN_PLACE, KEYED)
+
+
+def matrices(rigid):
+    return quat_vec.to_affine(rigid)
+
+
+def apart(a, b):
+    """The largest difference of two arrays of rigid transforms, whatever the signs of quaternions."""
+    return np.abs(matrices(a) - matrices(b)).max()
+
+
+def plain(method, **more):
+    """Every clip from its first frame, its root as any bone: what the formulas say alone."""
+    return Settings(method=method, align=False, root_motion=KEYED, **more)
+
+
+def pair(seed=1):
+    rng = np.random.default_rng(seed)
+    return walks.random_clip(rng, "a"), walks.random_clip(rng, "b")
+
+
+def test_methods_are_the_librarys():
+    assert set(METHODS) == set(sinew.interpolate.METHODS)
+    assert len({method.number for method in METHODS.values()}) == len(METHODS)
+
+
+# --- What every blend has
+
+
+@pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
+@pytest.mark.parametrize("space", ["relative", ARMATURE])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_clip_of_weight_one_is_that_clip(method, space, root_motion):
+    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
+    for align in (True, False):
+        settings = Settings(method=method, space=space, root_motion=root_motion, align=align)
+        for number, clip in enumerate((walk, run)):
+            made = blend([walk, run], np.eye(2)[number], settings).clip("one")
+            assert made.length == clip.length
+            assert apart(made.poses.rigid, clip.poses.rigid) < 1e-9
+            assert np.abs(made.poses.scale - clip.poses.scale).max() < 1e-9
+
+
+@pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_clip_that_is_none_of_the_cycles_is_itself_too(method, root_motion):
+    clips = pair()
+    for align in (True, False):
+        settings = Settings(method=method, root_motion=root_motion, align=align)
+        made = blend(clips, (0, 1), settings)
+        assert not made.is_cyclic
+        assert apart(made.poses.rigid, clips[1].poses.rigid) < 1e-9
+        assert np.abs(made.poses.scale - clips[1].poses.scale).max() < 1e-9
+
+
+@pytest.mark.parametrize("root_motion", [TRAVEL, KEYED])
+@pytest.mark.parametrize("method", METHODS)
+def test_equal_clips_give_the_clip(method, root_motion):
+    for clip in (walks.walk(turn=0.4), *pair()[:1]):
+        settings = Settings(method=method, root_motion=root_motion)
+        made = blend([clip, replace(clip, name="again"), clip], (0.2, 0.5, 0.3), settings)
+        assert apart(made.poses.rigid, clip.poses.rigid) < 1e-9
+        assert np.abs(made.poses.scale - clip.poses.scale).max() < 1e-9
+
+
+def test_signs_of_quaternions_and_the_sum_of_weights_do_not_matter():
+    a, b = pair(3)
+    flipped = a.poses.rigid.copy()
+    flipped[::2, :, :4] *= -1.0
+    for method in METHODS:
+        one = blend([a, b], (1, 3), plain(method))
+        other = blend([replace(a, poses=Poses(flipped, a.poses.scale)), b], (0.25, 0.75), plain(method))
+        assert apart(one.poses.rigid, other.poses.rigid) < 1e-12
+
+
+@pytest.mark.parametrize("method", sorted(set(METHODS) - {"matrix_log"}))
+def test_a_rigid_motion_of_all_clips_goes_through(method):
+    """From the left, which is what moving the whole motion is; matrix_log lets nothing through."""
+    clips = pair(5)
+    moved, x = [], quat_vec.from_twist(np.array([0.4, -0.8, 0.3, 1.0, 2.0, -0.5]))
+    for clip in clips:
+        rig, rigid = clip.rig, clip.poses.rigid.copy()
+        rest = rig.rest[0]
+        there = quat_vec.compose(x, quat_vec.compose(rest, rigid[:, 0]))
+        rigid[:, 0] = quat_vec.compose(quat_vec.inverse(rest), there)
+        moved.append(replace(clip, poses=Poses(rigid, clip.poses.scale)))
+    for space in ("relative", ARMATURE):
+        settings = plain(method, space=space)
+        one, other = blend(clips, (0.3, 0.7), settings), blend(moved, (0.3, 0.7), settings)
+        posed = quat_vec.compose(x, clips[0].rig.to_armature(one.poses.rigid))
+        assert apart(posed, clips[0].rig.to_armature(other.poses.rigid)) < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_where_on_the_ground_clips_are_does_not_matter(method):
+    """With root motion a clip may stand elsewhere and face elsewhere: the blend begins where the heaviest
+    does."""
+    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2)
+    rigid = run.poses.rigid.copy()
+    ground = quat_vec.from_screw_about(UP, np.array([3.0, 1.0, 0.0]), 1.2, 0.0)
+    rest = run.rig.rest[0]
+    there = quat_vec.compose(ground, quat_vec.compose(rest, rigid[:, 0]))
+    rigid[:, 0] = quat_vec.compose(quat_vec.inverse(rest), there)
+    elsewhere = replace(run, poses=Poses(rigid, run.poses.scale))
+    settings = Settings(method=method)
+    one = blend([walk, run], (0.6, 0.4), settings)
+    other = blend([walk, elsewhere], (0.6, 0.4), settings)
+    assert apart(one.poses.rigid, other.poses.rigid) < 1e-9
+
+
+# --- The formulas
+
+
+def test_dlb_is_the_normalised_sum():
+    a, b = pair()
+    made = blend([a, b], (0.35, 0.65), plain("dlb"))
+    left, right = dual_quat_of(a), dual_quat_of(b)
+    right = np.where((left[..., :4] * right[..., :4]).sum(-1, keepdims=True) < 0, -right, right)
+    total = 0.35 * left + 0.65 * right
+    real, dual = total[..., :4], total[..., 4:]
+    norm = np.linalg.norm(real, axis=-1, keepdims=True)
+    slope = (real * dual).sum(-1, keepdims=True) / norm
+    # |q| of a dual quaternion is a dual number: its inverse is 1 / n - e s / n^2.
+    unit = np.concatenate([real / norm, dual / norm - real * slope / norm**2], axis=-1)
+    assert np.abs(dual_quat.to_affine(unit) - matrices(made.poses.rigid)).max() < 1e-12
+
+
+def dual_quat_of(clip):
+    """By the definition: real, and half the translation times it."""
+    q, t = clip.poses.rigid[..., :4], clip.poses.rigid[..., 4:]
+    w, v = q[..., :1], q[..., 1:]
+    return np.concatenate(
+        [q, -0.5 * (t * v).sum(-1, keepdims=True), 0.5 * (t * w + np.cross(t, v))], axis=-1
+    )
+
+
+@pytest.mark.parametrize("method", ["sclerp", "dib"])
+def test_sclerp_of_two_is_the_screw_from_one_to_the_other(method):
+    a, b = pair(7)
+    made = matrices(blend([a, b], (0.3, 0.7), plain(method)).poses.rigid)
+    left, right = matrices(a.poses.rigid), matrices(b.poses.rigid)
+    for frame in (0, 5, 11):
+        for bone in range(len(a.rig.names)):
+            screw = logm(np.linalg.inv(left[frame, bone]) @ right[frame, bone]).real
+            assert np.abs(left[frame, bone] @ expm(0.7 * screw) - made[frame, bone]).max() < 1e-9
+
+
+def test_matrices_by_their_definitions():
+    a, b = pair(8)
+    left, right = matrices(a.poses.rigid), matrices(b.poses.rigid)
+    mean = 0.4 * left + 0.6 * right
+    u, _s, vt = np.linalg.svd(mean[..., :3, :3])
+    assert np.linalg.det(u @ vt).min() > 0
+    for method in ("matrix_linear", "matrix_polar"):
+        made = matrices(blend([a, b], (0.4, 0.6), plain(method)).poses.rigid)
+        assert np.abs(made[..., :3, :3] - u @ vt).max() < 1e-9
+        assert np.abs(made[..., :3, 3] - mean[..., :3, 3]).max() < 1e-12
+    made = matrices(blend([a, b], (0.4, 0.6), plain("matrix_log")).poses.rigid)
+    for bone in range(len(a.rig.names)):
+        wanted = expm(0.4 * logm(left[4, bone]).real + 0.6 * logm(right[4, bone]).real)
+        assert np.abs(made[4, bone] - wanted).max() < 1e-9
+
+
+def test_pairs_have_the_mean_location():
+    a, b = pair(9)
+    wanted = 0.4 * a.poses.rigid[..., 4:] + 0.6 * b.poses.rigid[..., 4:]
+    for method in ("qv_nlerp", "qv_slerp"):
+        made = blend([a, b], (0.4, 0.6), plain(method))
+        assert np.abs(made.poses.rigid[..., 4:] - wanted).max() < 1e-12
+
+
+def test_linear_matrices_shrink_and_no_other_method_does():
+    a, b = pair(11)
+    left, right = matrices(a.poses.rigid), matrices(b.poses.rigid)
+    wanted = np.linalg.det(0.5 * left[..., :3, :3] + 0.5 * right[..., :3, :3])
+    for method in METHODS:
+        made = blend([a, b], (1, 1), plain(method))
+        scale = 0.5 * (a.poses.scale + b.poses.scale)
+        if method == "matrix_linear":
+            assert np.abs(made.volume - wanted).max() < 1e-12
+            assert made.volume.min() < 0.8
+            # What Blender gets of it: the lengths of the axes.
+            axes = np.linalg.norm(0.5 * (left + right)[..., :3, :3], axis=-2)
+            assert np.abs(made.poses.scale - scale * axes).max() < 1e-12
+            shrunk = measure.shrinking(made)
+            assert shrunk.volume == made.volume.min()
+            assert made.volume[shrunk.frame, a.rig.index(shrunk.bone)] == shrunk.volume
+        else:
+            assert (made.volume == 1.0).all()
+            assert np.abs(made.poses.scale - scale).max() < 1e-12
+        assert np.abs(np.linalg.norm(made.poses.rigid[..., :4], axis=-1) - 1.0).max() < 1e-9
+
+
+def test_a_half_turn_apart_a_matrix_is_flat_and_the_blend_is_not_defined():
+    """Smith 2013, section 3.5.2: half way to a half turn about z a matrix is that of a line."""
+    a = walks.walk()
+    rest = Poses(np.broadcast_to(quat_vec.identity(), a.poses.rigid.shape).copy(), a.poses.scale)
+    still = replace(a, poses=rest)
+    rigid = rest.rigid.copy()
+    rigid[:, 3] = quat_vec.from_axis_angle([0.0, 0.0, 1.0], np.pi)
+    made = blend([still, replace(a, poses=Poses(rigid, a.poses.scale))], (1, 1), plain("matrix_linear"))
+    assert np.abs(made.volume[:, 3]).max() < 1e-12
+    assert np.abs(made.volume[:, 2] - 1.0).max() < 1e-12
+    assert np.abs(made.poses.scale[:, 3] - (0.0, 0.0, 1.0)).max() < 1e-9
+    flipped = blend([still, replace(a, poses=Poses(rigid, a.poses.scale))], (1, 1), plain("dlb"))
+    assert flipped.undefined[:, 3].all() and not flipped.undefined[:, :3].any()
+
+
+def test_armature_space_is_the_blend_of_what_algorithm_1_gives():
+    a, b = pair(13)
+    rig = a.rig
+    made = blend([a, b], (0.5, 0.5), plain("dlb", space=ARMATURE))
+    skeleton = sinew.Skeleton(rig.parents)
+    for frame in (0, 6, 12):
+        ends = [
+            skeleton.root_relative(quat_vec.compose(rig.rest, clip.poses.rigid[frame])) for clip in (a, b)
+        ]
+        wanted = sinew.interpolate.blend(
+            np.stack([quat_vec.to_dual_quat(end) for end in ends], axis=1), np.full((8, 2), 0.5), "dlb"
+        ).transforms
+        posed = rig.to_armature(made.poses.rigid)[frame]
+        # Rotations are those, whatever holds the heads.
+        assert np.abs(matrices(posed)[:, :3, :3] - dual_quat.to_affine(wanted)[:, :3, :3]).max() < 1e-9
+    # Connected bones stay on their parents' tails; what they would have left them by is told.
+    assert np.abs(made.poses.rigid[:, rig.connected, 4:]).max() == 0.0
+    assert made.apart[:, rig.connected].max() > 0.05
+    assert blend([a, b], (0.5, 0.5), plain("dlb")).apart.max() == 0.0
+
+
+def test_relative_blends_keep_bones_of_a_chain_together_and_armature_space_does_not():
+    """Smith 2013, figure 3.3, for blends of motions: two legs at other phases."""
+    walk, run = walks.walk(), walks.walk("late", 20, 1.1, 0.3, start=0.4)
+    for method in ("dlb", "qv_nlerp", "matrix_linear"):
+        relative = blend([walk, run], (0.5, 0.5), plain(method))
+        torn = blend([walk, run], (0.5, 0.5), plain(method, space=ARMATURE))
+        assert np.abs(relative.poses.rigid[:, 1:, 4:]).max() < 1e-12
+        assert torn.apart.max() > 0.01
+
+
+# --- Times
+
+
+def test_a_blend_of_periods_20_and_30_has_period_25_and_keeps_the_contacts():
+    """Whatever frame a clip begins at, the left foot of the blend is on the ground when that of both is."""
+    walk = walks.walk(period=20, start=0.1)
+    run = walks.walk("run", 30, 1.1, 0.2, start=0.65)
+    made = blend([walk, run], (0.5, 0.5))
+    assert made.is_cyclic
+    clip = made.clip("blend")
+    assert clip.length == 25.0
+    # Of the reference, which is the first: it begins at phase 0.1, its left foot lifts at 0.6.
+    phases = 0.1 + np.arange(26) / 25.0
+    sides = [walks.foot(phases + ahead, 1.0, 0.6, 0.1)[1] == 0.0 for ahead in (0.0, 0.5)]
+    feet = measure.bones_named(clip, ["foot.L", "foot.R"])
+    heights = clip.rig.points(clip.rig.to_armature(clip.poses.rigid))[:, feet, 0, 2]
+    for height, on_ground in zip(heights.T, sides, strict=True):
+        sure = on_ground & np.roll(on_ground, 1) & np.roll(on_ground, -1)
+        assert height[sure].max() < walks.ANKLE + 0.012
+        lifted = height > walks.ANKLE + 0.05
+        assert lifted.any() and not (lifted & on_ground).any()
+    # It closes, but for its travel.
+    assert apart(clip.poses.rigid[0, 1:], clip.poses.rigid[-1, 1:]) < 1e-9
+
+
+def test_without_alignment_feet_meet_the_ground_at_other_times_and_slide():
+    walk = walks.walk(period=20)
+    run = walks.walk("run", 30, 1.1, 0.2, start=0.65)
+    feet = measure.bones_named(walk, ["foot.L", "foot.R"])
+    slides = {}
+    for align in (True, False):
+        made = blend([walk, run], (0.5, 0.5), Settings(align=align)).clip("blend")
+        slides[align] = measure.measure(made, feet, 0, UP, 24.0).sliding
+    own = max(measure.measure(clip, feet, 0, UP, 24.0).sliding for clip in (walk, run))
+    assert slides[True] < 1.5 * own
+    assert slides[False] > 2.0 * slides[True]
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05, 0.31, 0.5, 0.77])
+def test_the_offset_of_a_cycle_is_found(offset):
+    reference, late = (grounded(walks.walk(start=start), 0, UP).clip for start in (0.0, offset))
+    warp = align(reference, late, np.ones(8, dtype=bool))
+    # What the reference has at phase 0 the other has at -offset, which is 1 - offset.
+    off = np.mod(warp.own - np.arange(PHASES + 1) / PHASES + offset + 0.5, 1.0) - 0.5
+    assert np.abs(off).max() < 1.0 / PHASES
+    assert warp.own[-1] - warp.own[0] == pytest.approx(1.0)
+    assert -0.5 <= warp.own[0] <= 0.5
+
+
+def test_one_foot_says_the_phase():
+    reference, late = (grounded(walks.walk(start=start), 0, UP).clip for start in (0.0, 0.25))
+    bones = np.array([name == "foot.L" for name in reference.rig.names])
+    off = align(reference, late, bones).own - np.arange(PHASES + 1) / PHASES + 0.25
+    assert np.abs(off).max() < 1.5 / PHASES
+    made = [blend([walks.walk(), walks.walk("late", start=0.25)], (1, 1), Settings(align_bones=names))
+            for names in ((), ("foot.L",))]
+    assert np.abs(made[0].timing.times - made[1].timing.times).max() < 1.0
+
+
+def test_another_pace_within_the_cycle_is_found():
+    even = np.linspace(0.0, 1.0, 41)
+    bent = even + 0.06 * np.sin(2 * np.pi * even)
+    reference = grounded(walks.walk(period=40), 0, UP).clip
+    other = grounded(walks.walk("bent", 40, phases=bent), 0, UP).clip
+    warp = align(reference, other, np.ones(8, dtype=bool))
+    # The other clip is at `bent` when it is at `even`: so the inverse.
+    phases = np.arange(PHASES + 1) / PHASES
+    wanted = np.interp(phases, bent, even)
+    assert np.abs(warp.own - wanted).max() < 1.2 / PHASES
+    assert (np.diff(warp.own) > 0.0).all()
+
+
+def test_clips_that_are_no_cycles_are_aligned_from_end_to_end():
+    even = np.linspace(0.0, 1.0, 41)
+    half = walks.walk("half", 40, phases=0.45 * even)
+    late = walks.walk("late", 40, phases=0.45 * even**1.4)
+    reference, other = (grounded(clip, 0, UP, False).clip for clip in (half, late))
+    warp = align(reference, other, np.ones(8, dtype=bool))
+    assert np.abs(warp.own[[0, -1]] - (0.0, 1.0)).max() < 1e-12
+    inside = slice(4, -4)
+    phases = np.arange(PHASES + 1) / PHASES
+    assert np.abs(warp.own - phases ** (1 / 1.4))[inside].max() < 2.0 / PHASES
+    assert not blend([half, late], (1, 1)).is_cyclic
+
+
+def test_clips_that_do_not_move_and_single_poses_blend():
+    walk = walks.walk()
+    pose = Clip("pose", walk.rig, Poses(walk.poses.rigid[:1], walk.poses.scale[:1]), 0.0)
+    still = replace(walk, poses=Poses(np.repeat(pose.poses.rigid, 21, 0), walk.poses.scale), name="still")
+    assert blend([pose, pose], (1, 1)).poses.rigid.shape == (1, 8, 7)
+    for other in (pose, still):
+        made = blend([walk, other], (0.5, 0.5))
+        assert len(made.poses.rigid) == 21
+        wanted = sinew.interpolate.blend(
+            np.stack([quat_vec.to_dual_quat(walk.poses.rigid[:, 1:]),
+                      quat_vec.to_dual_quat(np.repeat(pose.poses.rigid[:, 1:], 21, 0))], axis=2),
+            np.full((21, 7, 2), 0.5), "dlb")  # fmt: skip
+        assert np.abs(dual_quat.to_affine(wanted.transforms) - matrices(made.poses.rigid[:, 1:])).max() < 1e-9
+
+
+def test_weights_change_over_the_blend():
+    """A change from a walk to a run begins as the one and ends as the other, at its pace there."""
+    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
+    made = blend([walk, run], (0, 1), Settings(cycles=3), weights_from=(1, 0))
+    timing = made.timing
+    assert np.array_equal(timing.weights[0], (1.0, 0.0)) and np.array_equal(timing.weights[-1], (0.0, 1.0))
+    assert (np.diff(timing.weights[:, 1]) > 0.0).all() and (np.diff(timing.times, axis=0) > 0.0).all()
+    assert len(timing.times) - 1 == pytest.approx(75.0, abs=1.0)
+    assert apart(made.poses.rigid[0], walk.poses.rigid[0]) < 1e-9
+    last = grounded(run, 0, UP).clip.at(timing.times[-1:, 1]).rigid
+    assert apart(made.poses.rigid[-1:, 1:], last[:, 1:]) < 1e-9
+    # One frame of the blend is one of the clip that it is alone.
+    assert timing.times[1, 0] - timing.times[0, 0] == pytest.approx(1.0, abs=0.03)
+    assert timing.times[-1, 1] - timing.times[-2, 1] == pytest.approx(1.0, abs=0.03)
+    assert not made.is_cyclic
+
+
+def test_between_samples_and_beyond_the_ends():
+    clip = pair(2)[0]
+    middle = clip.at(np.array([3.5])).rigid[0]
+    wanted = sinew.interpolate.between(*clip.poses.rigid[3:5], 0.5, "qv_slerp").transforms
+    assert apart(middle, wanted) < 1e-12
+    assert apart(clip.at(np.array([-2.0, 99.0])).rigid, clip.poses.rigid[[0, -1]]) == 0.0
+    cycle = grounded(walks.walk(), 0, UP).clip
+    assert apart(cycle.at(np.array([20.0, 47.0, -3.0])).rigid, cycle.poses.rigid[[20, 7, 17]]) < 1e-12
+
+
+# --- Root motion
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_two_straight_walks_move_at_the_blended_speed(method):
+    """Of equal periods the mean of the speeds; of others the mean stride in the mean period."""
+    for period, share in ((20, 0.25), (30, 0.25), (30, 0.6)):
+        slow, fast = walks.walk(stride=0.6), walks.walk("fast", period, 1.1, start=0.2)
+        made = blend([slow, fast], (1 - share, share), Settings(method=method, cycles=2))
+        place = made.clip("x").rig.to_armature(made.poses.rigid)[:, 0, 4:]
+        stride = (1 - share) * 0.6 + share * 1.1
+        frames = len(place) - 1
+        assert frames == round(2 * ((1 - share) * 20 + share * period))
+        assert np.abs(place[-1] - place[0] - (0.0, -2 * stride, 0.0)).max() < 1e-9
+        if period == 20:
+            speed = np.diff(place[:, 1])
+            assert speed.mean() == pytest.approx(-((1 - share) * 0.6 + share * 1.1) / 20)
+        assert np.abs(place[:, 0]).max() < 1e-9
+
+
+@pytest.mark.parametrize("method", ["dlb", "sclerp", "qv_slerp", "matrix_polar"])
+def test_turns_add_up_to_the_blended_turn(method):
+    left, right = walks.walk(turn=0.9), walks.walk("right", turn=-0.3)
+    made = blend([left, right], (0.5, 0.5), Settings(method=method, cycles=4))
+    root = made.rig.to_armature(made.poses.rigid)[:, 0]
+    whole = quat_vec.to_screw(quat_vec.compose(root[-1], quat_vec.inverse(root[0])))
+    # An even walk on a circle: its turn is the mean, and it goes on along the vertical's circle.
+    assert whole.angle * np.sign(whole.axis @ UP) == pytest.approx(-4 * 0.3, abs=2e-3)
+    assert np.abs(root[:, 6] - root[0, 6]).max() < 1e-9
+    same = blend([left, left], (0.5, 0.5), Settings(method=method, cycles=2))
+    whole = quat_vec.compose(same.poses.rigid[20, 0], quat_vec.inverse(same.poses.rigid[0, 0]))
+    assert apart(quat_vec.compose(whole, same.poses.rigid[20, 0]), same.poses.rigid[40, 0]) < 1e-9
+
+
+def test_in_place_keeps_the_pose_and_goes_nowhere():
+    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2)
+    moving = blend([walk, run], (0.5, 0.5), Settings(cycles=2))
+    still = blend([walk, run], (0.5, 0.5), Settings(cycles=2, root_motion=IN_PLACE))
+    assert apart(moving.poses.rigid[:, 1:], still.poses.rigid[:, 1:]) < 1e-12
+    place = still.rig.to_armature(still.poses.rigid)[:, 0, 4:]
+    assert np.abs(place - place[0]).max() < 1e-9
+    assert moving.rig.to_armature(moving.poses.rigid)[-1, 0, 5] == pytest.approx(-1.9)
+    # As keyed they do not close, so that they are blended once, each from end to end.
+    keyed = blend([walk, run], (0.5, 0.5), Settings(root_motion=KEYED))
+    assert not keyed.is_cyclic and keyed.root is None
+
+
+def test_the_root_is_the_uppermost_bone_that_moves():
+    walk = walks.walk()
+    assert main_root(walk.rig, [walk]) == 0
+    rigid = walk.poses.rigid.copy()
+    rigid[:, 0] = quat_vec.identity()
+    assert walk.rig.names[main_root(walk.rig, [replace(walk, poses=Poses(rigid, walk.poses.scale))])] in (
+        "thigh.L",
+        "thigh.R",
+    )
+    # A bone above that stands still does not carry.
+    rig = walk.rig
+    names, parents = ("master", *rig.names), np.concatenate([[-1], np.where(rig.parents < 0, 0, rig.parents + 1)])
+    under = replace(
+        rig,
+        names=names,
+        parents=parents,
+        rest=np.vstack([quat_vec.identity(), rig.rest]),
+        lengths=np.concatenate([[1.0], rig.lengths]),
+        connected=np.concatenate([[False], rig.connected]),
+    )
+    still = np.broadcast_to(quat_vec.identity(), (21, 1, 7))
+    poses = Poses(np.concatenate([still, walk.poses.rigid], axis=1), np.ones((21, 9, 3)))
+    clip = Clip("walk", under, poses, 20.0)
+    assert names[main_root(under, [clip])] == "hips"
+    made = blend([clip, clip], (1, 1), Settings(cycles=2))
+    assert made.root == "hips" and len(made.poses.rigid) == 41
+    assert under.to_armature(made.poses.rigid)[-1, 1, 5] == pytest.approx(-1.6)
+
+
+def test_a_root_that_tilts_on_a_turned_armature_travels_on_its_own_ground():
+    """Up may be any direction of armature space, as of files with Y up; a tilt is none of the travel."""
+    walk = walks.walk(sway=0.0)
+    x = quat_vec.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
+    rig = replace(walk.rig, rest=walk.rig.rest.copy())
+    rig.rest[0] = quat_vec.compose(x, rig.rest[0])
+    up = quat_vec.transform_vector(x, UP)
+    rigid = walk.poses.rigid.copy()
+    tilt = 0.3 * np.sin(2 * np.pi * np.arange(21) / 20)
+    rigid[:, 0] = quat_vec.compose(rigid[:, 0], quat_vec.from_axis_angle([1.0, 0.0, 0.0], tilt))
+    clip = Clip("walk", rig, Poses(rigid, walk.poses.scale), 20.0)
+    made = blend([clip, clip], (1, 2), Settings(cycles=3), up=up)
+    assert made.is_cyclic and len(made.poses.rigid) == 61
+    assert apart(made.poses.rigid[:21], rigid) < 1e-9
+    place = rig.to_armature(made.poses.rigid)[:, 0, 4:]
+    assert np.abs(place[-1] - place[0] - quat_vec.transform_vector(x, [0.0, -2.4, 0.0])).max() < 1e-9
+
+
+# --- Numbers
+
+
+def test_sliding_is_what_a_dragged_foot_slides():
+    walk = walks.walk(sway=0.0)
+    rigid = np.repeat(walk.poses.rigid[:1], 21, axis=0)
+    # Straight ahead, without a step.
+    rigid[:, 0, 6] = 0.03 * np.arange(21)
+    dragged = Clip("dragged", walk.rig, Poses(rigid, walk.poses.scale), 20.0)
+    feet = measure.bones_named(dragged, ["foot.L"])
+    found = measure.measure(dragged, feet, 0, UP, 24.0)
+    assert found.sliding == pytest.approx(0.03)
+    assert found.travel == pytest.approx(0.03)
+    assert found.angular_acceleration == found.worst_acceleration == 0.0
+    # A foot that stands slides nowhere.
+    standing = np.arange(21) / 20 < 0.55
+    steps, on_ground = measure.sliding(walk, feet, UP)
+    assert steps[standing[1:], 0].max() < 1e-9
+    assert on_ground[standing[1:], 0].min() > 0.99 and on_ground[:, 0].min() == 0.0
+
+
+def test_angular_acceleration_is_that_of_a_growing_spin():
+    rig = walks.rig()
+    frames = np.arange(25)
+    rigid = np.broadcast_to(quat_vec.identity(), (25, 8, 7)).copy()
+    # angle = a t^2 / 2: at 24 frames a second every second difference is a / 24^2.
+    rigid[:, 4] = quat_vec.from_axis_angle([1.0, 2.0, 2.0], 0.5 * 3.0 * (frames / 24.0) ** 2)
+    clip = Clip("spin", rig, Poses(rigid, np.ones((25, 8, 3))), 24.0)
+    found = measure.measure(clip, [], 0, UP, 24.0)
+    assert found.worst_acceleration == pytest.approx(np.degrees(3.0))
+    assert found.angular_acceleration == pytest.approx(np.degrees(3.0) / np.sqrt(8.0))
+
+
+def test_feet_are_found():
+    walk = walks.walk()
+    assert [walk.rig.names[bone] for bone in measure.feet_of(walk, UP)] == ["foot.L", "foot.R"]
+
+
+# --- Errors
+
+
+@pytest.mark.parametrize(
+    ("weights", "settings", "sentence"),
+    [
+        ((1,), {}, "expected one for each of 2 clips, got 1"),
+        ((0, 0), {}, "not all of them 0"),
+        ((1, -1), {}, "0 or more"),
+        ((1, float("nan")), {}, "0 or more"),
+        ((1, 1), {"method": "slerp"}, "method: expected one of dlb"),
+        ((1, 1), {"space": "world"}, "space: expected one of relative, armature"),
+        ((1, 1), {"root_motion": "yes"}, "root motion: expected one of travel"),
+        ((1, 1), {"cycles": 0}, "cycles: expected 1 or more"),
+        ((1, 1), {"cycles": 10_000}, "choose fewer cycles"),
+        ((1, 1), {"root": "tail"}, "There is no bone 'tail'"),
+        ((1, 1), {"align_bones": ("paw",)}, "There is no bone 'paw'"),
+    ],
+)
+def test_errors_are_one_sentence(weights, settings, sentence):
+    with pytest.raises(SinewError, match=sentence):
+        blend([walks.walk(), walks.walk("other")], weights, Settings(**settings))
+
+
+def test_clips_of_other_armatures_are_refused():
+    walk = walks.walk()
+    other = replace(walk, rig=replace(walk.rig, names=("pelvis", *walk.rig.names[1:])), name="other")
+    with pytest.raises(SinewError, match="other and walk move other bones"):
+        blend([walk, other], (1, 1))
+    with pytest.raises(SinewError, match="choose two actions"):
+        blend([], ())
+
+
+def test_many_frames_at_once_are_frame_by_frame():
+    a, b = pair(21)
+    c = walks.random_clip(np.random.default_rng(22), "c")
+    weights = np.array([0.2, 0.5, 0.3])
+    for method in METHODS:
+        made = matrices(blend([a, b, c], weights, plain(method)).poses.rigid)
+        layout = {"m": quat_vec.to_affine, "q": np.asarray}.get(method[0], quat_vec.to_dual_quat)
+        for frame, bone in ((0, 1), (7, 3), (12, 6)):
+            three = np.stack([clip.poses.rigid[frame, bone] for clip in (a, b, c)])
+            one = sinew.interpolate.blend(layout(three), weights, method).transforms
+            if method.startswith("matrix"):
+                one = affine.normalized(one)
+            elif method.startswith("qv"):
+                one = quat_vec.to_affine(one)
+            else:
+                one = dual_quat.to_affine(one)
+            assert np.abs(one[:3] - made[frame, bone, :3]).max() < 1e-9
