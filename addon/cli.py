@@ -37,6 +37,7 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
     """The parser of the whole command line, and the module of each subcommand."""
     from .commands import (
         bake,
+        blend,
         check,
         compare,
         export,
@@ -59,6 +60,7 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
         "reskin": reskin,
         "restore": restore,
         "inbetween": inbetween,
+        "blend": blend,
         "bake": bake,
         "export": export,
         "compare": compare,

@@ -24,6 +24,7 @@ def register() -> None:
     from .attach import properties, stored_vertex_data
     from .deform import exporters, handlers
     from .features.bake import feature as bake
+    from .features.blend import feature as blend
     from .features.compare import feature as compare
     from .features.corrective import feature as corrective
     from .features.diagnose import feature as diagnose
@@ -50,7 +51,7 @@ def register() -> None:
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
         *(character_operators, presets, menus, main_panel, meshes_panel),
-        *(suggest, inbetween, bake, corrective, compare, heat, diagnose, gltf),
+        *(suggest, inbetween, blend, bake, corrective, compare, heat, diagnose, gltf),
     ):
         _register_classes(owner.CLASSES)
     translations.register()
@@ -65,7 +66,7 @@ def register() -> None:
     inbetween.register()
     handlers.register()
     exporters.register()
-    for feature in (suggest, bake, compare, heat, diagnose, gltf):
+    for feature in (suggest, blend, bake, compare, heat, diagnose, gltf):
         feature.register()
     handlers.adopt_open_file()
     atexit.unregister(_end)
@@ -77,6 +78,7 @@ def unregister() -> None:
         from .attach import note, properties, stored_vertex_data
         from .deform import exporters, handlers, session
         from .features.bake import feature as bake
+        from .features.blend import feature as blend
         from .features.compare import feature as compare
         from .features.diagnose import feature as diagnose
         from .features.gltf import feature as gltf
@@ -88,7 +90,7 @@ def unregister() -> None:
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
-        for feature in (gltf, diagnose, heat, compare, bake, suggest):
+        for feature in (gltf, diagnose, heat, compare, bake, blend, suggest):
             feature.unregister()
         exporters.unregister()
         handlers.unregister()

@@ -73,6 +73,55 @@ def curve_lists(
     return [bag.fcurves for bag in bags if bag is not None]
 
 
+def slot_for(action: bpy.types.Action, obj: bpy.types.Object) -> bpy.types.bpy_struct | None:
+    """The slot by which `obj` plays an action, or would: of those for objects the one of its name, else that
+    which moves most of its bones; None up to Blender 4.3."""
+    if not hasattr(action, "slots"):
+        return None
+    animation = obj.animation_data
+    if animation is not None and animation.action == action and animation.action_slot is not None:
+        return animation.action_slot
+    usable = [slot for slot in action.slots if slot.target_id_type in ("OBJECT", "UNSPECIFIED")]
+    names = set(obj.pose.bones.keys()) if obj.pose is not None else set()
+
+    def fitness(slot: bpy.types.bpy_struct) -> tuple[bool, int]:
+        bones = names & bone_curves(action, slot).keys()
+        return bool(bones) and slot.name_display == obj.name, len(bones)
+
+    return max(usable, key=fitness, default=None)
+
+
+def new_curves(
+    action: bpy.types.Action, obj: bpy.types.Object
+) -> tuple[bpy.types.bpy_prop_collection, bpy.types.bpy_struct | None]:
+    """Where F-curves for `obj` go in a new action, and the slot that plays them; None up to Blender 4.3."""
+    if not hasattr(action, "layers"):
+        return action.fcurves, None
+    slot = action.slots.new("OBJECT", obj.name)
+    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    return strip.channelbag(slot, ensure=True).fcurves, slot
+
+
+def new_curve(
+    curves: bpy.types.bpy_prop_collection, path: str, index: int, group: str
+) -> bpy.types.FCurve:
+    """An F-curve in a group of the Graph Editor; Blender 4.4 and 4.5 make none in an action's slots."""
+    known = curves.bl_rna.functions["new"].parameters
+    name = next((each for each in ("group_name", "action_group") if each in known), None)
+    return curves.new(path, index=index, **({name: group} if name is not None else {}))
+
+
+def play(obj: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.bpy_struct | None) -> None:
+    """Has `obj` play the action; the one before stays in the file."""
+    animation = obj.animation_data or obj.animation_data_create()
+    before = animation.action
+    if before is not None and before != action and before.is_editable:
+        before.use_fake_user = True
+    animation.action = action
+    if slot is not None:
+        animation.action_slot = slot
+
+
 def all_curves(action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None) -> list[bpy.types.FCurve]:
     return [curve for curves in curve_lists(action, slot) for curve in curves] if action is not None else []
 
@@ -99,6 +148,21 @@ def bone_curves(
         if channel is not None:
             bones.setdefault(channel.bone, []).append((curve, channel))
     return bones
+
+
+def unmuted_curves(
+    action: bpy.types.Action, slot: bpy.types.bpy_struct | None
+) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
+    """The curves that move bones, by bone, without those that the artist has muted: what Sinew plays in their
+    place counts."""
+    record = action.sinew_holds.get(str(handle_of(slot)))
+    muted = record.muted_by_artist() if record is not None else None
+    found = {}
+    for bone, pairs in bone_curves(action, slot).items():
+        pairs = [(c, each) for c, each in pairs if not (c.mute if muted is None else key_of(c) in muted)]
+        if pairs:
+            found[bone] = pairs
+    return found
 
 
 def key_times(curves: Sequence[bpy.types.FCurve]) -> np.ndarray:

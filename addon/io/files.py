@@ -7,7 +7,7 @@ import errno
 import os
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import bpy
@@ -20,7 +20,6 @@ IMPORTERS = {
     ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path),
 }
-READABLE = (".blend", *IMPORTERS)
 
 BLEND_MAGIC = b"BLENDER"
 ZSTANDARD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -37,17 +36,23 @@ LAST_BLOCK = (24, 32)
 _ABOUT_ERROR = re.compile(r"^((Error|OSError): |\[Errno \d+\] )+")
 
 
-def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> None:
+def open_file(
+    path: Path,
+    load_ui: bool = False,
+    scripts: bool = False,
+    importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
+) -> None:
     """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
 
-    load_ui  with the file's own windows and workspaces, which a copy of it is to keep
-    scripts  whether those in the file run
+    load_ui    with the file's own windows and workspaces, which a copy of it is to keep
+    scripts    whether those in the file run
+    importers  by their endings, of what else than a .blend is read
 
     Raises SinewError where it can not be read.
     """
-    _check_readable(path)
+    check_readable(path, (".blend", *importers))
     try:
-        importer = IMPORTERS.get(path.suffix.lower())
+        importer = importers.get(path.suffix.lower())
         if importer is None:
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=scripts)
         else:
@@ -98,15 +103,16 @@ def check_free(path: Path, overwrite: bool) -> None:
         raise SinewError(f"{path}: is there already; choose to overwrite it, or another folder")
 
 
-def _check_readable(path: Path) -> None:
+def check_readable(path: Path, readable: Sequence[str]) -> None:
+    """Raises SinewError where `path` is no file with one of these endings, or no .blend named so."""
     if not path.exists():
         raise SinewError(f"{path}: no such file")
     if path.is_dir():
         raise SinewError(f"{path}: is a folder, expected a file")
     if not path.is_file():
         raise SinewError(f"{path}: is a device or a pipe, expected a file")
-    if path.suffix.lower() not in READABLE:
-        raise SinewError(f"{path}: expected a file ending in {', '.join(READABLE)}")
+    if path.suffix.lower() not in readable:
+        raise SinewError(f"{path}: expected a file ending in {', '.join(readable)}")
     try:
         with path.open("rb") as file:
             magic = file.read(len(BLEND_MAGIC))

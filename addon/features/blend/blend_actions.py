@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions of an armature read, blended, and written as a new action, in steps."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from ...core.errors import SinewError
+from ...core.motion import blend as core
+from ...core.motion import measure
+from ...core.motion.clip import Clip
+from ...io import actions, clips
+
+# Of the whole: reading curves takes as long as writing keys.
+READING = 0.5
+
+
+@dataclass(frozen=True)
+class Made:
+    """The new action, which nothing plays yet, what it was made of, and the vertical in armature space."""
+
+    action: bpy.types.Action
+    sources: list[Clip]
+    blend: core.Blend
+    up: list[float]
+
+    @property
+    def frames(self) -> int:
+        return len(self.blend.poses.rigid)
+
+    @property
+    def clip(self) -> Clip:
+        return self.blend.clip(self.action.name)
+
+    def notes(self) -> list[str]:
+        """What a user should know of it, each a sentence."""
+        found, blend = [], self.blend
+        unsure = [blend.rig.names[bone] for bone in blend.undefined.any(axis=0).nonzero()[0]]
+        if unsure:
+            found.append(
+                f"{', '.join(unsure[:3])}{' and others' if len(unsure) > 3 else ''}: the actions are half a "
+                "turn apart in some frames, where a blend may jump"
+            )
+        least = measure.shrinking(blend)
+        if least.volume < 0.99:
+            found.append(
+                f"{least.bone} shrinks to {max(least.volume, 0.0):.0%} of its volume in frame "
+                f"{least.frame + 1} of the blend: another method keeps it"
+            )
+        if least.apart > 0.001 * blend.rig.size:
+            found.append(
+                f"Bones would leave their parents by up to {least.apart:.3g}: connected ones are kept on them"
+            )
+        return found
+
+
+def make(
+    armature: bpy.types.Object,
+    chosen: Sequence[bpy.types.Action],
+    weights: Sequence[float],
+    settings: core.Settings,
+    weights_from: Sequence[float] | None = None,
+    name: str = "",
+) -> Generator[float, None, Made]:
+    """Yields the share that is done. The new action begins at the scene's first frame; closed before its
+    end, nothing has changed. Raises SinewError for what can not be blended."""
+    if len(chosen) < 2:
+        raise SinewError(f"{armature.name}: choose two actions or more to blend")
+    rig, up, sources = clips.rig_of(armature), clips.up_of(armature), []
+    for number, action in enumerate(chosen):
+        steps = clips.read(armature, action, rig)
+        clip = yield from _part(steps, READING * number / len(chosen), READING / len(chosen))
+        sources.append(clip)
+    blend = core.blend(sources, weights, settings, weights_from, up)
+    keyed = set().union(*(clips.keyed_properties(armature, action) for action in chosen))
+    name = name or f"Blend {' '.join(action.name for action in chosen)}"
+    first = float(bpy.context.scene.frame_start)
+    steps = clips.write(armature, blend.clip(name), name, first, keyed)
+    made = yield from _part(steps, READING, 1.0 - READING)
+    return Made(made, sources, blend, list(up))
+
+
+def play(armature: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Has the armature play the new action; the one before stays in the file."""
+    actions.play(armature, action, actions.slot_for(action, armature))
+
+
+def _part(steps: Generator[float, None, object], start: float, share: float) -> Generator[float, None, object]:
+    """A generator as a part of another: what it yields, in the place of the whole; what it returns."""
+    while True:
+        try:
+            done = next(steps)
+        except StopIteration as end:
+            return end.value
+        try:
+            yield start + share * done
+        except GeneratorExit:
+            steps.close()
+            raise

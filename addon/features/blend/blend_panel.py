@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel of blends of actions in the sidebar, and its buttons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ...core.errors import SinewError
+from ...core.motion.blend import METHODS, TRAVEL
+from ...io import clips
+from ...ui import operators, stepped
+from ...ui.sidebar import Sidebar, characters, draw_text, shortened
+from ...ui.translations import counted, tr
+from . import blend_actions
+
+
+def armature_of(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The armature whose actions are blended: the active one, or that of the active mesh."""
+    return next(iter(operators.armatures(context)), None)
+
+
+class _OfArmature:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        armature = armature_of(context)
+        if armature is None:
+            cls.poll_message_set(tr("Select an armature, or a mesh that it deforms"))
+            return False
+        if not armature.is_editable:
+            text = tr("{name} is linked: make a library override of it first", name=armature.name)
+            cls.poll_message_set(text)
+            return False
+        return operators.can_change(cls)
+
+
+class SINEW_OT_blend_add_clip(_OfArmature, bpy.types.Operator):
+    bl_idname = "sinew.blend_add_clip"
+    bl_label = "Add Action"
+    bl_description = "Add an action to the blend: the one that plays, or the next that moves these bones"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        armature = armature_of(context)
+        chosen = armature.sinew_blend.clips
+        taken = [clip.action for clip in chosen]
+        playing = armature.animation_data.action if armature.animation_data is not None else None
+        left = [action for action in (playing, *bpy.data.actions) if action is not None]
+        left = [a for a in left if a not in taken and clips.keyed_properties(armature, a)]
+        chosen.add().action = left[0] if left else None
+        return {"FINISHED"}
+
+
+class SINEW_OT_blend_remove_clip(_OfArmature, bpy.types.Operator):
+    bl_idname = "sinew.blend_remove_clip"
+    bl_label = "Remove Action"
+    bl_description = "Take the action out of the blend; the action itself stays in the file"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: bpy.props.IntProperty(description="Which of the blend's actions", options={"HIDDEN", "SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        armature_of(context).sinew_blend.clips.remove(self.index)
+        return {"FINISHED"}
+
+
+class SINEW_OT_blend_import_clip(_OfArmature, ImportHelper, bpy.types.Operator):
+    bl_idname = "sinew.blend_import_clip"
+    bl_label = "Add Clip from File"
+    bl_description = (
+        "Make actions of the animations in a BVH, glTF or FBX file whose bones have the same names and rest, "
+        "and add them to the blend"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{ending}" for ending in clips.IMPORTERS), options={"HIDDEN"}
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        armature = armature_of(context)
+        try:
+            made = clips.import_actions(armature, Path(self.filepath))
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for action in made:
+            armature.sinew_blend.clips.add().action = action
+        self.report({"INFO"}, tr("Added {names}", names=", ".join(action.name for action in made)))
+        return {"FINISHED"}
+
+
+class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
+    bl_idname = "sinew.blend_actions"
+    bl_label = "Blend Actions"
+    bl_description = (
+        "Blend the actions into a new one of plain keys, which the armature plays; the actions themselves "
+        "stay as they are"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+    saying = "Sinew blends actions"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        chosen = [clip for clip in armature_of(context).sinew_blend.clips if clip.action is not None]
+        if len(chosen) < 2:
+            cls.poll_message_set(tr("Add two actions or more in the panel Blend Actions"))
+        return len(chosen) >= 2
+
+    def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        armature = armature_of(context)
+        # By name: undo, or another file, would leave pointers to nothing.
+        self._armature = armature.name
+        chosen = [clip for clip in armature.sinew_blend.clips if clip.action is not None]
+        blend = armature.sinew_blend
+        self._made = yield from blend_actions.make(
+            armature,
+            [clip.action for clip in chosen],
+            [clip.weight for clip in chosen],
+            blend.settings(),
+            [clip.weight_from for clip in chosen] if blend.changes else None,
+        )
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        made = self._made
+        blend_actions.play(bpy.data.objects[self._armature], made.action)
+        text = tr("Made {name}: {frames}", name=made.action.name, frames=_frames_text(made.frames))
+        self.report({"INFO"}, text)
+        for note in made.notes():
+            self.report({"WARNING"}, note)
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+def _frames_text(count: int) -> str:
+    return counted(count, "{count} frame", "{count} frames")
+
+
+class SINEW_PT_blend(Sidebar, bpy.types.Panel):
+    bl_label = "Blend Actions"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return armature_of(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, armature = self.layout, armature_of(context)
+        blend = armature.sinew_blend
+        name = shortened(armature.name, characters(context) - 4)
+        layout.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
+        for index, clip in enumerate(blend.clips):
+            column = layout.column(align=True)
+            row = column.row(align=True)
+            row.prop(clip, "action", text="")
+            row.operator("sinew.blend_remove_clip", text="", icon="X").index = index
+            row = column.row(align=True)
+            if blend.changes:
+                row.prop(clip, "weight_from", slider=True)
+            row.prop(clip, "weight", slider=True)
+        row = layout.row(align=True)
+        row.operator("sinew.blend_add_clip", icon="ADD")
+        row.operator("sinew.blend_import_clip", text="", icon="FILE_FOLDER")
+        if not blend.clips:
+            draw_text(layout, context, "Add actions of this armature, such as a walk and a run", icon="INFO")
+            return
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        for name in ("method", "space", "changes", "align"):
+            column.prop(blend, name)
+        if blend.align:
+            column.prop_search(blend, "align_bone", armature.data, "bones")
+        column.prop(blend, "cycles")
+        column.prop(blend, "root_motion")
+        if blend.root_motion == TRAVEL or blend.align:
+            column.prop_search(blend, "root", armature.data, "bones")
+        draw_text(layout, context, METHODS[blend.method].description)
+        layout.operator("sinew.blend_actions", icon="ACTION_TWEAK")
+
+
+CLASSES = (
+    SINEW_OT_blend_add_clip,
+    SINEW_OT_blend_remove_clip,
+    SINEW_OT_blend_import_clip,
+    SINEW_OT_blend_actions,
+    SINEW_PT_blend,
+)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an armature object has chosen for a blend of its actions, in the .blend file."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.motion import blend as core
+
+
+class SinewBlendClip(bpy.types.PropertyGroup):
+    """An action of a blend."""
+
+    action: bpy.props.PointerProperty(
+        type=bpy.types.Action, name="Action", description="An action that moves bones of this armature"
+    )
+    weight: bpy.props.FloatProperty(
+        name="Weight",
+        description="How much of the action is in the blend; weights are brought to sum 1",
+        default=1.0,
+        min=0.0,
+        soft_max=1.0,
+        options=set(),
+    )
+    weight_from: bpy.props.FloatProperty(
+        name="At First",
+        description="How much of the action is in the first frame, from where it goes to its weight",
+        default=1.0,
+        min=0.0,
+        soft_max=1.0,
+        options=set(),
+    )
+
+
+class SinewBlend(bpy.types.PropertyGroup):
+    """A blend of an armature object's actions."""
+
+    clips: bpy.props.CollectionProperty(type=SinewBlendClip, description="The actions to blend")
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How poses of a bone are blended",
+        items=[(m.name, m.label, m.description, m.number) for m in core.METHODS.values()],
+        default="dlb",
+        options=set(),
+    )
+    space: bpy.props.EnumProperty(
+        name="Space",
+        description="Relative to what bones are blended",
+        items=[
+            (core.RELATIVE, "Parents", "Each bone relative to its parent: chains stay whole", 0),
+            (
+                core.ARMATURE,
+                "Armature",
+                "Each bone by itself: it keeps its direction, and bones that are not connected leave their "
+                "parents",
+                1,
+            ),
+        ],
+        default=core.RELATIVE,
+        options=set(),
+    )
+    align: bpy.props.BoolProperty(
+        name="Align",
+        description="Bring the actions to the same moment of their motion, and cycles to a common length; "
+        "else each plays from its first frame",
+        default=True,
+        options=set(),
+    )
+    align_bone: bpy.props.StringProperty(
+        name="Aligned by",
+        description="The bone that says which moment it is, such as a foot; empty: all bones",
+        options=set(),
+    )
+    changes: bpy.props.BoolProperty(
+        name="Change Weights",
+        description="Let the weights change from the first frame of the blend to its last",
+        default=False,
+        options=set(),
+    )
+    cycles: bpy.props.IntProperty(
+        name="Cycles",
+        description="How often actions that repeat go round in the blend",
+        default=1,
+        min=1,
+        soft_max=20,
+        options=set(),
+    )
+    root_motion: bpy.props.EnumProperty(
+        name="Root Motion",
+        description="What becomes of the way that the root goes over the ground",
+        items=[
+            (core.TRAVEL, "Blended", "Steps of the root are blended and added up: speeds and turns blend", 0),
+            (core.IN_PLACE, "In Place", "The way over the ground is taken out", 1),
+            (core.KEYED, "As Keyed", "The root is blended as any other bone", 2),
+        ],
+        default=core.TRAVEL,
+        options=set(),
+    )
+    root: bpy.props.StringProperty(
+        name="Root",
+        description="The bone that carries the others; empty: the uppermost that moves",
+        options=set(),
+    )
+
+    def settings(self) -> core.Settings:
+        return core.Settings(
+            method=self.method,
+            space=self.space,
+            align=self.align,
+            align_bones=(self.align_bone,) if self.align_bone else (),
+            root=self.root or None,
+            root_motion=self.root_motion,
+            cycles=self.cycles,
+        )
+
+
+CLASSES = (SinewBlendClip, SinewBlend)
+
+
+def register() -> None:
+    bpy.types.Object.sinew_blend = bpy.props.PointerProperty(type=SinewBlend)
+
+
+def unregister() -> None:
+    del bpy.types.Object.sinew_blend

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions of an armature as clips, clips as actions, and actions from files of other formats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+import bpy
+import numpy as np
+from sinew import affine, quat_vec
+
+from ..core.errors import SinewError
+from ..core.inbetween import Poses
+from ..core.motion.clip import Clip, Rig
+from . import actions, files, pose_io
+
+
+def _import_bvh(path: str) -> None:
+    bpy.ops.import_anim.bvh(filepath=path, use_fps_scale=True, rotate_mode="QUATERNION")
+
+
+Result = TypeVar("Result")
+
+# What Blender opens or imports that can move an armature.
+IMPORTERS = {**files.IMPORTERS, ".bvh": _import_bvh}
+# How far rests may differ for a clip of another file to be one of this armature: radians, part of the size.
+SAME_REST = (0.02, 0.01)
+# Of the three properties that Blender keys, the columns of pose_io.read_channels(), and rest there.
+_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+
+
+def rig_of(armature: bpy.types.Object) -> Rig:
+    """The bones of an armature object, parents first."""
+    waiting = [bone for bone in reversed(armature.data.bones) if bone.parent is None]
+    bones = []
+    while waiting:
+        bones.append(waiting.pop())
+        waiting += reversed(bones[-1].children)
+    if not bones:
+        raise SinewError(f"{armature.name} has no bones")
+    index = {bone.name: number for number, bone in enumerate(bones)}
+    parents = np.array([index[bone.parent.name] if bone.parent else -1 for bone in bones])
+    rest = affine.to_quat_vec(
+        affine.normalized(np.array([bone.matrix_local for bone in bones], dtype=np.float64))
+    )
+    above = np.where((parents >= 0)[:, None], rest[np.maximum(parents, 0)], quat_vec.identity())
+    return Rig(
+        tuple(index),
+        parents,
+        quat_vec.compose(quat_vec.inverse(above), rest),
+        np.array([bone.length for bone in bones]),
+        np.array([bone.use_connect and bone.parent is not None for bone in bones]),
+    )
+
+
+def up_of(armature: bpy.types.Object) -> np.ndarray:
+    """[3]: the world's Z in armature space, of length 1."""
+    up = np.array(armature.matrix_world.to_3x3().normalized().inverted_safe(), dtype=np.float64)[:, 2]
+    length = float(np.linalg.norm(up))
+    return up / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+
+
+def read(
+    armature: bpy.types.Object, action: bpy.types.Action, rig: Rig | None = None
+) -> Generator[float, None, Clip]:
+    """An action's bones at every frame, as the armature would play it; yields the share that is done.
+
+    From its first key of a bone to its last, or its manual frame range; a cycle where that says so. Curves'
+    modifiers act, constraints and drivers do not. A bone is at rest in what has no keys. Raises SinewError
+    where it moves no bone.
+    """
+    rig = rig_of(armature) if rig is None else rig
+    curves = _playing(armature, action)
+    if not curves:
+        raise SinewError(f"{action.name} moves no bone of {armature.name}: choose another action")
+    times = _times(action, [curve for curve, _bone, _column in curves])
+    rows = {name: row for row, name in enumerate(rig.names)}
+    modes = _modes(armature, rig)
+    channels = np.tile(_rest_channels(modes), (len(times), 1, 1))
+    for number, (curve, bone, column) in enumerate(curves):
+        channels[:, rows[bone], column] = [curve.evaluate(time) for time in times]
+        yield (number + 1) / len(curves)
+    poses = pose_io.poses_of(channels.reshape(-1, pose_io.CHANNELS), np.tile(modes, len(times)))
+    shape = (len(times), len(rig.names), -1)
+    is_cyclic = action.use_frame_range and action.use_cyclic
+    return Clip(
+        action.name,
+        rig,
+        Poses(poses.rigid.reshape(shape), poses.scale.reshape(shape)),
+        float(times[-1] - times[0]),
+        is_cyclic,
+    )
+
+
+def keyed_properties(armature: bpy.types.Object, action: bpy.types.Action) -> set[tuple[str, str]]:
+    """What an action keys: bones with "location", "rotation" or "scale"."""
+    return {(bone, _property_of(column)) for _curve, bone, column in _playing(armature, action)}
+
+
+def write(
+    armature: bpy.types.Object, clip: Clip, name: str, first_frame: float, keyed: set[tuple[str, str]]
+) -> Generator[float, None, bpy.types.Action]:
+    """A new action of plain keys at every frame, straight lines between them; nothing plays it yet.
+
+    keyed  as of keyed_properties(); what is not at rest is keyed as well
+    """
+    rig, count = clip.rig, len(clip.poses.rigid)
+    modes = _modes(armature, rig)
+    samples = np.empty((count, len(rig.names), pose_io.CHANNELS))
+    near = _rest_channels(modes)
+    for frame in range(count):
+        poses = Poses(clip.poses.rigid[frame], clip.poses.scale[frame])
+        near = samples[frame] = pose_io.channels_of(poses, modes, near)
+        yield 0.5 * (frame + 1) / count
+    times = first_frame + np.linspace(0.0, clip.length, count)
+    rotations = pose_io.rotation_properties(armature.pose.bones)
+    action = bpy.data.actions.new(name)
+    try:
+        curves, _slot = actions.new_curves(action, armature)
+        for row, bone in enumerate(rig.names):
+            path = f'pose.bones["{bpy.utils.escape_identifier(bone)}"].'
+            for kind, columns, at_rest in _kinds(modes[row]):
+                values = samples[:, row, columns]
+                if (bone, kind) in keyed or np.abs(values - at_rest).max() > 1e-6:
+                    for index in range(values.shape[1]):
+                        property_name = rotations[bone] if kind == "rotation" else kind
+                        curve = actions.new_curve(curves, path + property_name, index, bone)
+                        _fill(curve, times, values[:, index])
+            yield 0.5 + 0.5 * (row + 1) / len(rig.names)
+    except BaseException:
+        # Esc closes the generator.
+        bpy.data.actions.remove(action)
+        raise
+    return action
+
+
+def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Action]:
+    """The animations in a .bvh, .glb, .gltf or .fbx file as new actions of `armature`; Blender's importers
+    read it into a scene of its own, which is removed again.
+
+    Raises SinewError where the file has none, or its bones rest otherwise.
+    """
+    importer = IMPORTERS.get(path.suffix.lower())
+    if importer is None:
+        raise SinewError(f"{path}: expected a file ending in {', '.join(IMPORTERS)}")
+    files.check_readable(path, tuple(IMPORTERS))
+    rig, found = rig_of(armature), []
+    with _imported(path, importer) as objects:
+        armatures = [obj for obj in objects if obj.type == "ARMATURE"]
+        sources = [(obj, action) for obj in armatures for action in _actions_of(obj)]
+        if not sources:
+            raise SinewError(f"{path}: has no animation of an armature")
+        for source, action in sources:
+            clip = _on_rig(_finished(read(source, action)), rig, path)
+            name = path.stem if len(sources) == 1 else f"{path.stem} {action.name}"
+            keyed = {each for each in keyed_properties(source, action) if each[0] in rig.names}
+            found.append((clip, name, keyed))
+    made = [_finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]
+    for action in made:
+        action.use_fake_user = True
+    return made
+
+
+def _playing(
+    armature: bpy.types.Object, action: bpy.types.Action
+) -> list[tuple[bpy.types.FCurve, str, int]]:
+    """The curves that move the armature's bones, with the bone and the column of its channels."""
+    rotations = pose_io.rotation_properties(armature.pose.bones)
+    found = actions.unmuted_curves(action, actions.slot_for(action, armature))
+    return [
+        (curve, bone, channel.column)
+        for bone, pairs in found.items()
+        for curve, channel in pairs
+        if actions.plays(channel, rotations.get(bone)) and curve.is_valid
+    ]
+
+
+def _times(action: bpy.types.Action, curves: list[bpy.types.FCurve]) -> np.ndarray:
+    """Even times from first to last, a frame apart; less where that is no whole number of frames."""
+    if action.use_frame_range:
+        first, last = action.frame_start, action.frame_end
+    else:
+        ranges = [tuple(curve.range()) for curve in curves]
+        first, last = min(start for start, _end in ranges), max(end for _start, end in ranges)
+    return np.linspace(first, last, max(round(last - first), 1 if last > first else 0) + 1)
+
+
+def _modes(armature: bpy.types.Object, rig: Rig) -> np.ndarray:
+    return np.array([armature.pose.bones[name].rotation_mode for name in rig.names])
+
+
+def _rest_channels(modes: np.ndarray) -> np.ndarray:
+    """[bones, 10] of bones at rest in their rotation modes."""
+    channels = np.tile(_REST, (len(modes), 1))
+    channels[modes == "AXIS_ANGLE", 3:7] = (0.0, 0.0, 1.0, 0.0)
+    channels[~np.isin(modes, list(pose_io.ROTATION_PROPERTIES)), 3:7] = 0.0
+    return channels
+
+
+def _property_of(column: int) -> str:
+    return "location" if column < 3 else "rotation" if column < 7 else "scale"
+
+
+def _kinds(mode: str) -> list[tuple[str, slice, np.ndarray]]:
+    """Each property with its columns, and its values at rest."""
+    width = 4 if mode in pose_io.ROTATION_PROPERTIES else 3
+    columns = {"location": slice(0, 3), "rotation": slice(3, 3 + width), "scale": slice(7, 10)}
+    rest = _rest_channels(np.array([mode]))[0]
+    return [(kind, where, rest[where]) for kind, where in columns.items()]
+
+
+def _fill(curve: bpy.types.FCurve, times: np.ndarray, values: np.ndarray) -> None:
+    points = curve.keyframe_points
+    points.add(len(times))
+    points.foreach_set("co", np.column_stack([times, values]).astype(np.float32).ravel())
+    linear = actions.key_value("interpolation", "LINEAR")
+    points.foreach_set("interpolation", np.full(len(times), linear, np.int32))
+    curve.update()
+
+
+def _on_rig(clip: Clip, rig: Rig, path: Path) -> Clip:
+    """The clip of a like armature on another's bones; those that it lacks are at rest."""
+    rows = [(row, clip.rig.names.index(name)) for row, name in enumerate(rig.names) if name in clip.rig.names]
+    if not rows:
+        raise SinewError(f"{path}: has no bone of this armature's names: rename bones in one of them")
+    for row, source in rows:
+        apart = quat_vec.rigid_distance(rig.rest[row], clip.rig.rest[source])
+        if apart.angle > SAME_REST[0] or apart.translation > SAME_REST[1] * rig.size:
+            raise SinewError(
+                f"{path}: {rig.names[row]} rests otherwise than in this armature: retarget the clip first"
+            )
+    count = len(clip.poses.rigid)
+    rigid = np.tile(quat_vec.identity(), (count, len(rig.names), 1))
+    scale = np.ones((count, len(rig.names), 3))
+    for row, source in rows:
+        rigid[:, row], scale[:, row] = clip.poses.rigid[:, source], clip.poses.scale[:, source]
+    return Clip(clip.name, rig, Poses(rigid, scale), clip.length, clip.is_cyclic)
+
+
+def _actions_of(obj: bpy.types.Object) -> list[bpy.types.Action]:
+    """The actions that an importer made for an armature object: what it plays and what its tracks hold."""
+    animation = obj.animation_data
+    if animation is None:
+        return []
+    strips = [strip for track in animation.nla_tracks for strip in track.strips]
+    found = [player.action for player in (animation, *strips) if player.action is not None]
+    return [action for action in dict.fromkeys(found) if _playing(obj, action)]
+
+
+def _finished(steps: Generator[float, None, Result]) -> Result:
+    """What a generator of this file returns."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+@contextmanager
+def _imported(path: Path, importer: Callable[[str], object]) -> Iterator[list[bpy.types.Object]]:
+    """The objects of a file in a scene of their own, at the open scene's frame rate; afterwards all that the
+    importer made is gone."""
+    before = bpy.context.scene
+    known = {block.session_uid for block in _blocks()}
+    scene = bpy.data.scenes.new(path.stem)
+    scene.render.fps, scene.render.fps_base = before.render.fps, before.render.fps_base
+    try:
+        with _shown(scene):
+            try:
+                importer(str(path))
+            except RuntimeError as error:
+                raise SinewError(f"{path}: Blender can not read it: {files.telling_line(error)}") from None
+            yield list(scene.objects)
+    finally:
+        bpy.data.batch_remove([block for block in _blocks() if block.session_uid not in known])
+
+
+@contextmanager
+def _shown(scene: bpy.types.Scene) -> Iterator[None]:
+    """Importers add to the scene of the context."""
+    window = bpy.context.window
+    if window is None:
+        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+            yield
+        return
+    before, layer = window.scene, window.view_layer
+    window.scene = scene
+    try:
+        yield
+    finally:
+        window.scene = before
+        window.view_layer = layer
+
+
+def _blocks() -> list[bpy.types.ID]:
+    """All data-blocks of the open file."""
+    collections = [each.identifier for each in bpy.data.bl_rna.properties if each.type == "COLLECTION"]
+    return [block for name in collections for block in getattr(bpy.data, name)]
