@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -155,7 +156,9 @@ def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Act
             raise SinewError(f"{path}: has no animation of an armature")
         for source, action in sources:
             clip = _on_rig(_finished(read(source, action)), rig, path)
-            name = path.stem if len(sources) == 1 else f"{path.stem} {action.name}"
+            # Without what Blender added where an action of this name was there.
+            own = re.sub(r"\.\d{3}$", "", action.name)
+            name = path.stem if len(sources) == 1 else f"{path.stem} {own}"
             keyed = {each for each in keyed_properties(source, action) if each[0] in rig.names}
             found.append((clip, name, keyed))
     made = [_finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]

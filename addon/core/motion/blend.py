@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from sinew import interpolate, quat_vec
 
-from ..errors import SinewError
+from ..errors import WrongUse
 from ..inbetween import Poses, axes_of, in_layout_of, rigid_of
 from . import timing
 from .align import Warp, align, same_pace
@@ -153,9 +153,9 @@ def _check(settings: Settings) -> None:
         ("root motion", settings.root_motion, (TRAVEL, IN_PLACE, KEYED)),
     ):
         if value not in known:
-            raise SinewError(f"{what}: expected one of {', '.join(known)}, got {value!r}")
+            raise WrongUse(f"{what}: expected one of {', '.join(known)}, got {value!r}")
     if settings.cycles < 1:
-        raise SinewError(f"cycles: expected 1 or more, got {settings.cycles}")
+        raise WrongUse(f"cycles: expected 1 or more, got {settings.cycles}")
 
 
 def _in_place(clips: Sequence[Clip], root: int, up: np.ndarray, settings: Settings) -> list[Grounded]:

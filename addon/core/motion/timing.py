@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import SinewError
+from ..errors import SinewError, WrongUse
 from .align import Warp
 from .clip import Clip
 
@@ -30,9 +30,9 @@ def checked_weights(weights: Sequence[float], count: int) -> np.ndarray:
     """[count] of sum 1. Raises SinewError where they are not such."""
     given = np.array(weights, dtype=np.float64)
     if given.shape != (count,):
-        raise SinewError(f"Weights: expected one for each of {count} clips, got {given.size}")
+        raise WrongUse(f"Weights: expected one for each of {count} clips, got {given.size}")
     if not np.isfinite(given).all() or (given < 0.0).any() or given.sum() <= 0.0:
-        raise SinewError("Weights: expected numbers of 0 or more, and not all of them 0")
+        raise WrongUse("Weights: expected numbers of 0 or more, and not all of them 0")
     return given / given.sum()
 
 

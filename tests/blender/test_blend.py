@@ -1,0 +1,489 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions of an armature blended: what Blender plays is what the core computes of what Blender played."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+from program import run_sinew
+from scipy.spatial.transform import Rotation
+from sinew import quat_vec
+from sinew_addon.core.errors import SinewError
+from sinew_addon.core.motion import blend as core
+from sinew_addon.core.motion.blend import Settings
+from sinew_addon.features.blend import blend_actions
+from sinew_addon.io import actions, clips, files
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+import walks  # noqa: E402 - it is found there
+
+CLOSE = 2e-5
+MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
+
+
+def finished(steps):
+    return clips._finished(steps)
+
+
+def make_legs(modes=("QUATERNION",), name="Legs"):
+    """The rig of walks.py in Blender; rotation modes in turn."""
+    rig = walks.rig()
+    armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    armature.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    rest = quat_vec.to_affine(rig.to_armature(np.tile(quat_vec.identity(), (8, 1))))
+    for bone, (name_of, parent) in enumerate(zip(rig.names, rig.parents, strict=True)):
+        made = armature.data.edit_bones.new(name_of)
+        made.head = (0, 0, 0)
+        made.tail = (0, rig.lengths[bone], 0)
+        made.matrix = Matrix(rest[bone].tolist())
+        made.length = rig.lengths[bone]
+        if parent >= 0:
+            made.parent = armature.data.edit_bones[rig.names[parent]]
+    for bone, connected in zip(rig.names, rig.connected, strict=True):
+        armature.data.edit_bones[bone].use_connect = bool(connected)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for number, bone in enumerate(armature.pose.bones):
+        bone.rotation_mode = modes[number % len(modes)]
+    return armature
+
+
+def key_clip(armature, clip, first=1):
+    """A clip keyed by Blender itself, as an action of its name."""
+    armature.animation_data_create().action = None
+    if armature.animation_data.action is None:
+        for bone in armature.pose.bones:
+            bone.matrix_basis = Matrix()
+    matrices = quat_vec.to_affine(clip.poses.rigid)
+    for frame in range(len(matrices)):
+        for row, name in enumerate(clip.rig.names):
+            bone = armature.pose.bones[name]
+            scale = clip.poses.scale[frame, row]
+            bone.matrix_basis = Matrix(matrices[frame, row].tolist()) @ Matrix.Diagonal((*scale, 1.0))
+            rotation = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(
+                bone.rotation_mode, "rotation_euler"
+            )
+            for path in ("location", rotation, "scale"):
+                bone.keyframe_insert(path, frame=first + frame)
+    action = armature.animation_data.action
+    action.name = clip.name
+    action.use_fake_user = True
+    return action
+
+
+def make_walks(modes=("QUATERNION",), run_start=0.3):
+    armature = make_legs(modes)
+    bpy.context.scene.frame_start = 1
+    pair = walks.walk("WALK"), walks.walk("RUN", 30, 1.1, 0.2, start=run_start)
+    return armature, [key_clip(armature, clip) for clip in pair], pair
+
+
+def film(armature, frames):
+    """float64 [frames, bones, 4, 4]: the evaluated pose in armature space, in the order of the rig."""
+    names, shown = clips.rig_of(armature).names, []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+        shown.append(np.array([posed[name].matrix for name in names], dtype=np.float64))
+    return np.array(shown)
+
+
+def played(armature, action, frames):
+    actions.play(armature, action, actions.slot_for(action, armature))
+    return film(armature, frames)
+
+
+# --- Reading and writing
+
+
+@pytest.mark.parametrize("modes", [("QUATERNION",), MODES])
+def test_a_clip_is_what_blender_plays(modes):
+    armature, (walk, run), pair = make_walks(modes)
+    for action, source in ((walk, pair[0]), (run, pair[1])):
+        clip = finished(clips.read(armature, action))
+        assert clip.length == source.length and not clip.is_cyclic
+        shown = played(armature, action, range(1, 2 + round(clip.length)))
+        posed = quat_vec.to_affine(clip.rig.to_armature(clip.poses.rigid))
+        assert np.abs(posed - shown).max() < CLOSE
+        order = [source.rig.names.index(name) for name in clip.rig.names]
+        wanted = quat_vec.to_affine(source.poses.rigid)[:, order]
+        assert np.abs(quat_vec.to_affine(clip.poses.rigid) - wanted).max() < CLOSE
+
+
+def test_random_poses_with_scale_come_back_in_every_rotation_mode():
+    armature = make_legs(MODES)
+    clip = walks.random_clip(np.random.default_rng(4), "random")
+    # A connected bone has no location.
+    clip.poses.rigid[:, clip.rig.connected, 4:] = 0.0
+    action = key_clip(armature, clip)
+    read = finished(clips.read(armature, action))
+    again = finished(clips.write(armature, read, "again", 1.0, set()))
+    frames = range(1, 14)
+    assert np.abs(played(armature, again, frames) - played(armature, action, frames)).max() < CLOSE
+    for curve in actions.all_curves(again, actions.slot_for(again, armature)):
+        assert {point.interpolation for point in curve.keyframe_points} == {"LINEAR"}
+        values = np.array([point.co[1] for point in curve.keyframe_points])
+        # Rotations are written close to the frame before: between frames nothing tumbles.
+        assert np.abs(np.diff(values)).max() < 1.5
+
+
+def test_only_what_plays_is_read():
+    armature, (walk, _run), _pair = make_walks(("XYZ",))
+    spine = armature.pose.bones["spine"]
+    before = finished(clips.read(armature, walk))
+    row = before.rig.names.index("spine")
+    assert np.abs(np.diff(before.poses.rigid[:, row], axis=0)).max() > 0.01
+    actions.play(armature, walk, actions.slot_for(walk, armature))
+    # Held by the in-betweens, curves are muted and play all the same.
+    armature.sinew_inbetween = "dlb"
+    held = finished(clips.read(armature, walk))
+    assert np.array_equal(held.poses.rigid, before.poses.rigid)
+    armature.sinew_inbetween = "blender"
+    for curve, _channel in actions.bone_curves(walk, actions.slot_for(walk, armature))["spine"]:
+        curve.mute = True
+    assert np.abs(np.diff(finished(clips.read(armature, walk)).poses.rigid[:, row], axis=0)).max() == 0.0
+    # Keyed in a rotation mode that the bone does not have.
+    for curve, _channel in actions.bone_curves(walk, actions.slot_for(walk, armature))["spine"]:
+        curve.mute = False
+    spine.rotation_mode = "QUATERNION"
+    assert np.abs(np.diff(finished(clips.read(armature, walk)).poses.rigid[:, row], axis=0)).max() == 0.0
+
+
+def test_a_manual_range_is_the_clip_and_says_that_it_is_a_cycle():
+    armature, (walk, _run), _pair = make_walks()
+    walk.use_frame_range, walk.frame_start, walk.frame_end = True, 3, 11
+    clip = finished(clips.read(armature, walk))
+    assert clip.length == 8.0 and len(clip.poses.rigid) == 9 and not clip.is_cyclic
+    walk.use_cyclic = True
+    assert finished(clips.read(armature, walk)).is_cyclic
+
+
+# --- Blending
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_weight_of_one_plays_the_action(number):
+    armature, chosen, pair = make_walks(MODES)
+    frames = range(1, 2 + round(pair[number].length))
+    wanted = played(armature, chosen[number], frames)
+    made = finished(blend_actions.make(armature, chosen, np.eye(2)[number], Settings()))
+    assert np.abs(played(armature, made.action, frames) - wanted).max() < CLOSE
+    assert made.frames == len(frames)
+
+
+@pytest.mark.parametrize("method", core.METHODS)
+def test_blender_plays_the_blend(method):
+    armature, chosen, pair = make_walks(MODES)
+    for space in (core.RELATIVE, core.ARMATURE):
+        settings = Settings(method=method, space=space, cycles=2)
+        made = finished(blend_actions.make(armature, chosen, (0.4, 0.6), settings))
+        blend = core.blend(pair, (0.4, 0.6), settings)
+        order = [blend.rig.names.index(name) for name in clips.rig_of(armature).names]
+        shown = played(armature, made.action, range(1, 1 + made.frames))
+        wanted = quat_vec.to_affine(blend.rig.to_armature(blend.poses.rigid))[:, order]
+        if method != "matrix_linear":
+            assert np.abs(shown - wanted).max() < 5 * CLOSE
+            continue
+        volume = np.linalg.det(shown[..., :3, :3])
+        assert volume.min() < 0.999 and np.abs(volume[0, 0] - blend.volume[0, 0]) < CLOSE
+        if space == core.ARMATURE:
+            assert np.abs(volume - blend.volume[:, order]).max() < 5e-5
+
+
+def test_the_root_travels_at_the_blended_speed():
+    armature, chosen, _pair = make_walks()
+    made = finished(blend_actions.make(armature, chosen, (1, 1), Settings(cycles=2)))
+    shown = played(armature, made.action, (1, made.frames))
+    assert made.frames == 51
+    hips = made.blend.rig.names.index("hips")
+    assert np.abs(shown[1, hips, :3, 3] - shown[0, hips, :3, 3] - (0, -1.9, 0)).max() < CLOSE
+    assert made.blend.root == "hips"
+
+
+def test_an_armature_turned_in_the_world_travels_over_the_worlds_ground():
+    armature, chosen, _pair = make_walks()
+    armature.rotation_euler.x = 0.4
+    bpy.context.view_layer.update()
+    assert np.abs(clips.up_of(armature) - (0.0, np.sin(0.4), np.cos(0.4))).max() < 1e-6
+
+
+def test_the_actions_and_all_else_stay_as_they_were():
+    armature, chosen, _pair = make_walks()
+    keys = [[(c.data_path, [tuple(p.co) for p in c.keyframe_points]) for c in
+             actions.all_curves(a, actions.slot_for(a, armature))] for a in chosen]  # fmt: skip
+    blend = armature.sinew_blend
+    for action in chosen:
+        blend.clips.add().action = action
+    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    made = armature.animation_data.action
+    assert made.name == "Blend WALK RUN" and made not in chosen
+    assert [[(c.data_path, [tuple(p.co) for p in c.keyframe_points]) for c in
+             actions.all_curves(a, actions.slot_for(a, armature))] for a in chosen] == keys  # fmt: skip
+    assert len(bpy.data.actions) == 3
+
+
+# --- The panel's buttons
+
+
+def test_the_operator_blends_and_undo_takes_it_back():
+    armature, chosen, _pair = make_walks()
+    actions.play(armature, chosen[0], actions.slot_for(chosen[0], armature))
+    assert bpy.ops.sinew.blend_add_clip() == {"FINISHED"}
+    assert not bpy.ops.sinew.blend_actions.poll()
+    assert bpy.ops.sinew.blend_add_clip() == {"FINISHED"}
+    assert [clip.action.name for clip in armature.sinew_blend.clips] == ["WALK", "RUN"]
+    bpy.ops.ed.undo_push(message="before")
+    armature.sinew_blend.clips[1].weight = 0.5
+    armature.sinew_blend.method = "sclerp"
+    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    assert len(film(armature, range(1, 3))) == 2
+    assert armature.animation_data.action.frame_range[1] == 24.0
+    bpy.ops.ed.undo_push(message="Blend Actions")
+    bpy.ops.ed.undo()
+    armature = bpy.data.objects["Legs"]
+    assert armature.animation_data.action.name == "WALK"
+    assert len(bpy.data.actions) == 2
+    assert bpy.ops.sinew.blend_remove_clip(index=0) == {"FINISHED"}
+    assert [clip.action.name for clip in armature.sinew_blend.clips] == ["RUN"]
+
+
+def test_weights_change_from_first_to_last():
+    armature, chosen, pair = make_walks()
+    for action, start, end in zip(chosen, (1.0, 0.0), (0.0, 1.0), strict=True):
+        clip = armature.sinew_blend.clips.add()
+        clip.action, clip.weight_from, clip.weight = action, start, end
+    armature.sinew_blend.changes = True
+    first = played(armature, chosen[0], [1])[0]
+    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    assert np.abs(film(armature, [1])[0] - first).max() < CLOSE
+
+
+@pytest.mark.parametrize("steps", [1, 40, 90])
+def test_stopped_nothing_has_changed(steps):
+    armature, chosen, _pair = make_walks()
+    actions.play(armature, chosen[0], actions.slot_for(chosen[0], armature))
+    before = set(bpy.data.actions.keys())
+    running = blend_actions.make(armature, chosen, (1, 1), Settings())
+    shares = [next(running) for _step in range(steps)]
+    assert shares == sorted(shares) and 0.0 < shares[-1] < 1.0
+    running.close()
+    assert set(bpy.data.actions.keys()) == before
+    assert armature.animation_data.action == chosen[0]
+
+
+def test_errors_are_reported_in_one_sentence():
+    armature, chosen, _pair = make_walks()
+    other = bpy.data.actions.new("EMPTY")
+    for action in (chosen[0], other):
+        armature.sinew_blend.clips.add().action = action
+    with pytest.raises(RuntimeError, match="EMPTY moves no bone of Legs: choose another action"):
+        bpy.ops.sinew.blend_actions()
+    armature.sinew_blend.clips[1].action = chosen[1]
+    armature.sinew_blend.root = "tail"
+    with pytest.raises(RuntimeError, match="There is no bone 'tail'"):
+        bpy.ops.sinew.blend_actions()
+    armature.sinew_blend.root = ""
+    for clip in armature.sinew_blend.clips:
+        clip.weight = 0.0
+    with pytest.raises(RuntimeError, match="not all of them 0"):
+        bpy.ops.sinew.blend_actions()
+    assert len(bpy.data.actions) == 3
+
+
+# --- Clips from files
+
+
+# Z up to Y up, as most BVH files have it: -Z is ahead.
+Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+
+def write_bvh(path, clip):
+    """A clip as a motion capture file, by the format's definition: bones rest unrotated, each rotates about
+    its head relative to its parent, by angles about Z, X and Y."""
+    rig, posed = clip.rig, clip.rig.to_armature(clip.poses.rigid)
+    rest = rig.to_armature(np.tile(quat_vec.identity(), (len(rig.names), 1)))
+    turned = quat_vec.to_affine(quat_vec.compose(posed, quat_vec.inverse(rest)))[..., :3, :3]
+    turned = Y_UP @ turned @ Y_UP.T
+    heads, tails = np.moveaxis(rig.points(rest) @ Y_UP.T, 1, 0)
+    lines, order = ["HIERARCHY"], []
+
+    def joint(bone, depth):
+        parent = rig.parents[bone]
+        order.append(bone)
+        offset = heads[bone] - (heads[parent] if parent >= 0 else 0.0)
+        places = "Xposition Yposition Zposition " if parent < 0 else ""
+        lines.append(f"{'JOINT' if parent >= 0 else 'ROOT'} {rig.names[bone]}")
+        lines.append("{\nOFFSET " + " ".join(f"{x:.9f}" for x in offset))
+        lines.append(f"CHANNELS {6 if places else 3} {places}Zrotation Xrotation Yrotation")
+        below = np.flatnonzero(rig.parents == bone)
+        for child in below:
+            joint(child, depth + 1)
+        if not len(below):
+            end = " ".join(f"{x:.9f}" for x in tails[bone] - heads[bone])
+            lines.append("End Site\n{\nOFFSET " + end + "\n}")
+        lines.append("}")
+
+    joint(0, 0)
+    count = len(posed)
+    lines.append(f"MOTION\nFrames: {count}\nFrame Time: {1 / 24:.9f}")
+    for frame in range(count):
+        row = [*(Y_UP @ posed[frame, 0, 4:])]
+        for bone in order:
+            parent = rig.parents[bone]
+            own = turned[frame, bone]
+            own = own if parent < 0 else turned[frame, parent].T @ own
+            row += list(Rotation.from_matrix(own).as_euler("ZXY", degrees=True))
+        lines.append(" ".join(f"{x:.9f}" for x in row))
+    path.write_text("\n".join(lines) + "\n")
+
+
+def heads_of(clip):
+    return clip.rig.points(clip.rig.to_armature(clip.poses.rigid))[:, :, 0]
+
+
+def test_a_bvh_file_becomes_an_action(tmp_path):
+    pair = walks.walk("WALK"), walks.walk("RUN", 30, 1.1, 0.2, start=0.3)
+    for clip in pair:
+        write_bvh(tmp_path / f"{clip.name.lower()}.bvh", clip)
+    files.open_file(tmp_path / "walk.bvh", importers=clips.IMPORTERS)
+    legs = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    known = {block.session_uid for block in clips._blocks()}
+    (run,) = clips.import_actions(legs, tmp_path / "run.bvh")
+    assert {block.session_uid for block in clips._blocks()} - known == {run.session_uid}
+    assert run.name == "run" and run.use_fake_user
+    walk = legs.animation_data.action
+    for action, source in ((walk, pair[0]), (run, pair[1])):
+        shown = played(legs, action, range(1, 2 + round(source.length)))
+        order = [source.rig.names.index(name) for name in clips.rig_of(legs).names]
+        assert np.abs(shown[..., :3, 3] - heads_of(source)[:, order]).max() < 1e-4
+    made = finished(blend_actions.make(legs, [walk, run], (1, 1), Settings()))
+    assert made.blend.is_cyclic and made.frames == 26
+    wanted = core.blend(pair, (1, 1)).clip("blend")
+    order = [wanted.rig.names.index(name) for name in made.blend.rig.names]
+    # Bones are rolled otherwise there: what they do is the same.
+    assert np.abs(heads_of(made.clip) - heads_of(wanted)[:, order]).max() < 1e-3
+
+
+def test_a_gltf_files_animations_become_actions(real_rig):
+    path = real_rig("Fox.glb")
+    files.open_file(path)
+    fox = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    scene, count = bpy.context.scene, len(bpy.data.objects)
+    made = clips.import_actions(fox, path)
+    assert sorted(action.name for action in made) == ["Fox Run", "Fox Survey", "Fox Walk"]
+    assert (bpy.context.scene, len(bpy.data.objects), len(bpy.data.scenes)) == (scene, count, 1)
+    for action in made:
+        theirs = bpy.data.actions[action.name.removeprefix("Fox ")]
+        one, other = (finished(clips.read(fox, each)) for each in (action, theirs))
+        assert one.length == pytest.approx(other.length)
+        difference = quat_vec.to_affine(one.poses.rigid) - quat_vec.to_affine(other.poses.rigid)
+        assert np.abs(difference[..., :3, :3]).max() < CLOSE
+
+
+def test_files_that_do_not_fit_are_refused(tmp_path):
+    armature, (walk, _run), _pair = make_walks()
+    actions.play(armature, walk, actions.slot_for(walk, armature))
+    bpy.ops.export_anim.bvh(filepath=str(tmp_path / "legs.bvh"), frame_start=1, frame_end=5)
+    known = {block.session_uid for block in clips._blocks()}
+    # The importer rolls bones in its own way: so they rest otherwise.
+    with pytest.raises(SinewError, match=r"legs\.bvh: \S+ rests otherwise"):
+        clips.import_actions(armature, tmp_path / "legs.bvh")
+    (tmp_path / "walk.txt").write_text("no motion")
+    (tmp_path / "bad.bvh").write_text("no motion")
+    for name, sentence in (("walk.txt", "expected a file ending"), ("none.bvh", "no such file"),
+                           ("bad.bvh", "bad.bvh: ")):  # fmt: skip
+        with pytest.raises(SinewError, match=sentence):
+            clips.import_actions(armature, tmp_path / name)
+    assert {block.session_uid for block in clips._blocks()} == known
+
+
+# --- The command
+
+
+@pytest.fixture
+def walking(tmp_path):
+    armature, _chosen, _pair = make_walks()
+    path = tmp_path / "walking.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_the_command_writes_a_copy(walking, tmp_path):
+    before, out = walking.read_bytes(), tmp_path / "blended.blend"
+    options = ["--actions", "WALK", "RUN", "--weights", 1, 1, "--align", "--cycles", 2, "--out", out]
+    result = run_sinew("blend", walking, *options)
+    assert "Blend WALK RUN: 51 frames, a cycle, carried by hips" in result.stdout
+    assert walking.read_bytes() == before
+    files.open_file(out)
+    armature = bpy.data.objects["Legs"]
+    assert armature.animation_data.action.name == "Blend WALK RUN"
+    assert {"WALK", "RUN"} < set(bpy.data.actions.keys())
+    shown = film(armature, (1, 51))
+    hips = clips.rig_of(armature).names.index("hips")
+    assert np.abs(shown[1, hips, :3, 3] - shown[0, hips, :3, 3] - (0, -1.9, 0)).max() < CLOSE
+    assert "--overwrite" in run_sinew("blend", walking, *options, status=1).stderr
+    run_sinew("blend", walking, *options, "--overwrite", "--weights-from", 1, 0, "--name", "To a Run")
+    files.open_file(out)
+    assert bpy.data.objects["Legs"].animation_data.action.name == "To a Run"
+
+
+def test_the_command_measures(walking):
+    def measured(*options):
+        command = ("blend", walking, "--actions", "WALK", "RUN", "--measure", "--json", *options)
+        return json.loads(run_sinew(*command).stdout)
+
+    found, linear, apart = (
+        measured(*options) for options in ((), ("--method", "matrix_linear"), ("--no-align",))
+    )
+    assert found["feet"] == ["foot.L", "foot.R"]
+    walk, run, blend = found["measures"]
+    assert (walk["length"], run["length"], blend["length"]) == (20.0, 30.0, 25.0)
+    assert (walk["travel"], run["travel"]) == (pytest.approx(0.04), pytest.approx(1.1 / 30, rel=1e-4))
+    assert blend["travel"] == pytest.approx(0.95 / 25, rel=1e-4)
+    assert found["shrinking"]["volume"] == 1.0 and linear["shrinking"]["volume"] < 0.99
+    assert any("shrinks to" in note for note in linear["notes"]) and not found["notes"]
+    assert apart["measures"][2]["sliding"] > 2.0 * blend["sliding"]
+
+
+def test_the_command_says_what_is_wrong(walking, tmp_path):
+    out = ["--out", tmp_path / "out.blend"]
+    both = ["--actions", "WALK", "RUN"]
+    cases = [
+        ([walking, *both], "--out NEW.blend, or --measure", 2),
+        ([walking, *both, "--out", walking, "--overwrite"], "would replace the file itself", 2),
+        ([walking, "--actions", "WALK", "JUMP", *out], "no action 'JUMP'; Legs can play: RUN, WALK", 1),
+        ([walking, "--actions", "WALK", *out], "expected two actions or more", 2),
+        ([walking, *both, "--weights", 1, *out], "expected one for each of 2 clips, got 1", 2),
+        ([walking, *both, "--method", "best", *out], "method: expected one of dlb", 2),
+        ([walking, *both, "--armature", "Arms", *out], "no armature 'Arms'; there are: Legs", 1),
+        ([walking, *both, "--root", "tail", *out], "no bone 'tail'", 1),
+        ([walking, *both, "--clips", tmp_path / "none.bvh", *out], "none.bvh: no such file", 1),
+        ([tmp_path / "none.blend", *both, *out], "no such file", 1),
+    ]
+    for arguments, sentence, status in cases:
+        result = run_sinew("blend", *arguments, status=status)
+        complaints = [line for line in result.stderr.splitlines() if line.startswith("sinew: ")]
+        assert len(complaints) == 1, result.stderr
+        assert sentence in complaints[0]
+    assert not (tmp_path / "out.blend").exists()
+
+
+def test_the_command_reads_bvh_files(tmp_path):
+    for name, clip in (("walk", walks.walk()), ("run", walks.walk("run", 30, 1.1, 0.2, start=0.3))):
+        write_bvh(tmp_path / f"{name}.bvh", clip)
+    out = tmp_path / "blended.blend"
+    result = run_sinew("blend", tmp_path / "walk.bvh", "--clips", tmp_path / "run.bvh", "--out", out)
+    assert ": 26 frames, a cycle, carried by hips" in result.stdout
+    files.open_file(out)
+    legs = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    shown = film(legs, (1, 26))
+    hips = clips.rig_of(legs).names.index("hips")
+    assert np.abs(shown[1, hips, :3, 3] - shown[0, hips, :3, 3] - (0.0, -0.95, 0.0)).max() < 1e-3
