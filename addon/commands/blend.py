@@ -58,14 +58,17 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         metavar="NAME",
         help="of the file (default, with --clips: the one that the armature plays)",
     )
-    parser.add_argument("--clips", nargs="+", default=[], type=Path, metavar="FILE", help="more, to be imported")
     parser.add_argument(
-        "--weights", nargs="+", type=float, metavar="W", help="one for each action, then for each clip "
-        "(default: equal)"
-    )  # fmt: skip
-    parser.add_argument(
-        "--weights-from", nargs="+", type=float, metavar="W", help="those of the first frame"
+        "--clips", nargs="+", default=[], type=Path, metavar="FILE", help="more, to be imported"
     )
+    parser.add_argument(
+        "--weights",
+        nargs="+",
+        type=float,
+        metavar="W",
+        help="one for each action, then for each clip (default: equal)",
+    )
+    parser.add_argument("--weights-from", nargs="+", type=float, metavar="W", help="those of the first frame")
     parser.add_argument("--method", default="dlb", help=f"one of {', '.join(METHODS)} (default: dlb)")
     parser.add_argument(
         "--space",
@@ -179,12 +182,11 @@ def _actions(args: argparse.Namespace, armature: bpy.types.Object) -> list[bpy.t
 
     from ..io import clips
 
-    there = [a.name for a in bpy.data.actions if clips.keyed_properties(armature, a)]
+    names = [a.name for a in bpy.data.actions if clips.keyed_properties(armature, a)]
+    there = f"{armature.name} can play: {', '.join(names) or 'none'}"
     missing = [name for name in args.actions if name not in bpy.data.actions]
     if missing:
-        raise SinewError(
-            f"{args.file}: has no action {missing[0]!r}; {armature.name} can play: {', '.join(there) or 'none'}"
-        )
+        raise SinewError(f"{args.file}: has no action {missing[0]!r}; {there}")
     chosen = [bpy.data.actions[name] for name in args.actions]
     animation = armature.animation_data
     if not chosen and args.clips and animation is not None and animation.action is not None:
@@ -192,10 +194,7 @@ def _actions(args: argparse.Namespace, armature: bpy.types.Object) -> list[bpy.t
     for path in args.clips:
         chosen += clips.import_actions(armature, path)
     if len(chosen) < 2:
-        raise WrongUse(
-            f"sinew blend: expected two actions or more by --actions or --clips; {armature.name} can play: "
-            f"{', '.join(there) or 'none'}"
-        )
+        raise WrongUse(f"sinew blend: expected two actions or more by --actions or --clips; {there}")
     return chosen
 
 
@@ -279,8 +278,8 @@ def _say(facts: dict[str, Any], console: Console) -> None:
             f"sliding of {', '.join(facts['feet']) or 'no feet'} and travel a frame, degrees a second squared"
         )
         console.say(
-            f"least volume {least['volume']:.3f}, of {least['bone']} in frame {least['frame'] + 1}; bones leave "
-            f"their parents by {least['apart']:.3g}"
+            f"least volume {least['volume']:.3f}, of {least['bone']} in frame {least['frame'] + 1}; bones "
+            f"leave their parents by {least['apart']:.3g}"
         )
     root = f", carried by {facts['root']}" if facts["root"] is not None else ""
     kind = "a cycle" if facts["is_cyclic"] else "no cycle"

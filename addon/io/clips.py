@@ -167,9 +167,7 @@ def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Act
     return made
 
 
-def _playing(
-    armature: bpy.types.Object, action: bpy.types.Action
-) -> list[tuple[bpy.types.FCurve, str, int]]:
+def _playing(armature: bpy.types.Object, action: bpy.types.Action) -> list[tuple[bpy.types.FCurve, str, int]]:
     """The curves that move the armature's bones, with the bone and the column of its channels."""
     rotations = pose_io.rotation_properties(armature.pose.bones)
     found = actions.unmuted_curves(action, actions.slot_for(action, armature))

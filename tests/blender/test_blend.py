@@ -21,7 +21,7 @@ from sinew_addon.features.blend import blend_actions
 from sinew_addon.io import actions, clips, files
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
-import walks  # noqa: E402 - it is found there
+import walks
 
 CLOSE = 2e-5
 MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
@@ -109,7 +109,8 @@ def test_a_clip_is_what_blender_plays(modes):
     armature, (walk, run), pair = make_walks(modes)
     for action, source in ((walk, pair[0]), (run, pair[1])):
         clip = finished(clips.read(armature, action))
-        assert clip.length == source.length and not clip.is_cyclic
+        assert clip.length == source.length
+        assert not clip.is_cyclic
         shown = played(armature, action, range(1, 2 + round(clip.length)))
         posed = quat_vec.to_affine(clip.rig.to_armature(clip.poses.rigid))
         assert np.abs(posed - shown).max() < CLOSE
@@ -161,7 +162,9 @@ def test_a_manual_range_is_the_clip_and_says_that_it_is_a_cycle():
     armature, (walk, _run), _pair = make_walks()
     walk.use_frame_range, walk.frame_start, walk.frame_end = True, 3, 11
     clip = finished(clips.read(armature, walk))
-    assert clip.length == 8.0 and len(clip.poses.rigid) == 9 and not clip.is_cyclic
+    assert clip.length == 8.0
+    assert len(clip.poses.rigid) == 9
+    assert not clip.is_cyclic
     walk.use_cyclic = True
     assert finished(clips.read(armature, walk)).is_cyclic
 
@@ -193,7 +196,8 @@ def test_blender_plays_the_blend(method):
             assert np.abs(shown - wanted).max() < 5 * CLOSE
             continue
         volume = np.linalg.det(shown[..., :3, :3])
-        assert volume.min() < 0.999 and np.abs(volume[0, 0] - blend.volume[0, 0]) < CLOSE
+        assert volume.min() < 0.999
+        assert np.abs(volume[0, 0] - blend.volume[0, 0]) < CLOSE
         if space == core.ARMATURE:
             assert np.abs(volume - blend.volume[:, order]).max() < 5e-5
 
@@ -209,7 +213,7 @@ def test_the_root_travels_at_the_blended_speed():
 
 
 def test_an_armature_turned_in_the_world_travels_over_the_worlds_ground():
-    armature, chosen, _pair = make_walks()
+    armature, _chosen, _pair = make_walks()
     armature.rotation_euler.x = 0.4
     bpy.context.view_layer.update()
     assert np.abs(clips.up_of(armature) - (0.0, np.sin(0.4), np.cos(0.4))).max() < 1e-6
@@ -224,7 +228,8 @@ def test_the_actions_and_all_else_stay_as_they_were():
         blend.clips.add().action = action
     assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
     made = armature.animation_data.action
-    assert made.name == "Blend WALK RUN" and made not in chosen
+    assert made.name == "Blend WALK RUN"
+    assert made not in chosen
     assert [[(c.data_path, [tuple(p.co) for p in c.keyframe_points]) for c in
              actions.all_curves(a, actions.slot_for(a, armature))] for a in chosen] == keys  # fmt: skip
     assert len(bpy.data.actions) == 3
@@ -256,7 +261,7 @@ def test_the_operator_blends_and_undo_takes_it_back():
 
 
 def test_weights_change_from_first_to_last():
-    armature, chosen, pair = make_walks()
+    armature, chosen, _pair = make_walks()
     for action, start, end in zip(chosen, (1.0, 0.0), (0.0, 1.0), strict=True):
         clip = armature.sinew_blend.clips.add()
         clip.action, clip.weight_from, clip.weight = action, start, end
@@ -273,7 +278,8 @@ def test_stopped_nothing_has_changed(steps):
     before = set(bpy.data.actions.keys())
     running = blend_actions.make(armature, chosen, (1, 1), Settings())
     shares = [next(running) for _step in range(steps)]
-    assert shares == sorted(shares) and 0.0 < shares[-1] < 1.0
+    assert shares == sorted(shares)
+    assert 0.0 < shares[-1] < 1.0
     running.close()
     assert set(bpy.data.actions.keys()) == before
     assert armature.animation_data.action == chosen[0]
@@ -358,14 +364,16 @@ def test_a_bvh_file_becomes_an_action(tmp_path):
     known = {block.session_uid for block in clips._blocks()}
     (run,) = clips.import_actions(legs, tmp_path / "run.bvh")
     assert {block.session_uid for block in clips._blocks()} - known == {run.session_uid}
-    assert run.name == "run" and run.use_fake_user
+    assert run.name == "run"
+    assert run.use_fake_user
     walk = legs.animation_data.action
     for action, source in ((walk, pair[0]), (run, pair[1])):
         shown = played(legs, action, range(1, 2 + round(source.length)))
         order = [source.rig.names.index(name) for name in clips.rig_of(legs).names]
         assert np.abs(shown[..., :3, 3] - heads_of(source)[:, order]).max() < 1e-4
     made = finished(blend_actions.make(legs, [walk, run], (1, 1), Settings()))
-    assert made.blend.is_cyclic and made.frames == 26
+    assert made.blend.is_cyclic
+    assert made.frames == 26
     wanted = core.blend(pair, (1, 1)).clip("blend")
     order = [wanted.rig.names.index(name) for name in made.blend.rig.names]
     # Bones are rolled otherwise there: what they do is the same.
@@ -410,7 +418,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path):
 
 @pytest.fixture
 def walking(tmp_path):
-    armature, _chosen, _pair = make_walks()
+    _armature, _chosen, _pair = make_walks()
     path = tmp_path / "walking.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
@@ -448,8 +456,10 @@ def test_the_command_measures(walking):
     assert (walk["length"], run["length"], blend["length"]) == (20.0, 30.0, 25.0)
     assert (walk["travel"], run["travel"]) == (pytest.approx(0.04), pytest.approx(1.1 / 30, rel=1e-4))
     assert blend["travel"] == pytest.approx(0.95 / 25, rel=1e-4)
-    assert found["shrinking"]["volume"] == 1.0 and linear["shrinking"]["volume"] < 0.99
-    assert any("shrinks to" in note for note in linear["notes"]) and not found["notes"]
+    assert found["shrinking"]["volume"] == 1.0
+    assert linear["shrinking"]["volume"] < 0.99
+    assert any("shrinks to" in note for note in linear["notes"])
+    assert not found["notes"]
     assert apart["measures"][2]["sliding"] > 2.0 * blend["sliding"]
 
 

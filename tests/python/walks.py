@@ -16,14 +16,18 @@ from sinew_addon.core.motion.clip import Clip, Rig
 THIGH = SHIN = 0.45
 ANKLE, WIDE = 0.08, 0.1
 LEG = ANKLE + SHIN + THIGH
-# How high the hips are carried.
+# Of a cycle, how long a foot is on the ground; how high the hips are carried.
+DUTY = 0.6
 HIP = 0.88
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def rig() -> Rig:
     """Hips, a spine, and thigh, shin and foot of each side."""
-    heads = {"hips": ((0, 0, LEG), (0, 0, LEG + 0.2), None), "spine": ((0, 0, LEG + 0.2), (0, 0, 1.5), "hips")}
+    heads = {
+        "hips": ((0, 0, LEG), (0, 0, LEG + 0.2), None),
+        "spine": ((0, 0, LEG + 0.2), (0, 0, 1.5), "hips"),
+    }
     for side, x in (("L", WIDE), ("R", -WIDE)):
         knee, ankle = ANKLE + SHIN, ANKLE
         heads[f"thigh.{side}"] = ((x, 0, LEG), (x, 0, knee), "hips")
@@ -47,22 +51,22 @@ def rig() -> Rig:
     return Rig(names, parents, rest, np.array(lengths), connected)
 
 
-def foot(phase: np.ndarray, stride: float, duty: float, lift: float) -> tuple[np.ndarray, np.ndarray]:
-    """How far a foot is ahead of the hips and above the ground: on it for `duty` of a cycle, which it begins
+def foot(phase: np.ndarray, stride: float, lift: float) -> tuple[np.ndarray, np.ndarray]:
+    """How far a foot is ahead of the hips and above the ground: on it for DUTY of a cycle, which it begins
     in front."""
     phase = np.mod(phase, 1.0)
-    reach = 0.5 * duty * stride
+    reach = 0.5 * DUTY * stride
     on_ground = reach - stride * phase
-    u = np.clip((phase - duty) / (1.0 - duty), 0.0, 1.0)
+    u = np.clip((phase - DUTY) / (1.0 - DUTY), 0.0, 1.0)
     # Hermite: it leaves the ground and meets it at the ground's pace.
-    pace = -stride * (1.0 - duty)
+    pace = -stride * (1.0 - DUTY)
     swing = (
         -reach * (2 * u**3 - 3 * u**2 + 1)
         + pace * (u**3 - 2 * u**2 + u)
         + reach * (3 * u**2 - 2 * u**3)
         + pace * (u**3 - u**2)
     )
-    swings = phase > duty
+    swings = phase > DUTY
     return np.where(swings, swing, on_ground), np.where(swings, lift * np.sin(np.pi * u) ** 2, 0.0)
 
 
@@ -75,9 +79,7 @@ def walk(
     period: int = 20,
     stride: float = 0.8,
     lift: float = 0.1,
-    duty: float = 0.6,
     start: float = 0.0,
-    travels: bool = True,
     sway: float = 0.3,
     turn: float = 0.0,
     phases: np.ndarray | None = None,
@@ -93,7 +95,7 @@ def walk(
 
     rotate("spine", sway * np.sin(2 * np.pi * phases), (0.0, 1.0, 0.0))
     for side, ahead in (("L", 0.0), ("R", 0.5)):
-        front, height = foot(phases + ahead, stride, duty, lift)
+        front, height = foot(phases + ahead, stride, lift)
         down = HIP - (ANKLE + height)
         reach = np.hypot(front, down)
         assert reach.max() < THIGH + SHIN, "the leg is too short for this stride"
@@ -104,7 +106,7 @@ def walk(
         rotate(f"foot.{side}", -(thigh + knee))
     # The hips stand lower than with straight legs, and go ahead; turning, about a centre beside them.
     hips = own.rest[0]
-    done = (phases - phases[0]) if travels else np.zeros(len(phases))
+    done = phases - phases[0]
     lower = quat_vec.from_translation(np.array([0.0, 0.0, HIP - LEG]))
     if turn:
         centre = np.array([-stride / turn, 0.0, 0.0])
@@ -123,7 +125,10 @@ def random_clip(rng: np.random.Generator, name: str, frames: int = 12, most: flo
     bones = len(own.names)
     twists = 0.4 * most * rng.normal(size=(bones, 6)) * np.sin(2 * time + rng.uniform(0, 6, (bones, 6)))
     rigid = np.concatenate(
-        [quat_vec.from_twist(np.pad(twists[..., :3], ((0, 0), (0, 0), (0, 3))))[..., :4], 0.2 * twists[..., 3:]],
+        [
+            quat_vec.from_twist(np.pad(twists[..., :3], ((0, 0), (0, 0), (0, 3))))[..., :4],
+            0.2 * twists[..., 3:],
+        ],
         axis=-1,
     )
     scale = 1.0 + 0.3 * rng.uniform(-1, 1, (frames + 1, bones, 3))

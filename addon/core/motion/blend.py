@@ -99,9 +99,9 @@ class Blend:
 def blend(
     clips: Sequence[Clip],
     weights: Sequence[float],
-    settings: Settings = Settings(),
+    settings: Settings | None = None,
     weights_from: Sequence[float] | None = None,
-    up: np.ndarray = np.array([0.0, 0.0, 1.0]),
+    up: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Blend:
     """The clips blended by `weights`, brought to sum 1; from `weights_from` at the first frame, if given.
 
@@ -112,13 +112,14 @@ def blend(
     up  [3], the vertical in armature space, of length 1
     Raises SinewError for other settings, weights or bones than can be.
     """
+    settings = Settings() if settings is None else settings
     rig = common_rig(clips)
     last = timing.checked_weights(weights, len(clips))
     first = last if weights_from is None else timing.checked_weights(weights_from, len(clips))
     _check(settings)
     reference = int(np.argmax(first))
     root = rig.index(settings.root) if settings.root is not None else main_root(rig, list(clips))
-    travels = _in_place(clips, root, up, settings)
+    travels = _in_place(clips, root, np.asarray(up), settings)
     placed = [travel.clip for travel in travels]
     warps = _warps(placed, reference, rig, root, settings)
     cycles = settings.cycles if all(clip.is_cyclic for clip in placed) or not settings.align else 1

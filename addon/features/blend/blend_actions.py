@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import bpy
 
@@ -13,6 +14,8 @@ from ...core.motion import blend as core
 from ...core.motion import measure
 from ...core.motion.clip import Clip
 from ...io import actions, clips
+
+Result = TypeVar("Result")
 
 # Of the whole: reading curves takes as long as writing keys.
 READING = 0.5
@@ -88,7 +91,9 @@ def play(armature: bpy.types.Object, action: bpy.types.Action) -> None:
     actions.play(armature, action, actions.slot_for(action, armature))
 
 
-def _part(steps: Generator[float, None, object], start: float, share: float) -> Generator[float, None, object]:
+def _part(
+    steps: Generator[float, None, Result], start: float, share: float
+) -> Generator[float, None, Result]:
     """A generator as a part of another: what it yields, in the place of the whole; what it returns."""
     while True:
         try:
