@@ -59,6 +59,7 @@ def aligned(
     in each: so a blend is as long as the weighted mean of its clips, to whole frames, and one of a single
     clip plays that as it is. Weights go from `first` to `last` in step with the motion."""
     lengths = lengths_of(clips)
+    _whole(cycles * float(np.minimum(first @ lengths, last @ lengths)))
     phases = np.linspace(0.0, cycles, STEPS * cycles + 1)
     own = np.column_stack([warp.at(phases) * length for warp, length in zip(warps, lengths, strict=True)])
     weights = _weights(phases / cycles, first, last)

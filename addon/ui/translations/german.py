@@ -628,6 +628,127 @@ TEXTS = {
         "oder wähle eine Methode, die auf Splines weich ist"
     ),
     "{count} bones into {action}": "{count} Knochen in {action}",
+    # Blends of actions
+    "Action": "Aktion",
+    "An action that moves bones of this armature": "Eine Aktion, die Knochen dieses Skeletts bewegt",
+    "Weight": "Gewicht",
+    "How much of the action is in the blend; weights are brought to sum 1": (
+        "Wie viel von der Aktion in der Mischung ist; Gewichte werden auf die Summe 1 gebracht"
+    ),
+    "At First": "Anfangs",
+    "How much of the action is in the first frame, from where it goes to its weight": (
+        "Wie viel von der Aktion im ersten Einzelbild ist; von da geht es zu ihrem Gewicht"
+    ),
+    "The actions to blend": "Die Aktionen, die gemischt werden",
+    "How poses of a bone are blended": "Wie Posen eines Knochens gemischt werden",
+    "Dual Quaternions (recommended)": "Duale Quaternionen (empfohlen)",
+    "Normalised sum: rigid, nearly a screw. DLB": "Normierte Summe: starr, fast eine Schraubung. DLB",
+    "Screw": "Schraubung",
+    "The screw between two, at an even pace; of more as DIB. ScLERP": (
+        "Die Schraubung zwischen zweien, gleichmäßig; von mehreren wie DIB. ScLERP"
+    ),
+    "Screw of Many": "Schraubung von vielen",
+    "Dual quaternions blended iteratively, evenly. DIB": (
+        "Duale Quaternionen, iterativ und gleichmäßig gemischt. DIB"
+    ),
+    "Quaternion and Vector": "Quaternion und Vektor",
+    "Normalised sum of rotations, mean location: rigid": (
+        "Normierte Summe der Drehungen, mittlere Position: starr"
+    ),
+    "Quaternion and Vector, Even": "Quaternion und Vektor, gleichmäßig",
+    "Mean rotation on the sphere, mean location": "Mittlere Drehung auf der Kugel, mittlere Position",
+    "Matrix Made Rigid": "Matrix, starr gemacht",
+    "Mean matrix, brought back to the nearest rotation": (
+        "Mittlere Matrix, zurückgeführt auf die nächste Drehung"
+    ),
+    "Mean of logarithms: rigid, dependent on the rest pose": (
+        "Mittel der Logarithmen: starr, abhängig von der Ruhepose"
+    ),
+    "Linear Matrix": "Matrix, linear",
+    "Mean matrix: bones shrink where clips differ": (
+        "Mittlere Matrix: Knochen schrumpfen, wo Aktionen sich unterscheiden"
+    ),
+    "Space": "Raum",
+    "Relative to what bones are blended": "Relativ wozu Knochen gemischt werden",
+    "Parents": "Eltern",
+    "Each bone relative to its parent: chains stay whole": (
+        "Jeder Knochen relativ zu seinem Elternknochen: Ketten bleiben ganz"
+    ),
+    "Each bone by itself: it keeps its direction, and bones that are not connected leave their "
+    "parents": (
+        "Jeder Knochen für sich: Er behält seine Richtung, und nicht verbundene Knochen lösen "
+        "sich von ihren Eltern"
+    ),
+    "Align": "Angleichen",
+    "Bring the actions to the same moment of their motion, and cycles to a common length; else "
+    "each plays from its first frame": (
+        "Bringt die Aktionen zum selben Moment ihrer Bewegung und Zyklen auf eine gemeinsame "
+        "Länge; sonst spielt jede von ihrem ersten Einzelbild an"
+    ),
+    "Aligned by": "Angeglichen nach",
+    "The bone that says which moment it is, such as a foot; empty: all bones": (
+        "Der Knochen, der sagt, welcher Moment es ist, etwa ein Fuß; leer: alle Knochen"
+    ),
+    "Change Weights": "Gewichte ändern",
+    "Let the weights change from the first frame of the blend to its last": (
+        "Lässt die Gewichte sich vom ersten bis zum letzten Einzelbild der Mischung ändern"
+    ),
+    "Cycles": "Zyklen",
+    "How often actions that repeat go round in the blend": (
+        "Wie oft Aktionen, die sich wiederholen, in der Mischung durchlaufen"
+    ),
+    "Root Motion": "Wurzelbewegung",
+    "What becomes of the way that the root goes over the ground": (
+        "Was aus dem Weg wird, den die Wurzel über den Boden geht"
+    ),
+    "Blended": "Gemischt",
+    "Steps of the root are blended and added up: speeds and turns blend": (
+        "Schritte der Wurzel werden gemischt und aufsummiert: Tempo und Wendungen mischen sich"
+    ),
+    "In Place": "Auf der Stelle",
+    "The way over the ground is taken out": "Der Weg über den Boden wird herausgenommen",
+    "As Keyed": "Wie gesetzt",
+    "The root is blended as any other bone": "Die Wurzel wird wie jeder andere Knochen gemischt",
+    "Root": "Wurzel",
+    "The bone that carries the others; empty: the uppermost that moves": (
+        "Der Knochen, der die anderen trägt; leer: der oberste, der sich bewegt"
+    ),
+    "Add Action": "Aktion hinzufügen",
+    "Add an action to the blend: the one that plays, or the next that moves these bones": (
+        "Fügt der Mischung eine Aktion hinzu: die abgespielte oder die nächste, die diese "
+        "Knochen bewegt"
+    ),
+    "Remove Action": "Aktion entfernen",
+    "Take the action out of the blend; the action itself stays in the file": (
+        "Nimmt die Aktion aus der Mischung; die Aktion selbst bleibt in der Datei"
+    ),
+    "Add Clip from File": "Clip aus Datei hinzufügen",
+    "Make actions of the animations in a BVH, glTF or FBX file whose bones have the same names "
+    "and rest, and add them to the blend": (
+        "Macht Aktionen aus den Animationen einer BVH-, glTF- oder FBX-Datei, deren Knochen "
+        "gleich heißen und gleich ruhen, und fügt sie der Mischung hinzu"
+    ),
+    "Blend Actions": "Aktionen mischen",
+    "Blend the actions into a new one of plain keys, which the armature plays; the actions "
+    "themselves stay as they are": (
+        "Mischt die Aktionen zu einer neuen aus gewöhnlichen Schlüsselbildern, die das Skelett "
+        "abspielt; die Aktionen selbst bleiben, wie sie sind"
+    ),
+    "Sinew blends actions": "Sinew mischt Aktionen",
+    "{count} frame": "{count} Einzelbild",
+    "{count} frames": "{count} Einzelbilder",
+    "Made {name}: {frames}": "{name} erstellt: {frames}",
+    "{name} is linked: make a library override of it first": (
+        "{name} ist verknüpft: Erstelle zuerst eine Bibliotheksüberschreibung"
+    ),
+    "Added {names}": "{names} hinzugefügt",
+    "Add actions of this armature, such as a walk and a run": (
+        "Füge Aktionen dieses Skeletts hinzu, etwa Gehen und Laufen"
+    ),
+    "Select an armature, or a mesh that it deforms": "Wähle ein Skelett oder eine Masche, die es verformt",
+    "Add two actions or more in the panel Blend Actions": (
+        "Füge im Panel Aktionen mischen zwei oder mehr Aktionen hinzu"
+    ),
     # Corrective shape keys
     "Corrective Shape Key": "Korrigierender Formschlüssel",
     "Corrective Shape Key Driven by the Bone": "Korrigierender Formschlüssel, vom Knochen getrieben",
