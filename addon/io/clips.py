@@ -155,13 +155,13 @@ def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Act
         if not sources:
             raise SinewError(f"{path}: has no animation of an armature")
         for source, action in sources:
-            clip = _on_rig(_finished(read(source, action)), rig, path)
+            clip = _on_rig(finished(read(source, action)), rig, path)
             # Without what Blender added where an action of this name was there.
             own = re.sub(r"\.\d{3}$", "", action.name)
             name = path.stem if len(sources) == 1 else f"{path.stem} {own}"
             keyed = {each for each in keyed_properties(source, action) if each[0] in rig.names}
             found.append((clip, name, keyed))
-    made = [_finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]
+    made = [finished(write(armature, clip, name, 1.0, keyed)) for clip, name, keyed in found]
     for action in made:
         action.use_fake_user = True
     return made
@@ -251,7 +251,7 @@ def _actions_of(obj: bpy.types.Object) -> list[bpy.types.Action]:
     return [action for action in dict.fromkeys(found) if _playing(obj, action)]
 
 
-def _finished(steps: Generator[float, None, Result]) -> Result:
+def finished(steps: Generator[float, None, Result]) -> Result:
     """What a generator of this file returns."""
     while True:
         try:

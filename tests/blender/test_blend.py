@@ -19,16 +19,13 @@ from sinew_addon.core.motion import blend as core
 from sinew_addon.core.motion.blend import Settings
 from sinew_addon.features.blend import blend_actions
 from sinew_addon.io import actions, clips, files
+from sinew_addon.io.clips import finished
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 import walks
 
 CLOSE = 2e-5
 MODES = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
-
-
-def finished(steps):
-    return clips._finished(steps)
 
 
 def make_legs(modes=("QUATERNION",), name="Legs"):
