@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two clips blended pose by pose, and at once: beside scipy, numpy and Blender's mathutils. With bpy."""
+"""Two clips blended pose by pose, and at once: beside scipy, numpy and Blender's mathutils. With bpy.
+
+Times are the processor's: all run on one thread, and longer runs share it with other programs.
+"""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+import time
 from pathlib import Path
 
 import bpy
@@ -13,7 +17,7 @@ import common
 import numpy as np
 import sinew
 import sinew_addon
-from mathutils import Quaternion, Vector
+from mathutils import Matrix, Quaternion, Vector
 from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 from sinew import interpolate, quat_vec
 
@@ -106,7 +110,7 @@ def times(seconds: float) -> dict:
         "mathutils/slerp, a loop": lambda: mathutils_loop(*of_mathutils),
         "scipy/slerp, a loop": lambda: scipy_loop(*of_scipy),
     }
-    return common.alternate(candidates, seconds)
+    return common.alternate(candidates, seconds, time.thread_time)
 
 
 def _same(a: np.ndarray, b: np.ndarray, close: float = 1e-9) -> None:
@@ -143,6 +147,7 @@ def whole(seconds: float) -> dict:
             "read, blend and write": make,
         },
         seconds,
+        time.thread_time,
     )
 
 
@@ -156,11 +161,13 @@ def _in_blender(pair: tuple) -> tuple:
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     rig = pair[0].rig
-    for name, parent in zip(rig.names, rig.parents, strict=True):
+    rest = quat_vec.to_affine(rig.to_armature(np.tile(quat_vec.identity(), (len(rig.names), 1))))
+    for row, name in enumerate(rig.names):
         bone = armature.data.edit_bones.new(name)
-        bone.head, bone.tail = (0, 0, 0), (0, 0.45, 0)
-        if parent >= 0:
-            bone.parent = armature.data.edit_bones[rig.names[parent]]
+        bone.head, bone.tail = (0, 0, 0), (0, rig.lengths[row], 0)
+        bone.matrix, bone.length = Matrix(rest[row].tolist()), rig.lengths[row]
+        if rig.parents[row] >= 0:
+            bone.parent = armature.data.edit_bones[rig.names[rig.parents[row]]]
     bpy.ops.object.mode_set(mode="OBJECT")
     return armature, [clips.finished(clips.write(armature, clip, clip.name, 1.0, set())) for clip in pair]
 

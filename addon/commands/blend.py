@@ -101,7 +101,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--feet", nargs="+", metavar="BONE", help="of --measure (default: those that come to the ground)"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--out", metavar="NEW.blend", help="the copy; may be left out with --measure")
+    parser.add_argument(
+        "--out", type=_file, metavar="NEW.blend", help="the copy; may be left out with --measure"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace NEW.blend where it exists already")
     return parser
 
@@ -145,12 +147,16 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
+def _file(text: str) -> Path:
+    return file_to_write(text, (".blend",))
+
+
 def _target(args: argparse.Namespace) -> Path | None:
-    if args.out is None:
+    out: Path | None = args.out
+    if out is None:
         if not args.measure:
             raise WrongUse("sinew blend: expected --out NEW.blend, or --measure for numbers alone")
         return None
-    out = file_to_write(args.out, (".blend",))
     if out.resolve() == args.file.resolve():
         raise WrongUse(f"{out}: would replace the file itself; choose another name")
     if out.exists() and not args.overwrite:

@@ -35,6 +35,7 @@ WRITERS = {
     "reskin": (("reskin", "FILE", "--method", "dq", "--frames", "none", "--out", OUT), "out"),
     "restore": (("restore", "RESKINNED", "--out", OUT), "out"),
     "inbetween": (("inbetween", "FILE", "--method", "sclerp", "--out", OUT), "out"),
+    "blend": (("blend", "FILE", "--actions", "Bend", "Bend", "--out", OUT), "blended.blend"),
     **{
         f"bake {kind}": (
             ("bake", "FILE", "--method", "dq", "--to", kind, "--frames", "1-3", "--out", OUT),
@@ -60,7 +61,8 @@ def inputs(tmp_path_factory):
     """An arm with an action of bones, and the same re-skinned."""
     folder = tmp_path_factory.mktemp("inputs")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scenes.make_arm()
+    _obj, armature = scenes.make_arm()
+    armature.animation_data.action.name = "Bend"
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "arm.blend"))
     run_sinew(
         "reskin", folder / "arm.blend", "--method", "dq", "--frames", "none", "--out", folder / "skinned"
@@ -235,6 +237,7 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
         ("report", "--blend-files", "FILE/x", "--out", "OUT"),
         ("bake", "FILE/x.blend", "--method", "dq", "--to", "mdd", "--out", "OUT"),
         ("inbetween", "FILE/x", "--method", "dlb", "--out", "OUT"),
+        ("blend", "FILE/x", "--actions", "A", "B", "--out", "OUT.blend"),
         ("info", "LONG"),
         ("reskin", "LONG", "--method", "dq", "--out", "OUT"),
         ("points", "FILE", "--method", "dq", "--frames", "1", "--out", "LONG.npz"),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shlex
@@ -195,6 +196,8 @@ def studio(tmp_path_factory):
         (folder / name).write_text("0,0,0\n1,0,0\n0,2,0\n0,0,3\n", encoding="utf-8")
     for name in ("hand.csv", "camera.csv", "seen.csv"):
         (folder / name).write_text("1,0,0,0,1,2,3\n0.8,0.6,0,0,1,2,4\n0.8,0,0.6,0,2,2,3\n", encoding="utf-8")
+    for name, count in (("walk.bvh", 5), ("run.bvh", 7)):
+        (folder / name).write_text(swing(count), encoding="utf-8")
     batch = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
     job = re.search(r"```toml\n(.*?)```", batch, re.DOTALL)[1]
     # The rig has one mesh, which the example's lists of names do not know.
@@ -202,6 +205,18 @@ def studio(tmp_path_factory):
         re.sub(r"^include = .*\n", "", job, flags=re.MULTILINE), encoding="utf-8"
     )
     return folder
+
+
+def swing(count: int) -> str:
+    """A motion capture file of a bone on another that goes ahead, which swings once."""
+    site = "End Site { OFFSET 0 1 0 }"
+    leg = f"JOINT leg {{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation {site} }}"
+    places = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+    rows = [f"0 0 {0.1 * i} 0 0 0 0 {30 * math.sin(2 * math.pi * i / (count - 1))} 0" for i in range(count)]
+    text = f"HIERARCHY ROOT hips {{ OFFSET 0 0 0 {places} {leg} }}".replace("{", "\n{\n").replace("}", "\n}\n")
+    for word in ("CHANNELS", "JOINT", "End"):
+        text = text.replace(f" {word}", f"\n{word}")
+    return "\n".join([text, "MOTION", f"Frames: {count}", "Frame Time: 0.0416667", *rows, ""])
 
 
 def run(line: str, folder: Path) -> str:

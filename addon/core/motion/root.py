@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from sinew import quat, quat_vec
+from sinew import quat_vec
 
 from ..inbetween import Poses
 from .clip import Clip, Rig, closes
@@ -63,9 +63,9 @@ def ground_frames(rig: Rig, root: int, posed: np.ndarray, up: np.ndarray) -> np.
     # horizontal axis has none.
     about = np.column_stack([turned[:, 0], turned[:, 1:] @ up])
     about = np.where(np.hypot(*about.T)[:, None] > 1e-9, about, (1.0, 0.0))
-    heading = quat.normalized(np.column_stack([about[:, 0], about[:, 1:] * up]))
     place = posed[:, root, 4:]
-    return np.column_stack([heading, place - (place @ up)[:, None] * up])
+    flat = place - (place @ up)[:, None] * up
+    return quat_vec.normalized(np.column_stack([about[:, 0], about[:, 1:] * up, flat]))
 
 
 def grounded(clip: Clip, root: int, up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
@@ -79,7 +79,7 @@ def grounded(clip: Clip, root: int, up: np.ndarray, is_cyclic: bool | None = Non
     screws = quat_vec.from_twist(shares[:, None] * twist)
     # The middle of what the root sways about the screw: no matter at which step the cycle begins.
     around = quat_vec.compose(quat_vec.inverse(screws), frames)[: max(len(frames) - 1, 1)]
-    middle = _mean_ground(around, up)
+    middle = _mean_ground(around)
     cycle = _carried(rig, root, posed, quat_vec.inverse(quat_vec.compose(screws, middle)))
     if is_cyclic is None:
         is_cyclic = closes(rig, cycle[0], cycle[-1])
@@ -122,7 +122,8 @@ def _carried(
     return relative
 
 
-def _mean_ground(frames: np.ndarray, up: np.ndarray) -> np.ndarray:
+def _mean_ground(frames: np.ndarray) -> np.ndarray:
     signs = np.where(frames[:, :4] @ frames[0, :4] < 0.0, -1.0, 1.0)[:, None]
-    heading = quat.normalized((signs * frames[:, :4]).sum(axis=0))
-    return np.concatenate([heading, frames[:, 4:].mean(axis=0)])
+    return quat_vec.normalized(
+        np.concatenate([(signs * frames[:, :4]).sum(axis=0), frames[:, 4:].mean(axis=0)])
+    )
