@@ -8,6 +8,7 @@ import json
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +103,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument(
-        "--out", type=_file, metavar="NEW.blend", help="the copy; may be left out with --measure"
+        "--out",
+        type=partial(file_to_write, endings=(".blend",)),
+        metavar="NEW.blend",
+        help="the copy; may be left out with --measure",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace NEW.blend where it exists already")
     return parser
@@ -145,10 +149,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
     else:
         _say(facts, console)
     return 0
-
-
-def _file(text: str) -> Path:
-    return file_to_write(text, (".blend",))
 
 
 def _target(args: argparse.Namespace) -> Path | None:

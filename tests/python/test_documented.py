@@ -213,9 +213,10 @@ def swing(count: int) -> str:
     leg = f"JOINT leg {{ OFFSET 0 1 0 CHANNELS 3 Zrotation Xrotation Yrotation {site} }}"
     places = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     rows = [f"0 0 {0.1 * i} 0 0 0 0 {30 * math.sin(2 * math.pi * i / (count - 1))} 0" for i in range(count)]
-    text = f"HIERARCHY ROOT hips {{ OFFSET 0 0 0 {places} {leg} }}".replace("{", "\n{\n").replace("}", "\n}\n")
-    for word in ("CHANNELS", "JOINT", "End"):
+    text = f"HIERARCHY ROOT hips {{ OFFSET 0 0 0 {places} {leg} }}"
+    for word in ("CHANNELS", "JOINT", "End", "{", "}"):
         text = text.replace(f" {word}", f"\n{word}")
+    text = text.replace("{ ", "{\n")
     return "\n".join([text, "MOTION", f"Frames: {count}", "Frame Time: 0.0416667", *rows, ""])
 
 
