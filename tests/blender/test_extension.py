@@ -298,6 +298,17 @@ def test_the_panel_in_a_window(photographed):
     assert facts["moved in between"] > 1e-3 * facts["diagonal"]
 
 
+def test_blending_actions_in_a_window(photographed):
+    """In steps, the window drawing in between: Esc leaves all as it was, and Ctrl+Z undoes a blend."""
+    options = ["--enable-event-simulate"]
+    facts = photographed("docs/photograph_blend.py", "motion-panel.png", options=options)
+    assert facts["listed"] == ["STRAIN", "LATE"]
+    before, after = facts["stopped"]
+    assert before == after == facts["undone"]
+    assert facts["ended"]["plays"] == "Blend STRAIN LATE"
+    assert facts["ended"]["frame"] == before["frame"]
+
+
 def test_a_comparison_in_a_window(photographed):
     """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
     facts = photographed("docs/photograph_comparison.py", "comparison.png")

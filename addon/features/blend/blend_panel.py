@@ -158,7 +158,7 @@ class SINEW_PT_blend(Sidebar, bpy.types.Panel):
             column = layout.column(align=True)
             row = column.row(align=True)
             row.prop(clip, "action", text="")
-            row.operator("sinew.blend_remove_clip", text="", icon="X").index = index
+            row.operator("sinew.blend_remove_clip", text="", icon="REMOVE").index = index
             row = column.row(align=True)
             if blend.changes:
                 row.prop(clip, "weight_from", slider=True)

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Photographs the panel Blend Actions in the window of a real Blender, on human.blend. Esc stops a long
+blend, the next goes to its end, and Ctrl+Z undoes it: it takes --enable-event-simulate.
+
+    blender --factory-startup OPTION human.blend --python docs/photograph_blend.py -- sinew.zip panel.png
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import window
+
+ZIP, PICTURE = window.arguments()
+TICK, PATIENCE = 0.1, 60.0
+# Long enough to be stopped.
+LONG = 20_000
+
+
+def open_panel() -> None:
+    """Has it open, and the others closed, when they are first drawn."""
+    names = [name for name in dir(bpy.types) if name.startswith("SINEW_PT_")]
+    panels = sorted((getattr(bpy.types, name) for name in names), key=lambda p: hasattr(p, "bl_parent_id"))
+    for panel in reversed(panels):
+        bpy.utils.unregister_class(panel)
+    panels.sort(key=lambda panel: panel.__name__ != "SINEW_PT_blend")
+    panels.sort(key=lambda panel: hasattr(panel, "bl_parent_id"))
+    for panel in panels:
+        panel.bl_options = set() if panel.__name__ == "SINEW_PT_blend" else {"DEFAULT_CLOSED"}
+        bpy.utils.register_class(panel)
+
+
+def is_blending() -> bool:
+    running = bpy.context.window_manager.windows[0].modal_operators
+    return any(operator.bl_idname == "SINEW_OT_blend_actions" for operator in running)
+
+
+def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
+    for _tick in range(round(PATIENCE / TICK)):
+        if wanted():
+            return
+        yield
+    raise AssertionError(f"{what} did not come")
+
+
+def state() -> dict[str, object]:
+    animation = rig().animation_data
+    return {
+        "actions": sorted(bpy.data.actions.keys()),
+        "plays": animation.action.name if animation.action is not None else None,
+        "frame": bpy.context.scene.frame_current,
+    }
+
+
+def rig() -> bpy.types.Object:
+    return next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+
+
+def blend_by_button() -> None:
+    with window.in_view3d():
+        bpy.ops.sinew.blend_actions("INVOKE_DEFAULT")
+
+
+def steps() -> Iterator[None]:
+    facts = {}
+    window.install(ZIP)
+    armature = rig()
+    window.select_only(armature)
+    open_panel()
+    strain = armature.animation_data.action
+    strain.name = "STRAIN"
+    other = strain.copy()
+    other.name = "LATE"
+    other.use_frame_range, other.frame_start, other.frame_end = True, 9, 40
+    window.open_sidebar()
+    yield
+    yield
+    window.choose_tab()
+    with window.in_view3d():
+        bpy.ops.sinew.blend_add_clip()
+        bpy.ops.sinew.blend_add_clip()
+    blend = armature.sinew_blend
+    facts["listed"] = [clip.action.name for clip in blend.clips]
+    blend.clips[1].weight = 0.5
+    bpy.context.scene.frame_set(16)
+    with window.in_view3d("WINDOW"):
+        view = bpy.context.space_data.region_3d
+        view.view_location, view.view_distance = (0.35, 0.0, 0.1), 2.6
+    for _tick in range(10):
+        yield
+    window.photograph(PICTURE)
+    yield
+    other.frame_end = LONG
+    bpy.ops.ed.undo_push(message="Before")
+    before = state()
+    blend_by_button()
+    yield from until(is_blending, "the blend")
+    yield
+    middle = bpy.context.window_manager.windows[0]
+    window.press("ESC", (middle.width // 2, middle.height // 2))
+    yield from until(lambda: not is_blending(), "the end of the blend")
+    facts["stopped"] = [before, state()]
+    other.frame_end = 40
+    bpy.ops.ed.undo_push(message="Shorter")
+    blend_by_button()
+    yield from until(lambda: not is_blending() and len(bpy.data.actions) == 3, "the new action")
+    facts["ended"] = state()
+    window.press("Z", (middle.width // 2, middle.height // 2), ctrl=True)
+    yield from until(lambda: len(bpy.data.actions) == 2, "undo")
+    facts["undone"] = state()
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+window.run(steps(), TICK)
