@@ -64,6 +64,7 @@ ENTRIES: tuple[Entry | None, ...] = (
     Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
     Entry("sinew.bake_inbetweens"),
     Entry("sinew.blend_actions"),
+    Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),
     Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
     Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
     None,

@@ -25,7 +25,8 @@ BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 # What commands write: left to 4.2 and the newest, between which the others lie. These run all other tests:
 # how Blender evaluates, stores and edits.
 LEFT_TO_OTHERS = {
-    *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_check", "test_cluster"),
+    *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
+    "test_cluster",
     *("test_command_line", "test_compare", "test_comparison", "test_export", "test_hostile", "test_output"),
     *("test_report", "test_restore", "test_stages_in_features"),
 }

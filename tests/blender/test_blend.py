@@ -364,6 +364,11 @@ def test_a_bvh_file_becomes_an_action(tmp_path):
     assert run.name == "run"
     assert run.use_fake_user
     walk = legs.animation_data.action
+    bpy.context.view_layer.objects.active = legs
+    assert bpy.ops.sinew.blend_import_clip(filepath=str(tmp_path / "run.bvh")) == {"FINISHED"}
+    assert [clip.action.name for clip in legs.sinew_blend.clips] == ["run.001"]
+    with pytest.raises(RuntimeError, match="no such file"):
+        bpy.ops.sinew.blend_import_clip(filepath=str(tmp_path / "none.bvh"))
     for action, source in ((walk, pair[0]), (run, pair[1])):
         shown = played(legs, action, range(1, 2 + round(source.length)))
         order = [source.rig.names.index(name) for name in clips.rig_of(legs).names]

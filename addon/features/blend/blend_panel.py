@@ -41,7 +41,7 @@ class SINEW_OT_blend_add_clip(_OfArmature, bpy.types.Operator):
     bl_idname = "sinew.blend_add_clip"
     bl_label = "Add Action"
     bl_description = "Add an action to the blend: the one that plays, or the next that moves these bones"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         armature = armature_of(context)
@@ -58,7 +58,7 @@ class SINEW_OT_blend_remove_clip(_OfArmature, bpy.types.Operator):
     bl_idname = "sinew.blend_remove_clip"
     bl_label = "Remove Action"
     bl_description = "Take the action out of the blend; the action itself stays in the file"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     index: bpy.props.IntProperty(description="Which of the blend's actions", options={"HIDDEN", "SKIP_SAVE"})
 

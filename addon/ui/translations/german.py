@@ -723,6 +723,7 @@ TEXTS = {
         "Nimmt die Aktion aus der Mischung; die Aktion selbst bleibt in der Datei"
     ),
     "Add Clip from File": "Clip aus Datei hinzufügen",
+    "Add Clip to the Blend…": "Clip zur Mischung hinzufügen…",
     "Make actions of the animations in a BVH, glTF or FBX file whose bones have the same names "
     "and rest, and add them to the blend": (
         "Macht Aktionen aus den Animationen einer BVH-, glTF- oder FBX-Datei, deren Knochen "
