@@ -301,6 +301,22 @@ def test_errors_are_reported_in_one_sentence():
     assert len(bpy.data.actions) == 3
 
 
+def test_a_linked_armature_is_refused(tmp_path):
+    armature, _chosen, _pair = make_walks()
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {armature, *bpy.data.actions})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (_theirs, ours):
+        ours.objects, ours.actions = ["Legs"], ["WALK", "RUN"]
+    linked = bpy.data.objects["Legs"]
+    bpy.context.scene.collection.objects.link(linked)
+    with pytest.raises(SinewError, match="Legs is linked: make a library override"):
+        finished(blend_actions.make(linked, list(bpy.data.actions), (1, 1), Settings()))
+    assert len(bpy.data.actions) == 2
+    bpy.context.view_layer.objects.active = linked
+    assert not bpy.ops.sinew.blend_actions.poll()
+
+
 # --- Clips from files
 
 

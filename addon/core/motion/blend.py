@@ -15,7 +15,7 @@ import numpy as np
 from sinew import interpolate, quat_vec
 
 from ..errors import WrongUse
-from ..inbetween import Poses, axes_of, in_layout_of, rigid_of
+from ..inbetween import Method, Poses, axes_of, in_layout_of, rigid_of
 from . import timing
 from .align import Warp, align, same_pace
 from .clip import Clip, Rig, common_rig
@@ -25,16 +25,8 @@ RELATIVE, ARMATURE = "relative", "armature"
 TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
 
 
-class Method(NamedTuple):
-    """A way to blend, named as in sinew.interpolate.METHODS; the numbers are stored in files."""
-
-    name: str
-    label: str
-    description: str
-    number: int
-
-
-# The one to recommend first, as menus have them. "sclerp" is that of two, "dib" of many: they are one.
+# The one to recommend first, as menus have them; numbers are those of the in-betweens. "sclerp" and "dib" are
+# one under two names, that of two and that of many.
 METHODS = {
     method.name: method
     for method in (

@@ -70,6 +70,8 @@ def make(
 ) -> Generator[float, None, Made]:
     """Yields the share that is done. The new action begins at the scene's first frame; closed before its
     end, nothing has changed. Raises SinewError for what can not be blended."""
+    if not armature.is_editable:
+        raise SinewError(f"{armature.name} is linked: make a library override of it first")
     if len(chosen) < 2:
         raise SinewError(f"{armature.name}: choose two actions or more to blend")
     rig, up, sources = clips.rig_of(armature), clips.up_of(armature), []
