@@ -411,6 +411,30 @@ def test_two_straight_walks_move_at_the_blended_speed(method):
         assert np.abs(place[:, 0]).max() < 1e-9
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_three_walks_move_at_the_mean_of_their_speeds(method):
+    clips = [walks.walk(stride=0.6), walks.walk("b", 24, 0.8, start=0.7), walks.walk("c", 30, 1.1, start=0.2)]
+    weights = (0.2, 0.5, 0.3)
+    made = blend(clips, weights, Settings(method=method))
+    place = made.clip("x").rig.to_armature(made.poses.rigid)[:, 0, 4:]
+    assert len(place) - 1 == 25
+    assert place[-1, 1] - place[0, 1] == pytest.approx(-np.dot(weights, (0.6, 0.8, 1.1)))
+    assert made.is_cyclic
+    assert apart(made.poses.rigid[0, 1:], made.poses.rigid[-1, 1:]) < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_change_of_weights_has_no_jumps(method):
+    """No bone moves faster in the blend than in the clips, but for what the blend itself changes."""
+    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
+    made = blend([walk, run], (0, 1), Settings(method=method, cycles=4), weights_from=(1, 0))
+    steps = {}
+    for name, clip in (("walk", walk), ("run", run), ("blend", made.clip("blend"))):
+        ends = clip.rig.points(clip.rig.to_armature(clip.poses.rigid))
+        steps[name] = np.linalg.norm(np.diff(ends, axis=0), axis=-1).max()
+    assert steps["blend"] < 1.1 * max(steps["walk"], steps["run"])
+
+
 @pytest.mark.parametrize("method", ["dlb", "sclerp", "qv_slerp", "matrix_polar"])
 def test_turns_add_up_to_the_blended_turn(method):
     left, right = walks.walk(turn=0.9), walks.walk("right", turn=-0.3)
