@@ -17,7 +17,7 @@ from sinew import quat_vec
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.motion import blend as core
 from sinew_addon.core.motion.blend import Settings
-from sinew_addon.features.blend import blend_actions
+from sinew_addon.features.blend import blend_actions, blend_settings
 from sinew_addon.io import actions, clips, files
 from sinew_addon.io.clips import finished
 
@@ -255,6 +255,20 @@ def test_the_operator_blends_and_undo_takes_it_back():
     assert len(bpy.data.actions) == 2
     assert bpy.ops.sinew.blend_remove_clip(index=0) == {"FINISHED"}
     assert [clip.action.name for clip in armature.sinew_blend.clips] == ["RUN"]
+
+
+def test_a_blend_leaves_no_trace_once_it_is_empty():
+    armature, _chosen, _pair = make_walks()
+    # To ask whether there is one, as panel and menu do, stores none.
+    assert not bpy.ops.sinew.blend_actions.poll()
+    assert blend_settings.of(armature) is None
+    assert not armature.is_property_set("sinew_blend")
+    bpy.ops.sinew.blend_add_clip()
+    assert len(blend_settings.of(armature).clips) == 1
+    with pytest.raises(RuntimeError, match="no such action"):
+        bpy.ops.sinew.blend_remove_clip(index=1)
+    bpy.ops.sinew.blend_remove_clip(index=0)
+    assert not armature.is_property_set("sinew_blend")
 
 
 def test_weights_change_from_first_to_last():

@@ -15,7 +15,7 @@ from ...io import clips
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, characters, draw_text, shortened
 from ...ui.translations import counted, tr
-from . import blend_actions
+from . import blend_actions, blend_settings
 
 
 def armature_of(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -63,7 +63,12 @@ class SINEW_OT_blend_remove_clip(_OfArmature, bpy.types.Operator):
     index: bpy.props.IntProperty(description="Which of the blend's actions", options={"HIDDEN", "SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        armature_of(context).sinew_blend.clips.remove(self.index)
+        armature = armature_of(context)
+        blend = blend_settings.of(armature)
+        if blend is None or not 0 <= self.index < len(blend.clips):
+            self.report({"ERROR"}, tr("There is no such action in the blend"))
+            return {"CANCELLED"}
+        blend_settings.remove_clip(armature, self.index)
         return {"FINISHED"}
 
 
@@ -107,7 +112,7 @@ class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not super().poll(context):
             return False
-        chosen = [clip for clip in armature_of(context).sinew_blend.clips if clip.action is not None]
+        chosen = _chosen(armature_of(context))
         if len(chosen) < 2:
             cls.poll_message_set(tr("Add two actions or more in the panel Blend Actions"))
         return len(chosen) >= 2
@@ -116,8 +121,7 @@ class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
         armature = armature_of(context)
         # By name: undo, or another file, would leave pointers to nothing.
         self._armature = armature.name
-        chosen = [clip for clip in armature.sinew_blend.clips if clip.action is not None]
-        blend = armature.sinew_blend
+        chosen, blend = _chosen(armature), armature.sinew_blend
         self._made = yield from blend_actions.make(
             armature,
             [clip.action for clip in chosen],
@@ -137,6 +141,12 @@ class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _chosen(armature: bpy.types.Object) -> list[blend_settings.SinewBlendClip]:
+    """The clips of its blend that have an action."""
+    blend = blend_settings.of(armature)
+    return [clip for clip in blend.clips if clip.action is not None] if blend is not None else []
+
+
 def _frames_text(count: int) -> str:
     return counted(count, "{count} frame", "{count} frames")
 
@@ -151,10 +161,11 @@ class SINEW_PT_blend(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, armature = self.layout, armature_of(context)
-        blend = armature.sinew_blend
+        blend = blend_settings.of(armature)
+        clips_of_blend = blend.clips if blend is not None else ()
         name = shortened(armature.name, characters(context) - 4)
         layout.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
-        for index, clip in enumerate(blend.clips):
+        for index, clip in enumerate(clips_of_blend):
             column = layout.column(align=True)
             row = column.row(align=True)
             row.prop(clip, "action", text="")
@@ -166,7 +177,7 @@ class SINEW_PT_blend(Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("sinew.blend_add_clip", icon="ADD")
         row.operator("sinew.blend_import_clip", text="", icon="FILE_FOLDER")
-        if not blend.clips:
+        if not clips_of_blend:
             draw_text(layout, context, "Add actions of this armature, such as a walk and a run", icon="INFO")
             return
         column = layout.column()

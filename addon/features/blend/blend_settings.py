@@ -114,6 +114,19 @@ class SinewBlend(bpy.types.PropertyGroup):
         )
 
 
+def of(armature: bpy.types.Object) -> SinewBlend | None:
+    """The blend of an armature object; None where nothing was ever added: to look at it would already store
+    an empty one in the file."""
+    return armature.sinew_blend if armature.is_property_set("sinew_blend") else None
+
+
+def remove_clip(armature: bpy.types.Object, index: int) -> None:
+    """With the last action all of the blend is gone from the file."""
+    armature.sinew_blend.clips.remove(index)
+    if not armature.sinew_blend.clips:
+        armature.property_unset("sinew_blend")
+
+
 CLASSES = (SinewBlendClip, SinewBlend)
 
 

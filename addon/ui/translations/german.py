@@ -714,6 +714,7 @@ TEXTS = {
         "Der Knochen, der die anderen trägt; leer: der oberste, der sich bewegt"
     ),
     "Add Action": "Aktion hinzufügen",
+    "There is no such action in the blend": "Diese Aktion gibt es in der Mischung nicht",
     "Add an action to the blend: the one that plays, or the next that moves these bones": (
         "Fügt der Mischung eine Aktion hinzu: die abgespielte oder die nächste, die diese "
         "Knochen bewegt"
