@@ -1,26 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations and rigid motions at 50 digits, by mpmath: the oracle of test_exact.py.
+"""Rotations and rigid motions at 50 digits: the oracle of test_exact.py.
 
-Arrays of mpmath's numbers, components first: a quaternion is [4, n], a vector [3, n], a matrix [3, 3, n].
-Written from the definitions, and by another formula than the library's where there is one; at 50 digits no
-difference cancels that matters.
+Numbers are Python's decimals, whose sums and products take a tenth of the time of mpmath's; sines, cosines and
+arctangents are mpmath's. Arrays of them, components first: a quaternion is [4, n], a vector [3, n], a matrix
+[3, 3, n]. Written from the definitions, and by another formula than the library's where there is one; at 50
+digits no difference cancels that matters.
 """
 
+import decimal
+from decimal import Decimal
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
-mpmath.mp.dps = 50
+DIGITS = 50
+# mpmath's results keep them when they are written in decimals.
+mpmath.mp.dps = DIGITS + 5
+decimal.getcontext().prec = DIGITS
 
-number = np.frompyfunc(mpmath.mpf, 1, 1)
-sqrt = np.frompyfunc(mpmath.sqrt, 1, 1)
-sin = np.frompyfunc(mpmath.sin, 1, 1)
-cos = np.frompyfunc(mpmath.cos, 1, 1)
-exp = np.frompyfunc(mpmath.exp, 1, 1)
-log = np.frompyfunc(mpmath.log, 1, 1)
-atan2 = np.frompyfunc(mpmath.atan2, 2, 1)
-HALF = mpmath.mpf(1) / 2
+
+def _by_mpmath(function, arguments):
+    def of(*numbers):
+        return Decimal(mpmath.nstr(function(*(mpmath.mpf(str(number)) for number in numbers)), DIGITS + 2))
+
+    return np.frompyfunc(of, arguments, 1)
+
+
+# Of a float the nearest of 50 digits.
+number = np.frompyfunc(lambda value: +Decimal(value), 1, 1)
+sqrt = np.frompyfunc(Decimal.sqrt, 1, 1)
+exp = np.frompyfunc(Decimal.exp, 1, 1)
+log = np.frompyfunc(Decimal.ln, 1, 1)
+sin, cos = _by_mpmath(mpmath.sin, 1), _by_mpmath(mpmath.cos, 1)
+atan2 = _by_mpmath(mpmath.atan2, 2)
+ONE, HALF = Decimal(1), Decimal("0.5")
 
 
 class Motion(NamedTuple):
@@ -55,7 +69,7 @@ def length(v):
 def unit(v):
     """`v` at length 1; of length 0 as it is."""
     size = length(v)
-    return v / np.where(size > 0, size, mpmath.mpf(1))
+    return v / np.where(size > 0, size, ONE)
 
 
 def cross(a, b):
@@ -175,11 +189,11 @@ def of_dual(real, dual):
 
 def _coefficients(angle):
     """(1 - cos x) / x^2 and (x - sin x) / x^3, by series where even 50 digits cancel."""
-    is_small = angle < mpmath.mpf("1e-8")
-    x = np.where(is_small, mpmath.mpf(1), angle)
+    is_small = angle < Decimal("1e-8")
+    x = np.where(is_small, ONE, angle)
     square = angle * angle
     first = np.where(is_small, HALF - square / 24, (1 - cos(x)) / (x * x))
-    second = np.where(is_small, mpmath.mpf(1) / 6 - square / 120, (x - sin(x)) / (x * x * x))
+    second = np.where(is_small, ONE / 6 - square / 120, (x - sin(x)) / (x * x * x))
     return first, second
 
 
@@ -196,9 +210,9 @@ def to_twist(a):
     """The logarithm, (angular, linear): what integrates to the translation."""
     angular = rotation_vector(a.q)
     angle = length(angular)
-    is_small = angle < mpmath.mpf("1e-8")
-    x = np.where(is_small, mpmath.mpf(1), angle)
-    series = mpmath.mpf(1) / 12 + angle * angle / 720
+    is_small = angle < Decimal("1e-8")
+    x = np.where(is_small, ONE, angle)
+    series = ONE / 12 + angle * angle / 720
     factor = np.where(is_small, series, 1 / (x * x) - cos(x * HALF) / sin(x * HALF) / (2 * x))
     sideways = cross(angular, a.t)
     return angular, a.t - HALF * sideways + factor * cross(angular, sideways)

@@ -84,8 +84,8 @@ def test_what_keeps_its_radius_is_said_of_the_numbers(content):
     (fact,) = content["figures"]["3.11"]["facts"]
     fact["values"] = {"radius, lbs": 0.99, "radius, dq": 0.4}
     text = section(paper.page(content), 4)
-    assert "with linear matrices; of it are left with dual quaternions 40%" in text
-    assert "What dual quaternions buy" not in text
+    assert "with linear matrices; what is left of it with others: dual quaternions 40%" in text
+    assert text.startswith("## 4. What blends of joints keep\n")
 
 
 def test_what_is_not_whole_makes_no_page(content, tmp_path):

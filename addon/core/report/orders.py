@@ -90,7 +90,9 @@ def ratio_of_best(measurements: Measurements, table: str, row: str, other: str) 
 
 def _in_words(timing: Timing, table: str, name: str) -> str:
     each = 1e9 / OPERATIONS[table]
-    return f"{timing.median * each:.1f} ± {timing.spread * each / 2:.1f} ns ({MAKERS[name.split('_')[0]]})"
+    time, half = timing.median * each, timing.spread * each / 2
+    digits = 1 if time >= 10 else 2
+    return f"{time:.{digits}f} ± {half:.{digits}f} ns ({MAKERS[name.split('_')[0]]})"
 
 
 def facts(measurements: Measurements, table: str) -> tuple[Fact, ...]:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,12 +21,12 @@ TIMES = {"3.4": "Combine two", "3.5": "Move a point", "3.10": "Blend three and m
 _SHORT = {
     "lbs": "linear matrices",
     "log": "logarithms",
-    "sbs": "spherical",
+    "sbs": "spherical blending",
     "qv": "pairs",
     "dq": "dual quaternions",
 }
 # What the page is made of, beside `studies`.
-_TABLES, _FIGURES = (*TIMES, "3.7", "3.9"), ("3.4", "3.11")
+_TABLES, _FIGURES = (*TIMES, "3.7", "3.9"), ("3.4", "3.10", "3.11")
 
 Content = Mapping[str, Any]
 
@@ -153,30 +155,23 @@ def _order_section(content: Content) -> str:
         title = "The order of the times depends on the implementation"
     sentences = []
     for number, (_first, second) in held.items():
-        values = second["values"]
-        least = min(values, key=lambda row: values[row])
-        sentences.append(
-            f"{TIMES[number]} (Table {number}): {_times(values)}; the fastest are "
-            f"{NAMES[_OF_SKINNING.get(least, least)]}."
-        )
+        _how, times = second["ours"].split(": ", 1)
+        sentences.append(f"{TIMES[number]} (Table {number}): {times}")
     ratios = [
         fact["values"]["ratio"] for fact in content["tables"]["3.9"]["facts"] if "ratio" in fact["values"]
     ]
     return "\n\n".join(
         [
             f"## 1. {title}",
-            "The report finds matrices slowest by far at everything, and asks for better implementations of "
-            f"them. {found} In nanoseconds, by the best of each:",
+            "The report prints matrices as the slowest in all three tables, and asks for better "
+            f"implementations of them. {found} By the best of each, with half the range of the middle "
+            "half of the runs:",
             "\n".join(f"- {sentence}" for sentence in sentences),
             f"ScLERP takes {ratios[0]:.1f} times as long as DLB without optimisation and {ratios[1]:.1f} "
             "times with it, by the fastest of each; the report says almost twice.",
             "![Times by representation, without optimisation and with it](results-times.svg)",
         ]
     )
-
-
-def _times(values: Mapping[str, float]) -> str:
-    return ", ".join(f"{NAMES[_OF_SKINNING.get(row, row)]} {value:.1f}" for row, value in values.items())
 
 
 def _accuracy_section(content: Content) -> str:
@@ -251,20 +246,25 @@ def _shape_section(content: Content) -> str:
     kept = [_SHORT.get(name, name) for name, share in radii.items() if share > 0.95]
     lost = [f"{_SHORT.get(name, name)} {share:.0%}" for name, share in radii.items() if share <= 0.95]
     bends = _values(content, "figures", "3.4")
-    title = "What dual quaternions buy is the shape" if "dual quaternions" in kept else "What shapes keep"
+    drift = _values(content, "figures", "3.10")["drift, in widths"]
+    title = "What blends of joints keep"
+    if {"pairs", "dual quaternions"} <= set(kept) and drift > 0.25:
+        title = "Pairs keep the shape of a joint and lose its place; dual quaternions keep both"
     text = (
         f"A joint twisted by 170 degrees (Figure 3.11) keeps its radius, to 5 %, with {_listed(kept)}"
         if kept
         else "A joint twisted by 170 degrees (Figure 3.11) keeps its radius with none of them"
     )
     if lost:
-        text += f"; of it are left with {_listed(lost)}"
+        text += f"; what is left of it with others: {_listed(lost)}"
     return "\n\n".join(
         [
             f"## 4. {title}",
-            f"{text}. Between two transforms (Figure 3.4) the path of the origin leaves the straight line "
-            f"by {bends['sclerp']:.2f} with ScLERP, {bends['dlb']:.2f} with DLB and {bends['qv_slerp']:.0e} "
-            "with pairs by slerp, which rotate about the origin, wherever that is.",
+            f"{text}. A bent joint three links from the origin (Figure 3.10) is by up to {drift:.1f} "
+            "widths of the limb elsewhere with pairs than with dual quaternions. Between two transforms "
+            "(Figure 3.4) the path of the origin leaves the straight line by "
+            f"{bends['sclerp']:.2f} with ScLERP, {bends['dlb']:.2f} with DLB and {bends['qv_slerp']:.0e} "
+            "with pairs by slerp: these rotate about the origin, wherever that is.",
             "![Radius that a twisted joint keeps](results-radius.svg)",
         ]
     )
@@ -293,8 +293,11 @@ def _axes_section(content: Content) -> str:
 
 
 def plots(content: Content) -> dict[str, str]:
-    """SVG text by name of file. Raises SinewError without matplotlib."""
-    return {
+    """SVG text by name of file, on white: a dark page would leave nothing of the text.
+
+    Raises SinewError without matplotlib.
+    """
+    drawn = {
         "results-times.svg": _plot_times(content),
         "results-accuracy.svg": _plot_lengths(
             "Error of float32", "error, of the length", _lengths(content, "accuracy"), NAMES
@@ -304,18 +307,25 @@ def plots(content: Content) -> dict[str, str]:
         ),
         "results-radius.svg": _plot_radius(content),
     }
+    white = '<rect width="100%" height="100%" fill="#ffffff"/>'
+    return {name: re.sub(r"(<svg[^>]*>)", rf"\1{white}", text, count=1) for name, text in drawn.items()}
 
 
 def _plot_times(content: Content) -> str:
-    with new_figure("Times", (7.2, 2.6), _SETTINGS) as figure:
+    most = max(
+        value for number in TIMES for fact in _orders(content, number) for value in fact["values"].values()
+    )
+    with new_figure("Times", (7.6, 2.9), _SETTINGS) as figure:
         for column, number in enumerate(TIMES):
             axes = figure.add_subplot(1, len(TIMES), column + 1)
             for group, fact in enumerate(_orders(content, number)):
                 for place, (row, value) in enumerate(fact["values"].items()):
                     axes.bar(group * 4 + place, value, color=_COLOUR[_OF_SKINNING.get(row, row)], width=0.9)
             axes.set_yscale("log")
+            # One scale for all, so that bars can be compared.
+            axes.set_ylim(1.0, 10.0 ** math.ceil(math.log10(most)))
             axes.set_xticks([1, 5], ["not optimised", "optimised"])
-            axes.set_title(TIMES[number], fontsize="medium")
+            axes.set_title(TIMES[number].replace(" and ", ",\n"), fontsize="medium")
             if column == 0:
                 axes.set_ylabel("nanoseconds")
         figure.legend(
@@ -363,10 +373,10 @@ def _plot_lengths(
 
 def _plot_radius(content: Content) -> str:
     radii = _radii(content)
-    with new_figure("Radius", (5.2, 2.2), _SETTINGS) as figure:
+    with new_figure("Radius", (5.4, 2.2), _SETTINGS) as figure:
         axes = figure.add_subplot()
         names = [_SHORT.get(name, name) for name in radii]
         axes.barh(names, [100 * share for share in radii.values()], color=COLOURS[0])
         axes.invert_yaxis()
-        axes.set_xlabel("% of the radius that a joint twisted by 170 degrees keeps")
+        axes.set_xlabel("% of its radius that a twisted joint keeps")
         return to_svg(figure)
