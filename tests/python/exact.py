@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rotations and rigid motions at 50 digits: the oracle of test_exact.py.
 
-Numbers are Python's decimals, whose sums and products take a tenth of the time of mpmath's; sines, cosines and
-arctangents are mpmath's. Arrays of them, components first: a quaternion is [4, n], a vector [3, n], a matrix
-[3, 3, n]. Written from the definitions, and by another formula than the library's where there is one; at 50
-digits no difference cancels that matters.
+Numbers are Python's decimals, whose sums and products take a tenth of the time of mpmath's; sines, cosines
+and arctangents are mpmath's. Arrays of them have their components first: a quaternion is [4, n], a vector
+[3, n], a matrix [3, 3, n]. Written from the definitions, and by another formula than the library's where
+there is one; at 50 digits no difference cancels that matters.
 """
 
 import decimal
