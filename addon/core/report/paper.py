@@ -127,8 +127,8 @@ def page(content: Content) -> str:
                 f"{machine.get('optimised', '')} and {machine.get('without optimisation', '')}; load average "
                 f"{machine.get('load average', 'unknown')}. Times are processor times, medians of "
                 "interleaved runs. Random chains have fixed seeds. Every number on this "
-                "page is written from [the measurements](results.json), none by hand: `./dev report` measures, "
-                "and `sinew report --from build/report/report.json --results docs` writes this page and its "
+                "page is written from [the measurements](results.json), none by hand: `./dev report` "
+                "measures, and `sinew report --from build/report/report.json --results docs` writes this page and its "
                 "plots.",
                 "To cite it, take CITATION.cff of the repository and the version above.",
             ]
