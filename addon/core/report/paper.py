@@ -126,10 +126,9 @@ def page(content: Content) -> str:
                 f"Sinew {content['version']}, {machine['processor']}, {machine.get('compiler', 'unknown')}, "
                 f"{machine.get('optimised', '')} and {machine.get('without optimisation', '')}; load average "
                 f"{machine.get('load average', 'unknown')}. Times are processor times, medians of "
-                "interleaved runs. Random chains have fixed seeds. Every number on this "
-                "page is written from [the measurements](results.json), none by hand: `./dev report` "
-                "measures, and `sinew report --from build/report/report.json --results docs` writes this page and its "
-                "plots.",
+                "interleaved runs. Random chains have fixed seeds. Every number on this page is written from "
+                "[the measurements](results.json), none by hand: `./dev report` measures, and `sinew report "
+                "--from build/report/report.json --results docs` writes this page and its plots.",
                 "To cite it, take CITATION.cff of the repository and the version above.",
             ]
         )
