@@ -243,6 +243,8 @@ void add_all() {
     using sinew::DualQuat;
     using sinew::QuatVec;
     add_chain_and_point<Plain4x4>("plain_4x4");
+    add_chain_and_point<Lanes4x4>("lanes_4x4");
+    add_chain_and_point<Lanes3x4>("lanes_3x4");
     add_chain_and_point<Ours<Affine>>("sinew_affine");
     add_chain_and_point<Ours<QuatVec>>("sinew_quat_vec");
     add_chain_and_point<Ours<DualQuat>>("sinew_dual_quat");
@@ -254,6 +256,8 @@ void add_all() {
     add_chain_and_point<EigenPair>("eigen_quat_vec");
 
     add_linear<Plain4x4>("plain_4x4");
+    add_linear<Lanes4x4>("lanes_4x4");
+    add_linear<Lanes3x4>("lanes_3x4");
     add_methods(static_cast<sinew::Interpolations*>(nullptr));
     add_linear<Glm4x4>("glm_4x4");
     add_pair<GlmPair>("glm_quat_vec");
@@ -264,6 +268,8 @@ void add_all() {
     add_pair<EigenPair>("eigen_quat_vec");
 
     add_blend<Plain4x4>("plain_4x4");
+    add_blend<Lanes4x4>("lanes_4x4");
+    add_blend<Lanes3x4>("lanes_3x4");
     add_skinning<sinew::Lbs>("sinew_lbs");
     add_skinning<sinew::Qv>("sinew_qv");
     add_skinning<sinew::Dq>("sinew_dq");

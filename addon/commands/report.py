@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.errors import SinewError
+from ..core.errors import SinewError, WrongUse
 from ..core.output import folder_to_write
 from ..core.report.model import Figure, Page
 from ..core.scratch import scratch_folder
@@ -30,9 +30,25 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "they agree. An installed Sinew computes Tables 3.1 and 3.6 to 3.8 and, with matplotlib, Figures "
         "3.3 to 3.5. Operation counts and times (Tables 3.2 to 3.5, 3.9, 3.10) take programs that are "
         "built against GLM and Eigen, and pictures (Figures 3.6 to 3.11) Sinew's example rigs: ./dev report "
-        "in a checkout builds the programs and passes on both. The page says what was left out and why.",
+        "in a checkout builds the programs and passes on both. The page says what was left out and why. "
+        "--results also writes its best five results as a short page for a site, of a whole report.json.",
     )
-    parser.add_argument("--out", required=True, type=folder_to_write, metavar="FOLDER")
+    parser.add_argument(
+        "--out", type=folder_to_write, metavar="FOLDER", help="of report.html and report.json"
+    )
+    parser.add_argument(
+        "--results",
+        type=folder_to_write,
+        metavar="FOLDER",
+        help="of results.md, its plots (with matplotlib) and the numbers that they are made of",
+    )
+    parser.add_argument(
+        "--from",
+        dest="made",
+        type=Path,
+        metavar="FILE",
+        help="the report.json that --results are of: nothing is measured",
+    )
     parser.add_argument(
         "--programs",
         type=Path,
@@ -52,9 +68,28 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
+    from ..core.report import paper
+
+    made = args.made
+    if made is not None and (args.out is not None or args.results is None):
+        raise WrongUse("--from takes --results FOLDER, and no --out")
+    if made is None:
+        if args.out is None:
+            raise WrongUse("--out FOLDER is missing: where to write report.html and report.json")
+        _make(args, console)
+        made = args.out / "report.json"
+    if args.results is not None:
+        content = paper.read(made)
+        for path in paper.write(content, args.results):
+            console.say(str(path))
+    return 0
+
+
+def _make(args: argparse.Namespace, console: Console) -> None:
+    """report.html and report.json."""
     import sinew
 
-    from ..core.report import answers, joints, measure, meshes, page, paths, tables
+    from ..core.report import answers, joints, measure, meshes, page, paths, studies, tables
 
     for folder in (args.programs, args.blend_files):
         if folder is not None and not folder.is_dir():
@@ -74,6 +109,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         tables=tables.tables(measurements),
         figures=figures,
         answers=answers.answers(measurements, figures),
+        studies=studies.numbers(),
     )
     missing = [(f"Table {table.number}", table.missing) for table in content.tables]
     missing += [(f"Figure {figure.number}", figure.missing) for figure in content.figures]
@@ -82,7 +118,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
             console.note(f"{name}: {reason}")
     for path in page.write(content, args.out):
         console.say(str(path))
-    return 0
 
 
 def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:

@@ -13,7 +13,7 @@ import sys
 from html.parser import HTMLParser
 
 import pytest
-from sinew_addon.core.report import measure, meshes, tables
+from sinew_addon.core.report import measure, meshes, orders, tables
 from sinew_addon.core.report.page import format_numbers
 
 PROGRAMS = os.environ.get("SINEW_EXPERIMENTS")
@@ -118,8 +118,8 @@ def test_the_page_says_what_the_json_says(made):
             assert cells[3] == {True: "yes", False: "no", None: ""}[row["agrees"]]
             assert row["why"] in ("", *cells)
             seen += 1
-        for note in (table["tolerance"], *table["notes"]):
-            assert note in reader.text[f"table-{number}"]
+        for said in (table["tolerance"], *table["notes"], *[fact["ours"] for fact in table["facts"]]):
+            assert said in reader.text[f"table-{number}"]
     assert seen >= 21
     for number, figure in content["figures"].items():
         text = reader.text[f"figure-{number}"]
@@ -234,3 +234,39 @@ def test_times_are_ratios_to_the_first_row(measurements, number):
     assert all(row.more["printed s"] for row in with_ratio)
     for row in with_ratio[1:]:
         assert row.agrees == (abs(row.ours[0] / row.printed[0] - 1) <= tables.RATIO_TOLERANCE)
+
+
+@pytest.mark.parametrize("number", orders.TIMED)
+def test_orders_are_those_of_the_times(measurements, number):
+    seconds, rows = orders.TIMED[number]
+    theirs = sorted(seconds, key=seconds.__getitem__)
+    first, second, *rest = orders.facts(measurements, number)
+    assert list(first.values) == list(second.values) == list(rows)
+    for fact in (first, second):
+        assert fact.agrees == (sorted(fact.values, key=fact.values.__getitem__) == theirs)
+    for row, names in rows.items():
+        times = [measurements.optimised[f"{number}/{name}"].median for name in names]
+        assert second.values[row] == pytest.approx(min(times) / measure.OPERATIONS[number] * 1e9)
+    # All that is measured of a matrix is a candidate for the best: none is left out.
+    known = {name for names in rows.values() for name in names}
+    measured = {name.split("/")[1] for name in measurements.optimised if name.startswith(f"{number}/")}
+    other = {name for name in measured - known if not name.startswith(("kernel_", "sinew_"))}
+    assert not other
+    assert len(rest) == (2 if number == "3.9" else 0)
+
+
+def test_an_order_that_is_another_is_said_to_be():
+    def timed(*medians):
+        names = ("glm_dual_quat", "glm_quat_vec", "glm_4x4")
+        own = {f"3.4/{name}": measure.Timing(m, m, 0.1) for name, m in zip(names, medians, strict=True)}
+        others = {name for of in orders.CANDIDATES.values() for name in of} - set(names)
+        return own | {f"3.4/{name}": measure.Timing(9.0, 9.0, 0.1) for name in others}
+
+    made = measure.Measurements({}, timed(3.0, 2.0, 1.0), timed(1.0, 2.0, 2.05), {})
+    first, second = orders.facts(made, "3.4")
+    assert first.agrees
+    assert "Of 3 pairs of rows 3 are in the printed order." in first.ours
+    assert "Not told apart by the spread: pair and matrix." in first.ours
+    assert not second.agrees
+    assert "Of 3 pairs of rows 0 are in the printed order." in second.ours
+    assert "spread" not in second.ours

@@ -212,3 +212,26 @@ def test_the_end_of_a_chain_is_that_of_its_matrices():
     matrices = sinew.quat_vec.to_affine(links)
     for each, end in zip(matrices, studies._end(sinew.quat_vec, links), strict=True):
         assert error(np.linalg.multi_dot(each)[:3, 3], end) < 1e-14
+
+
+def test_tables_3_7_and_3_8_have_float32_beside_float64():
+    for table in (tables.one_by_one(), tables.combined()):
+        for row in table.rows:
+            single = [float(number) for number in row.more["in float32"].split(", ")]
+            assert error(single, row.ours) < 5e-6
+            assert row.more["float32, difference"] == pytest.approx(error(single, row.printed), abs=1e-7)
+
+
+def test_what_is_said_of_the_chain_is_held_to_ours():
+    (apart,) = tables.one_by_one().facts
+    # Of one axis for all, what is left is rounding: no 1e-5, and it does not grow with each.
+    assert max(apart.values.values()) < 2e-6
+    assert not apart.agrees
+    (combined,) = tables.combined().facts
+    assert combined.values == {
+        name: error(
+            moved_combined(name, np.float32, AS_REPORT[name]),
+            moved_one_by_one(name, np.float32, AS_REPORT[name])[-1],
+        )
+        for name in LAYOUTS
+    }

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import sinew
 
-from . import paths, printed, studies, tables
-from .measure import OPERATIONS, Measurements
+from . import orders, paths, printed, studies, tables
+from .measure import Measurements
 from .model import Answer, Fact, Figure
 
 # What counts as no dearer: within what one machine's neighbours change in a measurement.
@@ -32,41 +32,6 @@ def answers(measurements: Measurements | None, figures: tuple[Figure, ...]) -> t
     )
 
 
-def _nanoseconds(measurements: Measurements, table: str, name: str) -> float:
-    """One operation in a table's optimised loop."""
-    return measurements.optimised[f"{table}/{name}"].median / OPERATIONS[table] * 1e9
-
-
-# By table: the times that the report prints, and for each of its rows what measures it here. GLM's first,
-# which the report used; of ScLERP Kenwright's on GLM.
-_CANDIDATES = {
-    "affine": ("glm_4x4", "plain_4x4", "sinew_affine", "eigen_4x4", "eigen_3x4"),
-    "quat_vec": ("glm_quat_vec", "sinew_quat_vec", "eigen_quat_vec"),
-    "dual_quat": ("glm_dual_quat", "sinew_dual_quat"),
-}
-_TIMED: dict[str, tuple[dict[str, float], dict[str, tuple[str, ...]]]] = {
-    "3.4": (printed.CHAIN_SECONDS, _CANDIDATES),
-    "3.5": (printed.POINT_SECONDS, _CANDIDATES),
-    "3.9": (
-        printed.INTERPOLATION_SECONDS,
-        {
-            "matrix_linear": ("glm_4x4", "plain_4x4", "sinew_matrix_linear", "eigen_4x4", "eigen_3x4"),
-            "qv_nlerp": ("glm_quat_vec_nlerp", "sinew_qv_nlerp", "eigen_quat_vec_nlerp"),
-            "qv_slerp": ("glm_quat_vec_slerp", "sinew_qv_slerp", "eigen_quat_vec_slerp"),
-            "dlb": ("glm_dual_quat", "sinew_dlb"),
-            "sclerp": ("glm_dual_quat_sclerp", "sinew_sclerp"),
-        },
-    ),
-    "3.10": (
-        printed.SKINNING_SECONDS,
-        {
-            "lbs": ("glm_4x4", "plain_4x4", "sinew_lbs", "eigen_4x4", "eigen_3x4"),
-            "qv": ("glm_quat_vec", "sinew_qv", "eigen_quat_vec"),
-            "dq": ("glm_dual_quat", "sinew_dq"),
-        },
-    ),
-}
-_MAKERS = {"glm": "GLM", "plain": "plain loops", "sinew": "Sinew", "eigen": "Eigen"}
 _TASKS = {
     "3.4": "combining two",
     "3.5": "moving a point",
@@ -74,36 +39,8 @@ _TASKS = {
 }
 
 
-def orders_that_agree(measurements: Measurements) -> tuple[list[str], list[str]]:
-    """The tables whose rows, by time, come in the printed order: unoptimised as the report had them, and
-    optimised by the fastest implementation of each."""
-    as_reported, fastest = [], []
-    for table, (seconds, candidates) in _TIMED.items():
-        theirs = sorted(seconds, key=seconds.__getitem__)
-        plain = {row: measurements.unoptimised[f"{table}/{candidates[row][0]}"].median for row in seconds}
-        if sorted(seconds, key=plain.__getitem__) == theirs:
-            as_reported.append(table)
-        best = {row: _nanoseconds(measurements, table, _fastest(measurements, table, row)) for row in seconds}
-        if sorted(seconds, key=best.__getitem__) == theirs:
-            fastest.append(table)
-    return as_reported, fastest
-
-
-def _fastest(measurements: Measurements, table: str, row: str) -> str:
-    """The name of the fastest implementation of a table's row."""
-    return min(_TIMED[table][1][row], key=lambda name: _nanoseconds(measurements, table, name))
-
-
 def _in_words(numbers: list[str]) -> str:
     return ", ".join(numbers) if numbers else "none"
-
-
-def _best(measurements: Measurements, table: str, row: str) -> str:
-    """The time of the fastest implementation of a table's row, who made it, and how far the runs spread."""
-    name = _fastest(measurements, table, row)
-    spread = measurements.optimised[f"{table}/{name}"].spread / OPERATIONS[table] * 1e9
-    maker = _MAKERS[name.split("_")[0]]
-    return f"{_nanoseconds(measurements, table, name):.1f} ± {spread / 2:.1f} ({maker})"
 
 
 def _matrices(measurements: Measurements | None) -> Answer:
@@ -113,20 +50,21 @@ def _matrices(measurements: Measurements | None) -> Answer:
     )
     if measurements is None:
         return Answer(question, "Not measured in this installation; see Table 3.4.")
-    as_reported, fastest = orders_that_agree(measurements)
+    held = {table: orders.facts(measurements, table)[:2] for table in orders.TIMED}
+    as_reported, fastest = ([table for table, of in held.items() if of[i].agrees] for i in range(2))
     parts = [
-        f"{task} {', '.join(_best(measurements, table, row) for row in _TIMED[table][0])}"
+        f"{task} {', '.join(orders.best(measurements, table, row) for row in orders.TIMED[table][0])}"
         for table, task in _TASKS.items()
     ]
-    slower = _ratio_of_best(measurements, "3.9", "sclerp", "dlb")
+    slower = orders.ratio_of_best(measurements, "3.9", "sclerp", "dlb")
     seconds = printed.INTERPOLATION_SECONDS
     return Answer(
         question,
         "Built without optimisation, GLM's times (of ScLERP Kenwright's) come in the printed order in "
         f"these of Tables 3.4, 3.5, 3.9 and 3.10: {_in_words(as_reported)}. Optimised, by the fastest "
-        f"implementation of each: {_in_words(fastest)}. In nanoseconds those take, for matrix, pair and dual "
-        f"quaternion (± half the range of the middle half of the runs): {'; '.join(parts)}. ScLERP takes "
-        f"{slower:.1f} times as long as DLB (printed {seconds['sclerp'] / seconds['dlb']:.1f}).",
+        f"implementation of each: {_in_words(fastest)}. Those take, for matrix, pair and dual quaternion "
+        f"(± half the range of the middle half of the runs): {'; '.join(parts)}. ScLERP takes {slower:.1f} "
+        f"times as long as DLB (printed {seconds['sclerp'] / seconds['dlb']:.1f}).",
     )
 
 
@@ -139,14 +77,6 @@ def _fact(figures: tuple[Figure, ...], number: str, key: str) -> float | None:
     return None
 
 
-def _ratio_of_best(measurements: Measurements, table: str, row: str, other: str) -> float:
-    """The time of one row to that of another, each by its fastest implementation."""
-    of_row, of_other = (
-        _nanoseconds(measurements, table, _fastest(measurements, table, each)) for each in (row, other)
-    )
-    return of_row / of_other
-
-
 def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> Answer:
     question = (
         "Dual quaternions are a natural fit for skeletal animation (chapter 5). Are they worth it over "
@@ -156,10 +86,12 @@ def _worth(measurements: Measurements | None, figures: tuple[Figure, ...]) -> An
     if measurements is None:
         sentences.append("What they cost is not measured in this installation; see Table 3.10.")
     else:
-        kernels = {name: _nanoseconds(measurements, "3.10", f"kernel_{name}") for name in ("lbs", "qv", "dq")}
+        kernels = {
+            name: orders.nanoseconds(measurements, "3.10", f"kernel_{name}") for name in ("lbs", "qv", "dq")
+        }
         over_matrix, over_pair = kernels["dq"] / kernels["lbs"], kernels["dq"] / kernels["qv"]
         one_vertex, point, chain = (
-            _ratio_of_best(measurements, table, row, matrix)
+            orders.ratio_of_best(measurements, table, row, matrix)
             for table, row, matrix in (
                 ("3.10", "dq", "lbs"),
                 ("3.5", "dual_quat", "affine"),
@@ -248,7 +180,7 @@ def _slower_methods(measurements: Measurements | None, figures: tuple[Figure, ..
     sentences = []
     if measurements is not None:
         log, linear, dlb = (
-            _nanoseconds(measurements, "3.9", f"sinew_{name}")
+            orders.nanoseconds(measurements, "3.9", f"sinew_{name}")
             for name in ("matrix_log", "matrix_linear", "dlb")
         )
         sentences.append(
@@ -260,7 +192,9 @@ def _slower_methods(measurements: Measurements | None, figures: tuple[Figure, ..
         f"{bends['matrix_log']:.1f}, with dual quaternions by {bends['sclerp']:.1f}."
     )
     if measurements is not None:
-        times = [_nanoseconds(measurements, "3.10", f"kernel_{name}") for name in ("lbs", "log", "sbs", "dq")]
+        times = [
+            orders.nanoseconds(measurements, "3.10", f"kernel_{name}") for name in ("lbs", "log", "sbs", "dq")
+        ]
         sentences.append(
             "In Sinew's kernels a vertex of three bones takes {:.1f} ns by linear matrices, {:.1f} by "
             "logarithms, {:.1f} by spherical blending and {:.1f} by dual quaternions.".format(*times)

@@ -27,6 +27,16 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Fact:
+    """What the report says that its table or figure shows, and what ours shows, with the numbers behind."""
+
+    says: str
+    ours: str
+    agrees: bool
+    values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Table:
     """A table of the report.
 
@@ -34,6 +44,7 @@ class Table:
     columns    what each of the numbers is
     tolerance  a sentence: when printed and ours agree
     decimals   digits shown after the point
+    facts      what the report concludes from it
     notes      what else there is to say
     missing    why it could not be measured here and how to, or None
     """
@@ -45,18 +56,9 @@ class Table:
     decimals: int
     rows: tuple[Row, ...] = ()
     more_columns: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
     notes: tuple[str, ...] = ()
     missing: str | None = None
-
-
-@dataclass(frozen=True)
-class Fact:
-    """What the report says that its figure shows, and what ours shows, with the numbers behind."""
-
-    says: str
-    ours: str
-    agrees: bool
-    values: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -87,9 +89,12 @@ class Answer:
 
 @dataclass(frozen=True)
 class Page:
+    """studies: the numbers of studies.py that the answers speak of."""
+
     version: str
     machine: dict[str, str]
     quick: bool
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...]
     answers: tuple[Answer, ...]
+    studies: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)

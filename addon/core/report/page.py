@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 
 from ..output import write_text
-from .model import Answer, Figure, Page, Picture, Row, Table
+from .model import Answer, Fact, Figure, Page, Picture, Row, Table
 
 TITLE = "Dual quaternions in transformation and interpolation: the report's experiments, done again"
 
@@ -61,6 +61,7 @@ def to_json(page: Page) -> str:
         "tables": {table.number: plain(table) for table in page.tables},
         "figures": {figure.number: plain(figure) for figure in page.figures},
         "answers": [asdict(answer) for answer in page.answers],
+        "studies": page.studies,
     }
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
@@ -81,7 +82,7 @@ def to_html(page: Page) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(TITLE)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>",
             f"<h1>{escape(TITLE)}</h1>",
-            "<p>Tables 3.1 to 3.10 and Figures 3.4 to 3.11 of M. Smith, <i>Applications of Dual Quaternions "
+            "<p>Tables 3.1 to 3.10 and Figures 3.3 to 3.11 of M. Smith, <i>Applications of Dual Quaternions "
             "in Three Dimensional Transformation and Interpolation</i> (University of Canterbury, 2013): "
             f"what is printed there beside what Sinew gives here. {escape(headline(page))}</p>",
             warning,
@@ -113,7 +114,8 @@ def headline(page: Page) -> str:
 def agreement(page: Page) -> tuple[int, int]:
     """How many rows and statements agree, and of how many that have something to agree with."""
     verdicts = [row.agrees for table in page.tables for row in table.rows if row.agrees is not None]
-    verdicts += [fact.agrees for figure in page.figures for fact in figure.facts]
+    facts = [table.facts for table in page.tables] + [figure.facts for figure in page.figures]
+    verdicts += [fact.agrees for of_part in facts for fact in of_part]
     return sum(verdicts), len(verdicts)
 
 
@@ -130,7 +132,7 @@ def _table(table: Table) -> str:
     head = ["", f"Printed{what}", f"Ours{what}", "Agrees", *table.more_columns, *["Why not"] * explains]
     lines.append('<div class="scroll"><table><tr>' + "".join(f"<th>{escape(h)}</th>" for h in head) + "</tr>")
     lines += [_row(table, row, explains) for row in table.rows]
-    lines.append("</table></div>")
+    lines += ["</table></div>", *_facts(table.facts)]
     lines += [f'<p class="faint">{escape(note)}</p>' for note in (table.tolerance, *table.notes)]
     return "\n".join(lines)
 
@@ -167,6 +169,16 @@ def _verdict(agrees: bool | None) -> str:
     return '<span class="yes">yes</span>' if agrees else '<span class="no">no</span>'
 
 
+def _facts(facts: tuple[Fact, ...]) -> list[str]:
+    if not facts:
+        return []
+    rows = [
+        f"<tr><td>{escape(fact.says)}</td><td>{escape(fact.ours)}</td><td>{_verdict(fact.agrees)}</td></tr>"
+        for fact in facts
+    ]
+    return ["<table><tr><th>The report</th><th>Ours</th><th>Agrees</th></tr>", *rows, "</table>"]
+
+
 def _figure(figure: Figure) -> str:
     lines = [f'<h3 id="figure-{figure.number}">Figure {figure.number}: {escape(figure.title)}</h3>']
     if figure.pictures:
@@ -175,13 +187,7 @@ def _figure(figure: Figure) -> str:
         lines += [*(_picture(picture) for picture in figure.pictures), "</div>"]
     if figure.missing is not None:
         lines.append(f'<p class="missing">{escape(figure.missing)}</p>')
-    if figure.facts:
-        lines.append("<table><tr><th>The report</th><th>Ours</th><th>Agrees</th></tr>")
-        lines += [
-            f"<tr><td>{escape(fact.says)}</td><td>{escape(fact.ours)}</td><td>{_verdict(fact.agrees)}</td></tr>"
-            for fact in figure.facts
-        ]
-        lines.append("</table>")
+    lines += _facts(figure.facts)
     lines += [f'<p class="faint">{escape(note)}</p>' for note in figure.notes]
     return "\n".join(lines)
 

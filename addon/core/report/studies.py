@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,7 @@ def _links(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
     return pairs
 
 
+@cache
 def accuracy(length: int, chains: int = CHAINS) -> dict[str, Spread]:
     """By representation: how far the end of a chain, combined in float32, is from where float64 has it, as a
     part of the chain's length."""
@@ -69,6 +71,7 @@ def _end(module: Any, links: np.ndarray) -> np.ndarray:
     return module.transform_point(whole, np.zeros(3, links.dtype))
 
 
+@cache
 def fits(sets: int = CHAINS) -> dict[str, Spread]:
     """By representation: the degrees between the true rotation of 12 points and the one that is fitted in
     float32 to them and to where they go, which is off by a hundredth of their size."""
@@ -86,6 +89,7 @@ def fits(sets: int = CHAINS) -> dict[str, Spread]:
     return found
 
 
+@cache
 def drift(length: int, chains: int = CHAINS, most: float = np.pi / 4) -> Spread:
     """How far apart DLB and ScLERP have the tip of a chain, at most over TIMES, as a part of its length. Each
     joint rotates about an axis of its own from one angle to another, both up to `most` radians."""
@@ -102,3 +106,13 @@ def drift(length: int, chains: int = CHAINS, most: float = np.pi / 4) -> Spread:
         ]
         worst = np.maximum(worst, np.linalg.norm(tips[0] - tips[1], axis=-1))
     return Spread.of(worst / length)
+
+
+def numbers() -> dict[str, dict[str, dict[str, float]]]:
+    """All of the above by "study, length" and representation or method, as report.json has them."""
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for length in LENGTHS:
+        found[f"accuracy, {length}"] = {name: asdict(spread) for name, spread in accuracy(length).items()}
+        found[f"drift, {length}"] = {"dlb": asdict(drift(length))}
+    found["fits"] = {name: asdict(spread) for name, spread in fits().items()}
+    return found

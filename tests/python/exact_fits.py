@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks at 50 digits: sinew.fit. A fit is held to what makes it the best one, with numbers that do not
+round."""
+
+import functools
+
+import exact as e
+import numpy as np
+import sinew
+from exact import Motion, exact, rounded
+from exact_cases import (
+    COUNT,
+    FLOATS,
+    LAYOUTS,
+    agree,
+    agree_motions,
+    angles,
+    cases_of,
+    directions,
+    in_layout,
+    motions,
+    quaternions,
+)
+
+POINTS, POSES = 5, 3
+LAYOUT_OF_FIT = {"kabsch": "affine", "horn": "quat_vec", "walker": "dual_quat"}
+
+
+def of_each(array, count):
+    return array.reshape(COUNT, count, *array.shape[1:])
+
+
+@functools.cache
+def point_cases():
+    """source, target [COUNT, POINTS, 3] and weights [COUNT, POINTS]: exact, noisy, far off the origin, tiny,
+    huge, of mirror images."""
+    rng = np.random.default_rng(301)
+    size = 10.0 ** np.where(np.arange(COUNT) % 5 == 1, rng.uniform(-12, 12, COUNT), 0.0)
+    source = rng.normal(size=(COUNT, POINTS, 3)) + 10.0 * rng.normal(size=(COUNT, 1, 3))
+    noise = np.choose(np.arange(COUNT) % 4, [0.0, 1e-6, 1e-2, 0.3])
+    mirror = np.where(np.arange(COUNT) % 7 == 0, -1.0, 1.0)
+    turned = np.einsum("nij,npj->npi", motions(301).affine[:, :3, :3], source * mirror[:, None, None])
+    target = (
+        turned + 5.0 * rng.normal(size=(COUNT, 1, 3)) + noise[:, None, None] * rng.normal(size=source.shape)
+    )
+    weights = rng.uniform(0.1, 1.0, (COUNT, POINTS)) * size[:, None]
+    weights[::6, 0] = 0.0
+    return source * size[:, None, None], target * size[:, None, None], weights
+
+
+@functools.cache
+def moments():
+    """Exact middles [3, COUNT] of both and the weighted sum of target source^T about them, of size 1."""
+    source, target, weights = point_cases()
+    part = e.number(weights.T)
+    part = part / part.sum(axis=0)
+    p, q = exact(source), exact(target)
+    middles = [(points * part.T[None]).sum(axis=2) for points in (p, q)]
+    p, q = p - middles[0][:, :, None], q - middles[1][:, :, None]
+    covariance = np.array(
+        [[(q[i] * p[j] * part.T).sum(axis=1) for j in range(3)] for i in range(3)], dtype=object
+    )
+    size = e.sqrt(((p * p + q * q) * part.T[None]).sum(axis=(0, 2)))
+    return *middles, covariance / size**2, size.astype(np.float64)
+
+
+def rigid(method):
+    """The least squares of all rotations: R^T C is symmetric, and no two of its eigenvalues have a sum below
+    0 (so that it is the maximum, not another point of rest); the middle goes to the middle."""
+
+    def check(_name, function):
+        source, target, weights = point_cases()
+        first, second, covariance, size = moments()
+        reach = np.abs(np.concatenate([source, target], axis=1)).max(axis=(1, 2))
+        singular = np.linalg.svd(np.moveaxis(covariance.astype(np.float64), -1, 0))[1]
+        mirrored = np.linalg.det(np.moveaxis(covariance.astype(np.float64), -1, 0)) < 0
+        gap = singular[:, 1] + np.where(mirrored, -1, 1) * singular[:, 2]
+        name = LAYOUT_OF_FIT[method]
+        for dtype in FLOATS:
+            fit = function(*(a.astype(dtype) for a in (source, target, weights)), method=method)
+            # As a mirror image's gap is a difference, rounding may leave nothing of it.
+            assert fit.is_defined[gap > 1e-3].all()
+            motion = exact_motion(fit.transforms, name)
+            rotation = e.matrix(motion.q)
+            aligned = e.matmul(np.swapaxes(rotation, 0, 1), covariance)
+            skew = np.array(
+                [aligned[2, 1] - aligned[1, 2], aligned[0, 2] - aligned[2, 0], aligned[1, 0] - aligned[0, 1]]
+            )
+            # What coordinates far from the origin round counts by their size.
+            far = reach / size
+            agree(rounded(skew).astype(dtype), np.zeros((COUNT, 3)), 1 + far)
+            symmetric = np.moveaxis(((aligned + np.swapaxes(aligned, 0, 1)) / 2).astype(np.float64), -1, 0)
+            least_two = np.linalg.eigvalsh(symmetric)[:, :2].sum(axis=1)
+            assert (least_two > -1e-5 if dtype == np.float32 else least_two > -1e-12).all()
+            moved = e.times(rotation, first) + motion.t
+            agree(rounded(moved).astype(dtype), rounded(second), reach * 4)
+            agree_error(fit, motion, dtype, far)
+            clear = np.abs(np.linalg.det(np.moveaxis(covariance.astype(np.float64), -1, 0))) > 1e-4
+            np.testing.assert_array_equal(fit.is_mirrored[clear], mirrored[clear])
+
+    return check
+
+
+def agree_error(fit, motion, dtype, far):
+    source, target, weights = point_cases()
+    part = e.number(weights.T)
+    part = part / part.sum(axis=0)
+    square = e.number(np.zeros(COUNT))
+    for k in range(POINTS):
+        off = e.rotate(motion.q, exact(source[:, k])) + motion.t - exact(target[:, k])
+        square = square + part[k] * e.dot(off, off)
+    want = e.sqrt(square).astype(np.float64)
+    agree(fit.error, want, moments()[3] * (1 + far) * 4)
+
+
+def exact_motion(array, name):
+    """The exact motion of a result, its rotation of unit length."""
+    array = np.asarray(array, np.float64)
+    if name == "affine":
+        q = sinew.affine.to_quat_vec(array)[:, :4]
+        # As near as rounding: the matrix is held to it here.
+        np.testing.assert_allclose(
+            np.moveaxis(e.matrix(e.unit(exact(q))).astype(np.float64), -1, 0),
+            array[:, :3, :3],
+            rtol=0,
+            atol=4e-7,
+        )
+        return Motion(e.unit(exact(q)), exact(array[:, :3, 3]))
+    numbers = exact(array)
+    if name == "quat_vec":
+        return Motion(e.unit(numbers[:4]), numbers[4:])
+    return e.of_dual(numbers[:4], numbers[4:])
+
+
+# --- Hand and eye
+
+
+@functools.cache
+def hand_eye_cases():
+    """x, and motions a [COUNT, POSES] with b = x^-1 a x: the axes of the first two are 30 degrees or more
+    apart."""
+    rng = np.random.default_rng(302)
+    x = motions(302).exact
+    x = Motion(x.q, exact(rng.normal(size=(COUNT, 3))))
+    count = COUNT * POSES
+    axes = directions(rng, count).reshape(COUNT, POSES, 3)
+    across = np.cross(axes[:, 0], directions(rng))
+    across = np.where(
+        np.linalg.norm(across, axis=1)[:, None] > 0.1, across, np.cross(axes[:, 0], [0.6, 0, 0.8])
+    )
+    axes[:, 1] = (
+        axes[:, 0] + rng.uniform(0.6, 3.0, (COUNT, 1)) * across / np.linalg.norm(across, axis=1)[:, None]
+    )
+    angle = rng.uniform(0.3, 2.8, count)
+    sign = rng.choice([-1.0, 1.0], (1, count))
+    a = Motion(
+        e.from_axis_angle(exact(axes.reshape(count, 3)), e.number(angle)) * e.number(sign),
+        exact(rng.normal(size=(count, 3))),
+    )
+    repeated = x.take(np.repeat(np.arange(COUNT), POSES))
+    b = e.compose(e.compose(e.inverse(repeated), a), repeated)
+    return cases_of(x), cases_of(a), cases_of(b), rng.uniform(0.1, 1.0, (COUNT, POSES))
+
+
+def hand_eye(_name, function):
+    x, a, b, weights = hand_eye_cases()
+    for name in LAYOUTS:
+        for dtype in FLOATS:
+            given = (of_each(cases.of(name, dtype), POSES) for cases in (a, b))
+            found = function(*given, weights.astype(dtype))
+            assert found.is_defined.all()
+            # Two axes 30 degrees apart and angles of 17 leave this much of the digits.
+            agree_motions(found.transforms, name, getattr(x, name), 1 + x.size, rotation=16.0, steps=512)
+            zero = np.zeros(COUNT)
+            agree(found.angle, zero, 16.0, 512)
+            agree(found.translation, zero, 16.0, 512)
+
+
+# --- Means
+
+
+@functools.cache
+def pose_cases():
+    """Motions [COUNT * POSES] about a middle, up to 0.7 radians from it, and weights."""
+    rng = np.random.default_rng(303)
+    count = COUNT * POSES
+    middle = motions(303).exact.take(np.repeat(np.arange(COUNT), POSES))
+    angle = np.minimum(angles(rng, count) / 4, 0.7)
+    step = Motion(e.unit(exact(quaternions(rng, angle))), exact(rng.normal(size=(count, 3))))
+    return cases_of(e.compose(middle, step)), rng.uniform(0.1, 1.0, (COUNT, POSES))
+
+
+def weighted_logarithms(mean, poses, part):
+    """Float64 [COUNT, 3] twice: the sum of the weighted logarithms from the mean to the poses."""
+    count = poses.q.shape[1] // COUNT
+    from_mean = e.inverse(mean.take(np.repeat(np.arange(COUNT), count)))
+    twist = e.to_twist(e.compose(from_mean, poses))
+    return [rounded((v.reshape(3, COUNT, count) * part.T[None]).sum(axis=2)) for v in twist]
+
+
+def average(_name, function):
+    poses, weights = pose_cases()
+    part = e.number(weights.T)
+    part = part / part.sum(axis=0)
+    size = of_each(poses.size, POSES).max(axis=1)
+    first = function(of_each(poses.dual_quat, POSES), weights)
+    residual = weighted_logarithms(exact_motion(first.transforms, "dual_quat"), poses.exact, part)
+    agree(residual[0], np.zeros((COUNT, 3)), 1.0)
+    agree(residual[1], np.zeros((COUNT, 3)), size)
+    means = cases_of(exact_motion(first.transforms, "dual_quat"))
+    for name in LAYOUTS:
+        for dtype in FLOATS:
+            found = function(of_each(poses.of(name, dtype), POSES), weights.astype(dtype))
+            assert found.is_defined.all()
+            assert (found.kept == 1).all()
+            agree_motions(found.transforms, name, getattr(means, name), size)
+    robust_average(function)
+
+
+def robust_average(function):
+    """Five poses that are near and two that are not: these do not count, and the mean is where the others',
+    by Tukey's biweights, cancel."""
+    rng = np.random.default_rng(304)
+    near, off = 5, 2
+    count = COUNT * (near + off)
+    is_off = np.tile(np.arange(near + off) >= near, COUNT)
+    middle = Motion(motions(304).exact.q, exact(rng.normal(size=(COUNT, 3))))
+    angle = np.where(is_off, rng.uniform(0.8, 2.0, count), rng.uniform(0.005, 0.02, count))
+    shift = directions(rng, count) * np.where(is_off, 5.0, rng.uniform(0.005, 0.02, count))[:, None]
+    step = Motion(e.unit(exact(quaternions(rng, angle))), exact(shift))
+    poses = e.compose(middle.take(np.repeat(np.arange(COUNT), near + off)), step)
+    given = in_layout(poses, "dual_quat").reshape(COUNT, near + off, 8)
+    found = function(given, robust=True)
+    assert found.is_defined.all()
+    assert not found.kept[:, near:].any()
+    part = e.number(found.kept.T)
+    residual = weighted_logarithms(
+        exact_motion(found.transforms, "dual_quat"), poses, part / part.sum(axis=0)
+    )
+    # It ends where the next step is below 1e-13.
+    agree(residual[0], np.zeros((COUNT, 3)), 1.0, 1024)
+    agree(residual[1], np.zeros((COUNT, 3)), 4.0, 1024)
+    single = function(given.astype(np.float32), robust=True)
+    assert single.is_defined.all()
+    # A median may be another pose's.
+    agree(single.kept, found.kept, 1.0, 4096)
+    agree_motions(single.transforms, "dual_quat", found.transforms, 4.0)
+
+
+# By module, function and method.
+CHECKS = {
+    **{f"fit.rigid.{method}": rigid(method) for method in LAYOUT_OF_FIT},
+    "fit.hand_eye": hand_eye,
+    "fit.average": average,
+}

@@ -1,0 +1,823 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks at 50 digits: sinew.interpolate, sinew.spline, sinew.Skeleton."""
+
+import functools
+import itertools
+
+import exact as e
+import numpy as np
+import sinew
+from exact import Motion, exact, rounded
+from exact_cases import (
+    COUNT,
+    FLOATS,
+    LAYOUTS,
+    agree,
+    agree_motions,
+    angles,
+    cases_of,
+    exact_matrix,
+    in_layout,
+    largest,
+    motions,
+    points,
+    quaternions,
+    step_of,
+    translations,
+)
+from motions import LAYOUT_OF
+
+BONES = 8
+GROUPS = COUNT // BONES
+# A result that hangs on the shorter of two ways, which are equal to about this, says that it is not defined.
+TIE = 1e-6
+
+
+def sizes(array, name):
+    """[..]: of the translations."""
+    array = np.asarray(array, np.float64)
+    if name == "affine":
+        return np.linalg.norm(array[..., :3, 3], axis=-1)
+    # The dual part is half as long as the translation.
+    return np.linalg.norm(array[..., 4:], axis=-1) * (2 if name == "dual_quat" else 1)
+
+
+def numbers_of(array, name):
+    """float64 in the layout as numbers, components first: 16, 7 or 8."""
+    array = np.asarray(array, np.float64)
+    return exact(array.reshape(*array.shape[:-2], 16) if name == "affine" else array)
+
+
+def array_of(numbers, name):
+    array = rounded(numbers)
+    return array.reshape(*array.shape[:-1], 4, 4) if name == "affine" else array
+
+
+def nearest_rotations(arrays):
+    """float64 [n, 4, 4] with the nearest rotations, and how near others are."""
+    u, s, vt = np.linalg.svd(arrays[:, :3, :3])
+    sign = np.linalg.det(u @ vt)
+    u[:, :, 2] *= sign[:, None]
+    result = arrays.copy()
+    result[:, :3, :3] = u @ vt
+    return result, s[:, 1] + sign * s[:, 2]
+
+
+def motion_of(array, name):
+    """The exact motion of unit quaternions in float64."""
+    numbers = exact(array)
+    if name == "quat_vec":
+        return Motion(numbers[:4], numbers[4:])
+    return e.of_dual(numbers[:4], numbers[4:])
+
+
+# --- Weighted sums
+
+
+def linear_blend(arrays, weights, method):
+    """float64 [n, ..] of transforms [n, k, ..] with numbers [k, n] of sum 1 for weights, signs as they are;
+    and what errors of rotations are measured by."""
+    name = LAYOUT_OF[method]
+    numbers = numbers_of(arrays, name)
+    total = (numbers * weights.T[None]).sum(axis=2)
+    ones = np.ones(len(arrays))
+    if method == "matrix_linear":
+        return array_of(total, name), ones
+    if method == "matrix_polar":
+        result, gap = nearest_rotations(array_of(total, name))
+        return result, 1 / np.maximum(gap, 1e-12)
+    size = e.length(total[:4])
+    cancels = 1 / size.astype(np.float64)
+    if method == "qv_nlerp":
+        return rounded(np.concatenate([total[:4] / size, total[4:]])), cancels
+    return in_layout(e.of_dual(total[:4], total[4:]), name), cancels
+
+
+def logarithms(arrays):
+    """(angular, linear), numbers [3, ..], of float64 affine [.., 4, 4], and |w| of the rotation."""
+    flat = arrays.reshape(-1, 4, 4)
+    quaternion = sinew_free_quaternions(flat[:, :3, :3])
+    angular, linear = e.to_twist(Motion(e.unit(quaternion), exact(flat[:, :3, 3])))
+    shape = (3, *arrays.shape[:-2])
+    return (
+        angular.reshape(shape),
+        linear.reshape(shape),
+        np.abs(quaternion[0].astype(np.float64)).reshape(shape[1:]),
+    )
+
+
+def sinew_free_quaternions(rotations):
+    """Numbers [4, n] of float64 [n, 3, 3]: the longest column of 4 q q^T, which a rotation matrix gives."""
+    m = exact_matrix(rotations)
+    (a, b, c), (d, f, g), (h, i, j) = m
+    square = np.array(
+        [
+            [1 + a + f + j, i - g, c - h, d - b],
+            [i - g, 1 + a - f - j, b + d, c + h],
+            [c - h, b + d, 1 - a + f - j, g + i],
+            [d - b, c + h, g + i, 1 - a - f + j],
+        ],
+        dtype=object,
+    )
+    diagonal = np.array([square[k, k] for k in range(4)], dtype=object)
+    longest = np.argmax(diagonal, axis=0)
+    return e.unit(square[:, longest, np.arange(len(rotations))])
+
+
+def log_blend(arrays, weights):
+    """float64 [n, 4, 4], and how near to half a turn a matrix is."""
+    angular, linear, w = logarithms(arrays)
+    motion = e.from_twist((angular * weights.T[None]).sum(axis=2), (linear * weights.T[None]).sum(axis=2))
+    return in_layout(motion, "affine"), w.min(axis=1)
+
+
+def agree_blend(got, name, want, size, cancels, where):
+    """The blend of a method whose result is known."""
+    # What cancels makes the length uncertain by which the translation of a dual quaternion is divided.
+    size = size * cancels * (cancels if name == "dual_quat" else 1.0)
+    agree_motions(got, name, want, size, rotation=cancels, where=where)
+
+
+# --- Between two
+
+
+@functools.cache
+def between_cases():
+    """Two Cases and t, [COUNT], the same for each BONES of them."""
+    rng = np.random.default_rng(101)
+    first = motions(101)
+    step = Motion(e.unit(exact(quaternions(rng, angles(rng)))), exact(translations(rng)))
+    second = cases_of(e.compose(first.exact, step))
+    t = rng.uniform(-0.25, 1.25, GROUPS)
+    t[::6], t[1::6], t[2::6] = 0.0, 1.0, 0.5
+    t[3::12] = 10.0 ** rng.uniform(-6, -2, len(t[3::12]))
+    return first, second, np.repeat(t, BONES)
+
+
+@functools.cache
+def between_wanted(method):
+    """float64 in the layout, sizes, what errors of rotations are measured by, and whether it is defined; NaN
+    near where that changes."""
+    a, b, t = between_cases()
+    name = LAYOUT_OF[method]
+    size = (a.size + b.size) * (1 + np.abs(t))
+    ones, apart = np.ones(COUNT), np.abs(e.dot(a.exact.q, b.exact.q).astype(np.float64))
+    inner = (t != 0) & (t != 1)
+    weights = np.stack([e.number(1.0) - e.number(t), e.number(t)])
+    if method.startswith("matrix"):
+        ends = np.stack([a.affine, b.affine], axis=1)
+        if method == "matrix_log":
+            want, w = log_blend(ends, weights)
+            # A matrix of weight 1 is the result, whichever logarithm it has.
+            return want, size, ones * 4, _defined(np.where(inner, w, 1.0))
+        want, cancels = linear_blend(ends, weights, method)
+        linear = method == "matrix_linear"
+        # The library's gap is twice the sum of the smaller singular values.
+        return want, size, cancels, _defined(ones if linear else 2 / cancels)
+    if method == "dib":
+        return between_wanted("sclerp")
+    if method in ("qv_slerp", "sclerp"):
+        want = _spherical(a, b, t, method)
+        return want, size, ones, _defined(np.where(inner, apart, 1.0))
+    onto = second_on_one_side(getattr(a, name), getattr(b, name), name)
+    want, cancels = linear_blend(np.stack([getattr(a, name), onto], axis=1), weights, method)
+    return want, size, cancels, _defined(np.where(inner, apart, 1.0))
+
+
+def _spherical(a, b, t, method):
+    """By logarithm and exponential, of rotations or of screws."""
+    t = e.number(t)
+    if method == "qv_slerp":
+        step = e.product(e.conjugate(a.exact.q), b.exact.q)
+        q = e.product(a.exact.q, e.from_rotation_vector(t * e.rotation_vector(step)))
+        return rounded(np.concatenate([q, (1 - t) * a.exact.t + t * b.exact.t]))
+    step = e.compose(e.inverse(a.exact), b.exact)
+    return in_layout(e.compose(a.exact, e.power(step, t)), "dual_quat")
+
+
+def _defined(margin):
+    return np.where(np.abs(margin / TIE - 1) < 0.1, np.nan, margin > TIE)
+
+
+def second_on_one_side(first, second, name):
+    flips = np.einsum("ni,ni->n", first[:, :4], second[:, :4]) < 0
+    signs = np.where(np.arange(first.shape[1]) < (8 if name == "dual_quat" else 4), -1.0, 1.0)
+    return np.where(flips[:, None], second * signs, second)
+
+
+def agree_defined(got, want, dtype):
+    """Where float32 may see it otherwise, it may say so."""
+    same = (got == want) | np.isnan(want)
+    if dtype == np.float32:
+        same |= ~np.asarray(got, bool)
+    assert same.all(), f"is_defined of case {np.argmin(same)} is {got[np.argmin(same)]}"
+
+
+def between(method):
+    def check(_name, function):
+        a, b, t = between_cases()
+        name = LAYOUT_OF[method]
+        want, size, cancels, is_defined = between_wanted(method)
+        for dtype in FLOATS:
+            got = function(a.of(name, dtype), b.of(name, dtype), t.astype(dtype), method)
+            agree_defined(got.is_defined, is_defined, dtype)
+            agree_blend(got.transforms, name, want, size, cancels, got.is_defined)
+
+    return check
+
+
+# --- Of many
+
+MANY = 3
+
+
+@functools.cache
+def blend_cases(width):
+    """Cases [COUNT * MANY] about a middle, rotated by up to `width` radians from it, and weights [COUNT,
+    MANY] of sum other than 1: none, some below 0, equal ones."""
+    rng = np.random.default_rng(int(10 * width) + 200)
+    middle = motions(102).exact.take(np.repeat(np.arange(COUNT), MANY))
+    count = COUNT * MANY
+    angle = rng.uniform(0, width, count) * np.where(np.arange(count) // MANY % 5 == 1, 1e-6, 1.0)
+    step = Motion(e.unit(exact(quaternions(rng, angle))), exact(translations(rng, count)))
+    cases = cases_of(e.compose(middle, step))
+    weights = rng.uniform(0.1, 1.0, (COUNT, MANY))
+    weights[::7, 0] = 0.0
+    weights[1::7, 1] *= -0.1
+    weights[2::7] = 1.0
+    return cases, weights * 10.0 ** rng.uniform(-3, 3, (COUNT, 1))
+
+
+def of_each(array):
+    return array.reshape(COUNT, MANY, *array.shape[1:])
+
+
+def shares(weights):
+    number = e.number(weights.T)
+    return number / number.sum(axis=0)
+
+
+def signs_by_rule(quaternions, weights, rule):
+    """[n, k] signs, and how far from a tie the choice is, by float64."""
+    signs, margin = np.ones(weights.shape), np.ones(len(weights))
+    if rule == "as_given":
+        return signs, margin
+    if rule == "heaviest":
+        pivot = quaternions[np.arange(len(weights)), np.argmax(weights, axis=1)]
+        along = np.einsum("nki,ni->nk", quaternions, pivot)
+        along = np.where(weights == 0, 1.0, along)
+        return np.where(along < 0, -1.0, 1.0), np.abs(along).min(axis=1)
+    total = np.zeros((len(weights), 4))
+    unit_weights = weights / weights.sum(axis=1, keepdims=True)
+    for k in range(weights.shape[1]):
+        along = np.einsum("ni,ni->n", total, quaternions[:, k])
+        counts = (weights[:, k] != 0) & total.any(axis=1)
+        signs[:, k] = np.where(counts & (along < 0), -1.0, 1.0)
+        margin = np.where(counts, np.minimum(margin, np.abs(along)), margin)
+        total += (signs[:, k] * unit_weights[:, k])[:, None] * quaternions[:, k]
+    return signs, margin
+
+
+RULES = ("heaviest", "running_sum", "as_given")
+
+
+def blend_of_sums(method):
+    """By each rule of signs."""
+
+    def check(_name, function):
+        name = LAYOUT_OF[method]
+        cases, weights = blend_cases(np.pi)
+        arrays, part = of_each(getattr(cases, name)), shares(weights)
+        size = largest(sizes(arrays, name)) * np.abs(part).sum(axis=0).astype(np.float64)
+        # A matrix has no sign.
+        for rule in RULES if name != "affine" else RULES[:1]:
+            aligned, margin = arrays, np.ones(COUNT)
+            if name != "affine":
+                signs, margin = signs_by_rule(arrays[..., :4], weights, rule)
+                aligned = with_signs(arrays, signs, name)
+            want, cancels = linear_blend(aligned, part, method)
+            for dtype in FLOATS:
+                got = function(arrays.astype(dtype), weights.astype(dtype), method, rule)
+                # Equal weights leave the order to decide.
+                assert got.is_defined.mean() > 0.7
+                where = got.is_defined & (margin > 100 * step_of(dtype))
+                agree_blend(got.transforms, name, want, size, cancels, where)
+
+    return check
+
+
+def with_signs(arrays, signs, name):
+    count = 8 if name == "dual_quat" else 4
+    return arrays * np.where(np.arange(arrays.shape[-1]) < count, signs[..., None], 1.0)
+
+
+def blend_of_logarithms(_name, function):
+    cases, weights = blend_cases(0.7)
+    arrays, part = of_each(cases.affine), shares(weights)
+    want, w = log_blend(arrays, part)
+    size = largest(cases.size.reshape(COUNT, MANY)) * np.abs(part).sum(axis=0).astype(np.float64)
+    for dtype in FLOATS:
+        got = function(arrays.astype(dtype), weights.astype(dtype), "matrix_log")
+        np.testing.assert_array_equal(got.is_defined[w > 2 * TIE], True)
+        agree_blend(got.transforms, "affine", want, size, np.full(COUNT, 4.0), got.is_defined)
+
+
+def blend_of_screws(method):
+    """Of n: where the weighted logarithms towards the transforms cancel (of rotations, or of screws),
+    whatever the rule of signs, as the transforms are less than half a turn apart."""
+
+    def check(_name, function):
+        name = LAYOUT_OF[method]
+        cases, weights = blend_cases(0.7)
+        part = shares(weights)
+        arrays = of_each(getattr(cases, name))
+        size = largest(cases.size.reshape(COUNT, MANY)) * np.abs(part).sum(axis=0).astype(np.float64)
+        one_side = with_signs(arrays, signs_by_rule(arrays[..., :4], weights, "heaviest")[0], name)
+        means = function(arrays, weights, method).transforms
+        if method == "dib":
+            np.testing.assert_array_equal(means, function(arrays, weights, "sclerp").transforms)
+        else:
+            agree_mean(means, name, cases.exact, part, size)
+        for dtype in FLOATS:
+            for rule, given in zip(RULES, (arrays, arrays, one_side), strict=True):
+                got = function(given.astype(dtype), weights.astype(dtype), method, rule)
+                assert got.is_defined.all()
+                agree_motions(got.transforms, name, means, size)
+
+    return check
+
+
+def agree_mean(got, name, motions_exact, part, size):
+    """`got` [n, ..]: the weighted logarithms from it to the MANY motions of each cancel."""
+    dtype = got.dtype
+    mean = motion_of(got.astype(np.float64), name)
+    unit_error = np.abs(np.linalg.norm(got[:, :4].astype(np.float64), axis=1) - 1)
+    assert unit_error.max() < 8 * step_of(dtype)
+    repeated = np.repeat(np.arange(COUNT), MANY)
+    mean_of_each = Motion(e.unit(mean.q), mean.t).take(repeated)
+    if name == "dual_quat":
+        angular, linear = e.to_twist(e.compose(e.inverse(mean_of_each), motions_exact))
+        left = residual(linear, part)
+        agree(left.astype(dtype), np.zeros((COUNT, 3)), size)
+    else:
+        step = e.product(e.conjugate(mean_of_each.q), motions_exact.q)
+        angular = e.rotation_vector(step)
+        want = rounded((motions_exact.t.reshape(3, COUNT, MANY) * part.T[None]).sum(axis=2))
+        agree(got[:, 4:], want, size)
+    assert np.linalg.norm(rounded(angular), axis=1).max() < np.pi / 2
+    agree(residual(angular, part).astype(dtype), np.zeros((COUNT, 3)), 1.0)
+
+
+def residual(vectors, part):
+    return rounded((vectors.reshape(3, COUNT, MANY) * part.T[None]).sum(axis=2))
+
+
+# --- Splines
+
+CURVES, TIMES, KEYS = 40, 50, 6
+
+
+@functools.cache
+def spline_cases():
+    """Cases [CURVES * KEYS], each key within 60 degrees of the one before; times [CURVES, KEYS] and the
+    times wanted [CURVES, TIMES], numbers of float32, the same for each BONES curves; before, at and after
+    keys, and a cut."""
+    rng = np.random.default_rng(103)
+    count = CURVES * KEYS
+    step = Motion(
+        e.unit(exact(quaternions(rng, rng.uniform(0, np.pi / 3, count)))), exact(translations(rng, count))
+    )
+    keys = [motions(104).exact.take(np.arange(CURVES))]
+    for key in range(1, KEYS):
+        keys.append(e.compose(keys[-1], step.take(np.arange(CURVES) * KEYS + key)))
+    order = (np.arange(count) % KEYS) * CURVES + np.arange(count) // KEYS
+    joined = Motion(np.concatenate([k.q for k in keys], axis=1), np.concatenate([k.t for k in keys], axis=1))
+    times = np.cumsum(rng.integers(1, 64, (CURVES // BONES, KEYS)), axis=1) / 16.0
+    times[1::2, 3] = times[1::2, 2]
+    at = np.floor(rng.uniform(times[:, :1] - 1, times[:, -1:] + 1, (CURVES // BONES, TIMES)) * 1024) / 1024
+    at[:, :KEYS] = times
+    return cases_of(joined.take(order)), np.repeat(times, BONES, axis=0), np.repeat(at, BONES, axis=0)
+
+
+@functools.cache
+def spline_terms():
+    """Indices of four keys [COUNT, 4] and their weights, numbers [4, COUNT]: of the Hermite form's two keys
+    and of what their tangents are made of."""
+    _cases, times, at = spline_cases()
+    indices = np.zeros((COUNT, 4), int)
+    weights = e.number(np.zeros((4, COUNT)))
+    for case in range(COUNT):
+        curve, moment = divmod(case, TIMES)
+        keys, of = curve_weights(times[curve], at[curve, moment])
+        indices[case] = curve * KEYS + np.array(keys)
+        weights[:, case] = of
+    return indices, weights
+
+
+def curve_weights(times, at):
+    one, none = e.number(1.0), e.number(0.0)
+    last = len(times) - 1
+    if at < times[0]:
+        return (0, 0, 0, 0), (none, one, none, none)
+    key = max(k for k in range(last + 1) if times[k] <= at)
+    if key == last:
+        return (last,) * 4, (none, one, none, none)
+    before = key - 1 if key > 0 and times[key - 1] < times[key] else key
+    beyond = key + 2 if key + 1 < last and times[key + 1] < times[key + 2] else key + 1
+    # Cardinal functions: the curve of a 1 at one key and 0 at the others.
+    weights = []
+    exact_times = [e.number(float(time)) for time in times]
+    whole = exact_times[key + 1] - exact_times[key]
+    u = (e.number(float(at)) - exact_times[key]) / whole
+
+    def curve(ones):
+        def value(k):
+            return one if k == ones else none
+
+        leave = (value("next") - value("before" if before != key else "key")) * whole
+        leave = leave / (exact_times[key + 1] - exact_times[before])
+        arrive = (value("beyond" if beyond != key + 1 else "next") - value("key")) * whole
+        arrive = arrive / (exact_times[beyond] - exact_times[key])
+        points = [value("key"), value("key") + leave / 3, value("next") - arrive / 3, value("next")]
+        while len(points) > 1:
+            points = [(1 - u) * p + u * q for p, q in itertools.pairwise(points)]
+        return points[0]
+
+    weights = [curve(name) for name in ("before", "key", "next", "beyond")]
+    return (before, key, key + 1, beyond), weights
+
+
+def on_one_side(arrays, name):
+    """[n, 4, ..]: signs along the chain, from the second key."""
+    if name == "affine":
+        return arrays
+    q = arrays[..., :4].copy()
+    signs = np.ones(arrays.shape[:2])
+    for onto, of in ((0, 1), (2, 1), (3, 2)):
+        along = np.einsum("ni,ni->n", q[:, onto], q[:, of]) * signs[:, of]
+        signs[:, onto] = np.where(along < 0, -1.0, 1.0)
+    return with_signs(arrays, signs, name)
+
+
+@functools.cache
+def spline_wanted(method):
+    """float64 [COUNT, ..], sizes and what errors of rotations are measured by; of a mean no first."""
+    name = LAYOUT_OF[method]
+    cases, _times, _at = spline_cases()
+    indices, weights = spline_terms()
+    arrays = on_one_side(getattr(cases, name)[indices], name)
+    size = largest(cases.size[indices])
+    if method == "matrix_log":
+        want, _w = log_blend(arrays, weights)
+        return want, size * 4, np.full(COUNT, 4.0)
+    if method in ("qv_slerp", "sclerp", "dib"):
+        return None, size, np.ones(COUNT)
+    want, cancels = linear_blend(arrays, weights, method)
+    return want, size, cancels
+
+
+def agree_spline(got, is_defined, method):
+    name = LAYOUT_OF[method]
+    want, size, cancels = spline_wanted(method)
+    if method != "matrix_log":
+        assert is_defined.all()
+    if want is not None:
+        agree_blend(got, name, want, size, cancels, is_defined)
+    elif got.dtype == np.float32:
+        agree_motions(got, name, of_curves(method, np.float64)[0], size)
+    elif method == "dib":
+        np.testing.assert_array_equal(got, of_curves("sclerp", np.float64)[0])
+    else:
+        cases, _times, _at = spline_cases()
+        agree_spline_mean(got, name, cases.exact, *spline_terms(), size)
+
+
+def agree_spline_mean(got, name, keys, indices, weights, size):
+    mean = motion_of(got.astype(np.float64), name)
+    mean = Motion(e.unit(mean.q), mean.t)
+    dtype = got.dtype
+    angular_sum, linear_sum = e.number(np.zeros((3, COUNT))), e.number(np.zeros((3, COUNT)))
+    for k in range(4):
+        key = keys.take(indices[:, k])
+        if name == "dual_quat":
+            angular, linear = e.to_twist(e.compose(e.inverse(mean), key))
+        else:
+            angular = e.rotation_vector(e.product(e.conjugate(mean.q), key.q))
+            linear = key.t - mean.t
+        angular_sum = angular_sum + weights[k] * angular
+        linear_sum = linear_sum + weights[k] * linear
+    agree(rounded(angular_sum).astype(dtype), np.zeros((COUNT, 3)), 1.0)
+    agree(rounded(linear_sum).astype(dtype), np.zeros((COUNT, 3)), size)
+
+
+@functools.cache
+def of_curves(method, dtype):
+    """(transforms, is_defined) of every case, curve after curve."""
+    cases, times, at = spline_cases()
+    keys = cases.of(LAYOUT_OF[method], dtype)
+    keys = keys.reshape(CURVES, KEYS, *keys.shape[1:])
+    found = [
+        sinew.spline.catmull_rom(keys[c], times[c].astype(dtype), at[c].astype(dtype), method)
+        for c in range(CURVES)
+    ]
+    return tuple(np.concatenate(part) for part in zip(*found, strict=True))
+
+
+def catmull_rom(method):
+    def check(_name, _function):
+        for dtype in FLOATS:
+            agree_spline(*of_curves(method, dtype), method)
+
+    return check
+
+
+@functools.cache
+def vector_wanted(name):
+    """float64 [COUNT, ..]: components blended, of points, too."""
+    cases, _times, _at = spline_cases()
+    indices, weights = spline_terms()
+    if name == "points":
+        arrays = points(105)[indices]
+        return rounded((exact(arrays) * weights.T[None]).sum(axis=2)), largest(arrays)
+    arrays = on_one_side(getattr(cases, name)[indices], name)
+    want = array_of((numbers_of(arrays, name) * weights.T[None]).sum(axis=2), name)
+    return want, largest(cases.size[indices])
+
+
+def catmull_rom_vector(_name, function):
+    cases, times, at = spline_cases()
+    for name in (*LAYOUTS, "points"):
+        keys = points(105)[: CURVES * KEYS] if name == "points" else getattr(cases, name)
+        keys = keys.reshape(CURVES, KEYS, *keys.shape[1:])
+        want, size = vector_wanted(name)
+        for dtype in FLOATS:
+            found = [
+                function(keys[c].astype(dtype), times[c].astype(dtype), at[c].astype(dtype))
+                for c in range(CURVES)
+            ]
+            assert all(one.is_defined.all() for one in found)
+            got = np.concatenate([one.transforms for one in found])
+            if name == "points":
+                agree(got, want, size)
+            else:
+                agree_motions(got, name, want, size, signed=True)
+
+
+def interval(times, at):
+    """Key, next and the part that is over, of each time wanted; the same key twice outside."""
+    last = len(times) - 1
+    found = []
+    for moment in at:
+        inside = [k for k in range(last + 1) if times[k] <= moment]
+        if not inside or inside[-1] == last:
+            key = inside[-1] if inside else 0
+            found.append((key, key, 0.0, 0.0))
+            continue
+        key = inside[-1]
+        found.append((key, key + 1, times[key], times[key + 1]))
+    return found
+
+
+@functools.cache
+def hermite_terms():
+    """Indices [COUNT, 2], the part of the interval and its length, numbers [COUNT]."""
+    _cases, times, at = spline_cases()
+    ends, part, span = np.zeros((COUNT, 2), int), e.number(np.zeros(COUNT)), e.number(np.zeros(COUNT))
+    for curve in range(CURVES):
+        for moment, (key, onto, start, stop) in enumerate(interval(times[curve], at[curve])):
+            case = curve * TIMES + moment
+            ends[case] = curve * KEYS + key, curve * KEYS + onto
+            span[case] = e.number(stop) - e.number(start)
+            if key != onto:
+                part[case] = (e.number(float(at[curve, moment])) - e.number(start)) / span[case]
+    return ends, part, span
+
+
+def hermite(_name, function):
+    _hermite_of_points(function)
+    _hermite_of_motions(function)
+
+
+def _hermite_of_points(function):
+    _cases, times, at = spline_cases()
+    ends, u, span = hermite_terms()
+    keys, tangents = points(105)[: CURVES * KEYS], points(106)[: CURVES * KEYS]
+    p, q = exact(keys[ends[:, 0]]), exact(keys[ends[:, 1]])
+    leave, arrive = exact(tangents[ends[:, 0]]) * span, exact(tangents[ends[:, 1]]) * span
+    # Smith 2013, section 2.3.2, in powers of u.
+    want = rounded(
+        (2 * u**3 - 3 * u**2 + 1) * p
+        + (u**3 - 2 * u**2 + u) * leave
+        + (3 * u**2 - 2 * u**3) * q
+        + (u**3 - u**2) * arrive
+    )
+    size = largest(keys[ends]) + largest(tangents[ends]) * span.astype(np.float64)
+    for dtype in FLOATS:
+        agree(_of_curves(function, keys, tangents, times, at, dtype), want, size)
+
+
+def _of_curves(function, keys, tangents, times, at, dtype):
+    found = []
+    for c in range(CURVES):
+        of = slice(c * KEYS, (c + 1) * KEYS)
+        found.append(
+            function(
+                keys[of].astype(dtype),
+                tangents[of].astype(dtype),
+                times[c].astype(dtype),
+                at[c].astype(dtype),
+            )
+        )
+    assert all(one.is_defined.all() for one in found)
+    return np.concatenate([one.transforms for one in found])
+
+
+def _hermite_of_motions(function):
+    cases, times, at = spline_cases()
+    ends, u, span = hermite_terms()
+    rng = np.random.default_rng(107)
+    count = CURVES * KEYS
+    tangents = np.column_stack([0.2 * rng.normal(size=(count, 3)), translations(rng, count)])
+    third = span / 3
+
+    def velocity(end, factor):
+        v = exact(tangents[ends[:, end]])
+        return e.from_twist(v[:3] * factor, v[3:] * factor)
+
+    first, last = cases.exact.take(ends[:, 0]), cases.exact.take(ends[:, 1])
+    points_of_curve = [
+        first,
+        e.compose(first, velocity(0, third)),
+        e.compose(last, velocity(1, -third)),
+        last,
+    ]
+    while len(points_of_curve) > 1:
+        points_of_curve = [
+            e.compose(a, e.power(e.compose(e.inverse(a), b), u))
+            for a, b in itertools.pairwise(points_of_curve)
+        ]
+    want = in_layout(points_of_curve[0], "dual_quat")
+    size = largest(cases.size[ends]) + largest(tangents[ends][..., 3:]) * span.astype(np.float64)
+    for dtype in FLOATS:
+        got = _of_curves(function, cases.dual_quat, tangents, times, at, dtype)
+        agree_motions(got, "dual_quat", want, size)
+
+
+# --- Skeletons
+
+
+@functools.cache
+def skeletons():
+    """int32 [GROUPS, BONES]: parents."""
+    rng = np.random.default_rng(108)
+    parents = rng.integers(-1, np.arange(1, BONES + 1) - 1, (GROUPS, BONES), endpoint=False)
+    parents[:, 0] = -1
+    return parents.astype(np.int32)
+
+
+@functools.cache
+def relative_wanted(has_changed):
+    """Exact motions relative to the root [COUNT], the root's as the last GROUPS; and sizes. Changed: bone
+    2's."""
+    cases, roots = motions(109), motions(110).exact.take(np.arange(GROUPS))
+    own = motions(111).exact if has_changed else cases.exact
+    at = np.arange(GROUPS) * BONES
+    found = []
+    for bone in range(BONES):
+        before = [roots.q.copy(), roots.t.copy()]
+        for other in range(bone):
+            is_parent = skeletons()[:, bone] == other
+            before[0] = np.where(is_parent, found[other].q, before[0])
+            before[1] = np.where(is_parent, found[other].t, before[1])
+        source = own if has_changed and bone == 2 else cases.exact
+        found.append(e.compose(Motion(*before), source.take(at + bone)))
+    motion = Motion(
+        *(np.stack(part, axis=2).reshape(len(part[0]), COUNT) for part in zip(*found, strict=True))
+    )
+    size = (
+        cases.size.reshape(GROUPS, BONES).sum(axis=1) + motions(110).size[:GROUPS] + motions(111).size[at + 2]
+    )
+    return motion, np.repeat(size, BONES)
+
+
+def of_groups(cases, name, dtype):
+    array = cases.of(name, dtype)
+    return array.reshape(GROUPS, BONES, *array.shape[1:])
+
+
+def root_relative(_name, _function):
+    for name in LAYOUTS:
+        motion, size = relative_wanted(False)
+        want = in_layout(motion, name)
+        for dtype in FLOATS:
+            bones, roots = of_groups(motions(109), name, dtype), motions(110).of(name, dtype)
+            got = [sinew.Skeleton(skeletons()[g]).root_relative(bones[g], roots[g]) for g in range(GROUPS)]
+            agree_motions(np.concatenate(got), name, want, size, signed=True)
+
+
+def update_branch(_name, _function):
+    for name in LAYOUTS:
+        motion, size = relative_wanted(True)
+        want = in_layout(motion, name)
+        for dtype in FLOATS:
+            bones, roots = of_groups(motions(109), name, dtype), motions(110).of(name, dtype)
+            changed = bones.copy()
+            changed[:, 2] = of_groups(motions(111), name, dtype)[:, 2]
+            got = []
+            for g in range(GROUPS):
+                skeleton = sinew.Skeleton(skeletons()[g])
+                before = skeleton.root_relative(bones[g], roots[g])
+                got.append(skeleton.update_branch(before, changed[g], 2, roots[g]))
+                below = [2]
+                below += [b for b in range(3, BONES) if _is_below(skeletons()[g], b)]
+                others = np.setdiff1d(np.arange(BONES), below)
+                np.testing.assert_array_equal(got[-1][others], before[others])
+            agree_motions(np.concatenate(got), name, want, size, signed=True)
+
+
+def _is_below(parents, bone):
+    while bone > 2:
+        bone = parents[bone]
+    return bone == 2
+
+
+def skeleton_interpolate(_name, _function):
+    a, b, t = between_cases()
+    for method in sinew.interpolate.METHODS:
+        name = LAYOUT_OF[method]
+        want, size, cancels, _is_defined = between_wanted(method)
+        for dtype in FLOATS:
+            first, second = of_groups(a, name, dtype), of_groups(b, name, dtype)
+            one = sinew.interpolate.between(a.of(name, dtype), b.of(name, dtype), t.astype(dtype), method)
+            got = []
+            for g in range(GROUPS):
+                skeleton = sinew.Skeleton(skeletons()[g])
+                bones, defined = skeleton.interpolate(first[g], second[g], dtype(t[g * BONES]), method)
+                assert bool(defined) == one.is_defined.reshape(GROUPS, BONES)[g].all()
+                got.append(bones)
+            agree_blend(np.concatenate(got), name, want, size, cancels, one.is_defined)
+
+
+def _skeleton_curves(name, dtype, run):
+    """[COUNT, ..] in the order of spline_wanted(): run(skeleton, keyframes, times, at) of BONES curves at
+    once."""
+    cases, times, at = spline_cases()
+    keys = getattr(cases, name)
+    keys = keys.reshape(CURVES // BONES, BONES, KEYS, *keys.shape[1:]).swapaxes(1, 2)
+    found, defined = [], []
+    for g in range(CURVES // BONES):
+        skeleton = sinew.Skeleton(skeletons()[g])
+        bones, is_defined = run(
+            skeleton, keys[g].astype(dtype), times[g * BONES].astype(dtype), at[g * BONES].astype(dtype)
+        )
+        found.append(np.swapaxes(bones, 0, 1))
+        defined.append(np.repeat(is_defined[None], BONES, axis=0))
+    got = np.concatenate(found)
+    return got.reshape(COUNT, *got.shape[2:]), np.concatenate(defined).reshape(COUNT)
+
+
+def skeleton_spline(_name, _function):
+    for method in sinew.interpolate.METHODS:
+        for dtype in FLOATS:
+            got, defined = _skeleton_curves(
+                LAYOUT_OF[method],
+                dtype,
+                lambda skeleton, keys, times, at, method=method: skeleton.spline(keys, times, at, method),
+            )
+            # Held to 50 digits above.
+            bones, is_defined = of_curves(method, dtype)
+            np.testing.assert_array_equal(got, bones)
+            of_bones = is_defined.reshape(CURVES // BONES, BONES, TIMES).all(axis=1)
+            np.testing.assert_array_equal(defined, np.repeat(of_bones[:, None], BONES, axis=1).reshape(COUNT))
+
+
+def skeleton_spline_vector(_name, _function):
+    for name in LAYOUTS:
+        want, size = vector_wanted(name)
+        for dtype in FLOATS:
+            got, defined = _skeleton_curves(
+                name, dtype, lambda skeleton, keys, times, at: skeleton.spline_vector(keys, times, at)
+            )
+            assert defined.all()
+            agree_motions(got, name, want, size, signed=True)
+
+
+BLENDS = {
+    "matrix_log": blend_of_logarithms,
+    **{method: blend_of_sums(method) for method in ("matrix_linear", "matrix_polar", "qv_nlerp", "dlb")},
+    **{method: blend_of_screws(method) for method in ("qv_slerp", "sclerp", "dib")},
+}
+
+# By module, function and method.
+CHECKS = {
+    **{f"interpolate.between.{method}": between(method) for method in LAYOUT_OF},
+    **{f"interpolate.blend.{method}": BLENDS[method] for method in LAYOUT_OF},
+    **{f"spline.catmull_rom.{method}": catmull_rom(method) for method in LAYOUT_OF},
+    "spline.catmull_rom_vector": catmull_rom_vector,
+    "spline.hermite": hermite,
+    "Skeleton.root_relative": root_relative,
+    "Skeleton.update_branch": update_branch,
+    "Skeleton.interpolate": skeleton_interpolate,
+    "Skeleton.spline": skeleton_spline,
+    "Skeleton.spline_vector": skeleton_spline_vector,
+}

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every public function of the mathematics, 2,000 seeded cases each with edges among them, against 50 digits
+(mpmath): float64 to 1e-14 and float32 to 1e-5 of what is added up, but where a check says why it allows more.
+
+Rounding of the input counts as the function's: results are compared with those of the input before it was
+rounded. Edges are rotations by nothing, by next to nothing, by half a turn and next to it, both signs of
+quaternions, and translations of nothing, 1e-25 and 1e12.
+"""
+
+import inspect
+
+import exact_fits
+import exact_interpolation
+import exact_transforms
+import numpy as np
+import pytest
+import sinew
+
+MODULES = ("affine", "quat_vec", "dual_quat", "quat", "dual", "interpolate", "spline", "fit")
+METHODS = {
+    "interpolate.between": sinew.interpolate.METHODS,
+    "interpolate.blend": sinew.interpolate.METHODS,
+    "spline.catmull_rom": sinew.interpolate.METHODS,
+    "fit.rigid": sinew.fit.METHODS,
+}
+CHECKS = {**exact_transforms.CHECKS, **exact_interpolation.CHECKS, **exact_fits.CHECKS}
+
+
+def public_functions():
+    """By "module.function": what these modules and Skeleton offer."""
+    found = {
+        f"{module}.{name}": getattr(getattr(sinew, module), name)
+        for module in MODULES
+        for name in getattr(sinew, module).__all__
+    }
+    found |= {f"Skeleton.{name}": method for name, method in vars(sinew.Skeleton).items() if name[0] != "_"}
+    return {name: what for name, what in found.items() if inspect.isroutine(what)}
+
+
+FUNCTIONS = public_functions()
+
+
+def names():
+    """With the method, of functions that have several."""
+    return [
+        f"{name}.{method}" if method else name for name in FUNCTIONS for method in METHODS.get(name, ("",))
+    ]
+
+
+def test_the_functions_are_found():
+    assert {"dual_quat.power", "quat.slerp", "Skeleton.spline", "fit.hand_eye"} <= FUNCTIONS.keys()
+    assert "interpolate.METHODS" not in FUNCTIONS
+    assert len(names()) > 110
+
+
+def test_no_check_is_left_over():
+    assert CHECKS.keys() == set(names())
+
+
+@pytest.mark.parametrize("name", names())
+def test_agrees_with_50_digits(name):
+    assert name in CHECKS, f"{name} has no oracle: add its check to CHECKS of one of exact_*.py"
+    module, function = name.split(".")[:2]
+    CHECKS[name](module, FUNCTIONS[f"{module}.{function}"])
+
+
+def test_a_result_that_is_off_is_found():
+    cases = exact_transforms.motions(5)
+    off = cases.quat_vec.copy()
+    off[1234, 2] += 1e-13
+    check = exact_transforms.REPRESENTATIONS["to_quat_vec"]
+    check("affine", lambda a: cases.quat_vec.astype(a.dtype))
+    with pytest.raises(AssertionError, match="float64, case 1234"):
+        check("affine", lambda a: off.astype(a.dtype))
+    with pytest.raises(AssertionError, match="float32"):
+        check("affine", lambda a: (cases.quat_vec * (1 + 1e-5 * (a.dtype == np.float32))).astype(a.dtype))
