@@ -703,6 +703,18 @@ TEXTS = {
         "{name}: {count} Hilfsknochen; Fehler im Mittel {rms} {unit}, höchstens {worst} ({shares} der "
         "Diagonale); lineares Überblenden hatte {rms_before} und {worst_before}"
     ),
+    "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; linear blending has "
+    "{rms_before} and {worst_before}": (
+        "In anderen Posen, aus denen sie nicht gemacht wurden: im Mittel {rms} {unit}, höchstens {worst}; "
+        "lineares Überblenden hat {rms_before} und {worst_before}"
+    ),
+    "What moves helper bones": "Was Hilfsknochen bewegt",
+    "Plain keys over these frames, the nearest that there are: for engines": (
+        "Schlüsselbilder über diese Einzelbilder, so nah es geht: für Spiele"
+    ),
+    "Constraints by which they follow the pose: other animation has them, too": (
+        "Beschränkungen, durch die sie der Pose folgen: auch andere Animation hat sie"
+    ),
     "Sinew bakes": "Sinew backt",
     "Bake stopped; nothing was written": "Backen angehalten; nichts wurde geschrieben",
     # glTF
