@@ -708,6 +708,9 @@ TEXTS = {
         "In anderen Posen, aus denen sie nicht gemacht wurden: im Mittel {rms} {unit}, höchstens {worst}; "
         "lineares Überblenden hat {rms_before} und {worst_before}"
     ),
+    "Motion": "Bewegung",
+    "Keys": "Schlüsselbilder",
+    "Pose": "Pose",
     "What moves helper bones": "Was Hilfsknochen bewegt",
     "Plain keys over these frames, the nearest that there are: for engines": (
         "Schlüsselbilder über diese Einzelbilder, so nah es geht: für Spiele"
