@@ -14,7 +14,8 @@ LEAST_LENGTH = 1e-6
 
 
 def text(scene: bpy.types.Scene, unit: str, value: float, signed: bool = False) -> str:
-    """A value whose unit is "length", "ratio" or "share", as in Metric; "not defined" for NaN.
+    """A value whose unit is "length", "ratio" or "share", as in Metric, or "area" or "volume"; "not defined" for
+    NaN.
 
     signed  with a plus above zero, as for a change
     """
@@ -23,7 +24,23 @@ def text(scene: bpy.types.Scene, unit: str, value: float, signed: bool = False) 
     sign = "+" if signed and value > 0.0 else ""
     if unit == "length":
         return sign + _length(scene.unit_settings, value)
+    if unit in _DIMENSIONS:
+        return _power_of_length(scene.unit_settings, unit, value)
     return f"{value:.2f}\u00d7" if unit == "ratio" else f"{sign}{100 * value:.3g} %"
+
+
+_DIMENSIONS = {"area": 2, "volume": 3}
+
+
+def _power_of_length(settings: bpy.types.UnitSettings, unit: str, value: float) -> str:
+    chosen, power = addon_preferences.value("units", default=OF_SCENE), _DIMENSIONS[unit]
+    if chosen == NONE or settings.system == "NONE":
+        return f"{value:.3g}"
+    value *= settings.scale_length**power
+    if settings.system == "METRIC":
+        # Blender would have thousands of cubic centimetres.
+        return f"{value:.3g} m{'²³'[power - 2]}"
+    return bpy.utils.units.to_string(settings.system, unit.upper(), value, precision=3)
 
 
 def _length(settings: bpy.types.UnitSettings, value: float) -> str:

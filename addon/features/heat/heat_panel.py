@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ...attach import properties
@@ -57,34 +59,52 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
         if subject is None:
             draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")
             return
+        other = live.measured_under_other(subject, settings.other, depsgraph)
+        shown = {properties.of(obj).method for obj, _skinned in pairs}
+        heads = ["", "At Rest", shown.pop() if len(shown) == 1 else "Shown"]
+        if other is not None:
+            heads.append("Armature" if settings.other == properties.BLENDER else settings.other)
         column = self.layout.column(align=True)
-        for name, value in rows(context.scene, subject.measured):
-            split = column.split(factor=0.42)
-            split.label(text=name)
-            split.label(text=value)
+        _draw_row(column, heads)
+        for row in rows(context.scene, subject.measured, other):
+            _draw_row(column, row)
         column = self.layout.column(align=True)
-        column.label(text="Distance is to")
+        column.label(text="Compared with")
         column.prop(settings, "other", text="")
 
 
-def rows(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
-    """What each number is and its value with its unit, of one frame."""
+def _draw_row(layout: bpy.types.UILayout, texts: Sequence[str]) -> None:
+    split = layout.split(factor=0.34)
+    split.label(text=texts[0])
+    values = split.row()
+    for text in texts[1:]:
+        values.label(text=text)
 
-    def entry(unit: str, name: str, signed: bool = False) -> str:
-        return units.text(scene, unit, measured.entry(name), signed)
 
-    def between(low: str, high: str) -> str:
-        return tr("{low} to {high}", low=low, high=high)
+def rows(scene: bpy.types.Scene, measured: Measured, other: Measured | None) -> list[tuple[str, ...]]:
+    """What each number is, and its values with their units in one frame: at rest, of the shape that is shown
+    and, where it is given, of the other method's. A distance is between these two."""
 
+    def row(label: str, name: str, unit: str, at_rest: str, signed: bool = False) -> tuple[str, ...]:
+        shapes = [measured] if other is None else [measured, other]
+        return label, at_rest, *(units.text(scene, unit, each.entry(name), signed) for each in shapes)
+
+    def between(label: str, name: str) -> tuple[str, ...]:
+        return label, "", units.text(scene, "length", measured.entry(name)), *([""] * (other is not None))
+
+    flipped = [measured] if other is None else [measured, other]
+    none = units.text(scene, "length", 0.0)
     return [
-        ("Volume", entry("share", "volume_change", signed=True)),
-        ("Area", entry("share", "area_change", signed=True)),
-        ("Stretch", between(entry("ratio", "stretch_min"), entry("ratio", "stretch_max"))),
-        ("Stretch, RMS", entry("share", "stretch_rms")),
-        ("Flipped faces", f"{measured.entry('flipped_faces'):,}"),
-        ("Bulge", between(entry("length", "bulge_min"), entry("length", "bulge_max", signed=True))),
-        ("Distance", tr("at most {value}", value=entry("length", "distance_max"))),
-        ("Distance, RMS", entry("length", "distance_rms")),
+        row("Volume", "volume_change", "share", units.text(scene, "volume", measured.rest.volume), True),
+        row("Area", "area_change", "share", units.text(scene, "area", measured.rest.area), True),
+        row("Least stretch", "stretch_min", "ratio", units.text(scene, "ratio", 1.0)),
+        row("Most stretch", "stretch_max", "ratio", units.text(scene, "ratio", 1.0)),
+        row("Stretch, RMS", "stretch_rms", "share", units.text(scene, "share", 0.0)),
+        ("Flipped faces", "0", *(f"{each.entry('flipped_faces'):,}" for each in flipped)),
+        row("Collapse", "bulge_min", "length", none),
+        row("Bulge", "bulge_max", "length", none, True),
+        between("Distance, most", "distance_max"),
+        between("Distance, RMS", "distance_rms"),
     ]
 
 
