@@ -271,3 +271,26 @@ def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
     moved = {curve.data_path for curve in all_curves if "Helper_" in curve.data_path}
     assert len(all_curves) == curves + 7 * len(moved) // 2
     assert all(len(c.keyframe_points) == len(FRAMES) for c in all_curves if "Helper_" in c.data_path)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm, tmp_path, moving):
+    """As where the armature moves against the mesh; where it takes the mesh along, they are baked."""
+    obj, _path = arm
+    rig = obj.modifiers["Armature"].object
+    obj.vertex_groups.clear()
+    obj.modifiers["Armature"].use_bone_envelopes = True
+    for offset, frame in ((0.0, 1), (1.5, 11)):
+        rig.location.x = offset
+        rig.keyframe_insert("location", frame=frame)
+    if not moving:
+        obj.parent = rig
+    scenes.add_sinew(obj, METHOD)
+    started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False)
+    if moving:
+        with pytest.raises(SinewError, match="envelopes of its bones reach other vertices"):
+            list(started.sample())
+        return
+    list(started.sample())
+    (report,) = started.reports
+    assert report.after.rms < 0.5 * report.before.rms

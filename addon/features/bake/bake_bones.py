@@ -31,6 +31,8 @@ from .take_off import take_off
 
 # Of the time that a bake takes, until the frames are read.
 _SAMPLING = 0.2
+# Weights of envelopes, which are computed anew at each frame, are the same to this.
+_SAME_WEIGHT = 1e-3
 # Random poses that helper bones are made from, beside the frames, and others that they are tried with.
 _POSES, _UNSEEN_POSES = 64, 32
 
@@ -121,9 +123,11 @@ class _Rig:
         for state, frame in zip(states, frames, strict=True):
             targets.append(transformed(state.points, frame.bones_from_model))
             rest.append(transformed(state.shown.rest_points, frame.bones_from_model))
-        if not self._poses:
-            self._bones = bindings[0].bones
-            self._influences = [b.weighting.influences(p) for b, p in zip(bindings, rest, strict=True)]
+        influences = [b.weighting.influences(p) for b, p in zip(bindings, rest, strict=True)]
+        if self._poses:
+            self._check_same(influences)
+        else:
+            self._bones, self._influences = bindings[0].bones, influences
             scale = np.array(self.rig.matrix_world, dtype=np.float64)[:3, :3]
             self._unit = float(np.cbrt(abs(np.linalg.det(scale))))
             self._stacks = [state.bound.skin_stack.another() for state in states]
@@ -145,6 +149,15 @@ class _Rig:
         ]
         values = [state.shown.stage_values for state in states]
         self._shapes.append(list(zip(points, frames, values, strict=True)))
+
+    def _check_same(self, influences: list[Influences]) -> None:
+        """Raises SinewError where others move vertices than at the first frame."""
+        for obj, own, first in zip(self.meshes, influences, self._influences, strict=True):
+            if own is not first and own.distance_from(first) > _SAME_WEIGHT:
+                raise SinewError(
+                    f"{obj.name}: the envelopes of its bones reach other vertices from frame to frame; bake to "
+                    "mdd or pc2"
+                )
 
     def solve(self, options: HelperOptions) -> Generator[float, None, None]:
         at_frames = self._motion(self._rest, self._targets, self._poses)
