@@ -70,7 +70,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Errors:
-    """Over all vertices with weights and all frames, in scene units."""
+    """Over all vertices and frames, in scene units."""
 
     rms: float
     worst: float
@@ -291,7 +291,7 @@ class Helper:
 
 @dataclass
 class Solver:
-    """Vertices here are those with weights.
+    """Vertices here are those with weights; only errors are of all.
 
     targets   float32 [vertices, frames * 3]
     residual  float32 [vertices, frames * 3]: what the present blend lacks of being 0
@@ -313,14 +313,28 @@ class Solver:
         self.targets = np.ascontiguousarray(self.motion.targets[:, self.deformed].transpose(1, 0, 2))
         self.targets = self.targets.reshape(len(self.deformed), 3 * frames)
         self.middle = self.rest.mean(axis=1)
+        # Of vertices without weights, which stay at rest whatever the bones do.
+        still = np.ones(len(influences.counts), dtype=bool)
+        still[self.deformed] = False
+        self.still = np.flatnonzero(still)
+        apart = np.square(self.motion.rest[:, still] - self.motion.targets[:, still].astype(np.float64))
+        self.still_squares = apart.sum(axis=2).T
         self.bones, self.weights = self.own, self.own_weights
         self.residual = self._residual_of(self.bones, self.weights)
 
     def errors(self) -> Errors:
-        if not len(self.residual):
-            return Errors(0.0, 0.0)
         squares = np.square(self.residual).reshape(-1, 3).sum(axis=1)
+        squares = np.concatenate([squares, self.still_squares.ravel()])
+        if not len(squares):
+            return Errors(0.0, 0.0)
         return Errors(float(np.sqrt(squares.mean(dtype=np.float64))), float(np.sqrt(squares.max())))
+
+    def errors_of_vertices(self) -> np.ndarray:
+        """float32 [vertices], rms over all frames"""
+        squares = np.zeros(len(self.motion.influences.counts))
+        squares[self.deformed] = np.square(self.residual).sum(axis=1)
+        squares[self.still] = self.still_squares.sum(axis=1)
+        return np.sqrt(squares / max(len(self.motion.targets), 1)).astype(np.float32)
 
     def refine(self) -> Generator[float, None, None]:
         """Motions and weights in turns, until little is gained; how much is done, 0 to 1.
@@ -555,8 +569,6 @@ class Solver:
         bones[self.deformed, slots] = np.where(self.bones >= 0, numbers[self.bones], -1)
         weights[self.deformed, slots] = self.weights
         frames = len(self.motion.targets)
-        errors = np.zeros(vertices, dtype=np.float32)
-        errors[self.deformed] = np.sqrt(np.square(self.residual).sum(axis=1) / max(frames, 1))
         return Solution(
             np.array([helper.motion for helper in helpers]).reshape(-1, frames, 3, 4).swapaxes(0, 1),
             np.array([helper.parent for helper in helpers], dtype=int),
@@ -565,7 +577,7 @@ class Solver:
             weights,
             before,
             self.errors(),
-            errors,
+            self.errors_of_vertices(),
             tuple(helper.blend for helper in helpers if helper.blend is not None),
         )
 

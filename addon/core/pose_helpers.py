@@ -66,11 +66,7 @@ class _PoseSolver(Solver):
         ]
         self.bones, self.weights = solution.bones[self.deformed], solution.weights[self.deformed]
         self.residual = self._residual_of(self.bones, self.weights)
-        errors = np.zeros(len(self.motion.influences.counts), dtype=np.float32)
-        errors[self.deformed] = np.sqrt(
-            np.square(self.residual).sum(axis=1) / max(len(self.motion.targets), 1)
-        )
-        return self.errors(), errors
+        return self.errors(), self.errors_of_vertices()
 
     def _blended(self, blend: Blend) -> np.ndarray:
         """float64 [frames, 3, 4]"""

@@ -645,6 +645,15 @@ TEXTS = {
         "{name}: {key} ist da und stummgeschaltet; der Skelettmodifikator liegt ohne ihn {before} daneben, "
         "mit ihm {after}"
     ),
+    # Lesson
+    "Open the Lesson": "Die Lektion öffnen",
+    "Sinew Lesson": "Sinew-Lektion",
+    "Open a file with an arm, a hand and a page that shows in ten minutes what Sinew does": (
+        "Eine Datei mit einem Arm, einer Hand und einer Seite öffnen, die in zehn Minuten zeigt, was Sinew tut"
+    ),
+    "Save this file first: the lesson takes its place": (
+        "Erst diese Datei speichern: die Lektion tritt an ihre Stelle"
+    ),
     # Bake
     "Baked {names}": "Gebacken: {names}",
     "Bake": "Backen",
