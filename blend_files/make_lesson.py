@@ -3,8 +3,8 @@
 
     python blend_files/make_lesson.py [--out FILE]
 
-needs `bpy` 4.2 as a module, as later versions save files that 4.2 may not open. The arm and the hand are those of
-elbow.blend and wrist.blend; nothing of Sinew is in the file: the lesson is to add it.
+needs `bpy` 4.2 as a module, as later versions save files that 4.2 may not open. The arm and the hand are
+those of elbow.blend and wrist.blend; nothing of Sinew is in the file: the lesson is to add it.
 """
 
 import argparse
@@ -24,31 +24,36 @@ A LESSON IN SINEW, in ten minutes
 Ctrl Z takes each click back. This file has no name yet: save it under one of your own.
 
 1  LOOK
-Press Space to play, and Esc to end. At frame 16 the wrist is pinched and the elbow flat: the Armature modifier blends the bones' matrices linearly.
+Press Space to play, and Esc to end. At frame 16 the wrist is pinched and the elbow flat: the Armature \
+modifier blends the bones' matrices linearly.
 
 2  ADD SINEW
-Click the hand. Choose the tab "Sinew" in the sidebar (N shows it). Click "Add Sinew". Nothing moves: Sinew starts with what the modifier did.
+Click the hand. Choose the tab "Sinew" in the sidebar (N shows it). Click "Add Sinew". Nothing moves: \
+Sinew starts with what the modifier did.
 
 3  CHOOSE A METHOD
 In the menu of methods take "Dual Quaternion". The wrist is round again.
 
 4  WHAT IT COSTS AT AN ELBOW
-Click the arm, "Add Sinew", "Dual Quaternion". The elbow is not flat any more, but it bulges. Open "Stages and Scale" and switch "Limit Bulge" on: the bulge is all but gone.
+Click the arm, "Add Sinew", "Dual Quaternion". The elbow is not flat any more, but it bulges. Open \
+"Stages and Scale" and switch "Limit Bulge" on: the bulge is all but gone.
 
 5  SEE WHERE
-Open the panel "Heat Map" and click its first button: nearly white is as at rest, blue is shorter, orange longer. "Numbers" below has numbers, beside those at rest and those \
-of another method. Click the button once more to end it.
+Open the panel "Heat Map" and click its first button: nearly white is as at rest, blue is shorter, \
+orange longer. "Numbers" below has numbers, beside those at rest and those of another method. Click the \
+button once more to end it.
 
 6  SEE BOTH
-Open the panel "Compare", click "Compare\u2026", choose "Linear Blend" and OK: a copy stands beside. Alt Shift F flips \
-between the two. "End Comparison" takes it away.
+Open the panel "Compare", click "Compare\u2026", choose "Linear Blend" and OK: a copy stands beside. Alt \
+Shift F flips between the two. "End Comparison" takes it away.
 
 7  LET IT CHOOSE
-Open the panel "Suggest" and click "Measure All Methods": every one is measured over the frames, and the best are marked.
+Open the panel "Suggest" and click "Measure All Methods": every one is measured over the frames, and the \
+best are marked.
 
 8  TAKE IT ALONG
-"Bake\u2026" in the tab writes what you see for a Blender or an engine without Sinew, as caches or as helper bones. With \
-"Motion" on "Pose", helper bones follow any animation.
+"Bake\u2026" in the tab writes what you see for a Blender or an engine without Sinew, as caches or as \
+helper bones. With "Motion" on "Pose", helper bones follow any animation.
 
 Every button has a tooltip, and "Online Manual" in its right-click menu.
 """

@@ -207,8 +207,8 @@ class Report:
             rms, worst, rms_before, worst_before = (f"{number:.2g}" for number in numbers)
             said.append(
                 phrase(
-                    "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; linear "
-                    "blending has {rms_before} and {worst_before}",
+                    "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; "
+                    "linear blending has {rms_before} and {worst_before}",
                     unit=unit,
                     rms=rms,
                     worst=worst,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones that follow the pose, whatever animation there is: each moves as the dual quaternion blend of the
-rig's bones around it, with weights of its own. Blender's Armature constraint with Preserve Volume is that blend.
+"""Helper bones that follow the pose, whatever animation there is: each moves as the dual quaternion blend of
+the rig's bones around it, with weights of its own. Blender's Armature constraint with Preserve Volume is it.
 
 Motions of this kind are in the place of those that each frame may choose (helper_bones.py): their weights are
 found by Gauss-Newton, damped (Levenberg, Marquardt), while everything else stands still.
@@ -35,8 +35,8 @@ def solve(motion: Motion, wanted: Wanted, rest: np.ndarray) -> Generator[float, 
 
 
 def errors_of(solution: Solution, motion: Motion, rest: np.ndarray) -> tuple[Errors, Errors, np.ndarray]:
-    """Of linear blend skinning with the weights that there were, and of a solution, in other poses than it was
-    made from; and its rms error at each vertex, float32 [vertices]."""
+    """Of linear blend skinning with the weights that there were, and of a solution, in other poses than it
+    was made from; and its rms error at each vertex, float32 [vertices]."""
     solver = _PoseSolver(motion, solution.bones.shape[1], rest_bones=rest)
     before = solver.errors()
     return before, *solver.play(solution)
@@ -44,9 +44,7 @@ def errors_of(solution: Solution, motion: Motion, rest: np.ndarray) -> tuple[Err
 
 @dataclass
 class _PoseSolver(Solver):
-    """
-    rest_bones  float [bones, 4, 4], armature space
-    """
+    """rest_bones  float [bones, 4, 4], armature space"""
 
     rest_bones: np.ndarray = field(kw_only=True)
 
@@ -58,7 +56,7 @@ class _PoseSolver(Solver):
         self._split = sinew.affine.split_scale(motions, np.asarray(self.rest_bones, dtype=np.float64))
 
     def play(self, solution: Solution) -> tuple[Errors, np.ndarray]:
-        """The errors of a solution that was made of other poses; the rms of each vertex, float32 [vertices]."""
+        """The errors of a solution that was made of other poses; the rms of each vertex, float32."""
         nothing = np.empty(0)
         self.helpers = [
             Helper(self._blended(blend), int(parent), nothing, nothing, blend)

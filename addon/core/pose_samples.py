@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that a rig can take, at random: joints rotate within their limits, or about as far as they are seen to."""
+"""Poses that a rig can take, at random: joints rotate within their limits, or about as far as is seen."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Joints:
     """
     rest     float [bones, 4, 4], armature space; bones come after their parents
     parents  int [bones]; -1 for none
-    limits   float [bones, 3, 2]: least and largest rotation about each of a bone's axes, in radians; nan where
-             there is none
+    limits   float [bones, 3, 2]: least and largest rotation about each of a bone's axes, in radians; nan
+             where there is none
     """
 
     rest: np.ndarray
@@ -29,13 +29,13 @@ class Joints:
 
 
 def sampled(poses: np.ndarray, joints: Joints, count: int, seed: int) -> np.ndarray:
-    """float64 [count, bones, 4, 4], armature space: each is one of `poses`, in turns, in which every bone has a
-    random rotation against its parent. Bones without a parent, all distances and all scale stay.
+    """float64 [count, bones, 4, 4], armature space: each is one of `poses`, in turns, in which every bone has
+    a random rotation against its parent. Bones without a parent, all distances and all scale stay.
 
     poses  float [frames, bones, 4, 4], armature space; what joints are seen to rotate is in them, too
 
-    Rotations are vectors, an angle about an axis, whose three numbers are in a box: that of the limits, or that
-    of the poses and of rest, and some more.
+    Rotations are vectors, an angle about an axis, whose three numbers are in a box: that of the limits, or
+    that of the poses and of rest, and some more.
     """
     rng = np.random.default_rng(seed)
     relative = _relative(poses, joints)

@@ -14,8 +14,8 @@ LEAST_LENGTH = 1e-6
 
 
 def text(scene: bpy.types.Scene, unit: str, value: float, signed: bool = False) -> str:
-    """A value whose unit is "length", "ratio" or "share", as in Metric, or "area" or "volume"; "not defined" for
-    NaN.
+    """A value whose unit is "length", "ratio" or "share", as in Metric, or "area" or "volume"; "not defined"
+    for NaN.
 
     signed  with a plus above zero, as for a change
     """

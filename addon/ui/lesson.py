@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lesson: a file with an arm, a hand and a page of text (blend_files/make_lesson.py), for who sees Sinew for the
-first time."""
+"""The lesson: a file with an arm, a hand and a page of text (blend_files/make_lesson.py), for who sees Sinew
+for the first time."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def test_what_the_page_says_holds(opened):
 
 
 def test_what_is_not_saved_is_not_lost():
-    """Without a window Blender has a file always as changed; what happens in one: test_lesson_in_window.py."""
+    """Without a window Blender has a file always as changed; in one: test_lesson_in_window.py."""
     bpy.data.objects.new("Unsaved", None)
     assert bpy.data.is_dirty
     with pytest.raises(RuntimeError, match="Save this file first"):

@@ -536,6 +536,9 @@ def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
     def is_free(obj: bpy.types.Object) -> bool:
         return obj.library is None and obj.override_library is None and not w.side.is_method_keyed(obj)
 
+    # As a window does between two clicks: Sinew knows by then which armature a modifier has.
+    w.before_evaluation()
+    bpy.context.view_layer.update()
     rigs = [rig for rig in w.armatures() if rig.visible_get()]
     meshes = {rig: w.side.character(rig) for rig in rigs}
     return w.one(r, [rig for rig in rigs if meshes[rig] and all(map(is_free, meshes[rig]))])

@@ -663,7 +663,7 @@ class SinewSide:
         return found.name
 
     def bake_to_bones(self, obj: bpy.types.Object, motion: str, is_alone: bool) -> str:
-        """is_alone  nothing but one Armature modifier changes the mesh: then what plays has the stated error"""
+        """is_alone  nothing but one Armature modifier changes the mesh: what plays has the stated error"""
         from sinew_addon.core.errors import SinewError
         from sinew_addon.core.helper_bones import HelperOptions
         from sinew_addon.features.bake import bake

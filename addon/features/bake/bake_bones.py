@@ -155,8 +155,8 @@ class _Rig:
         for obj, own, first in zip(self.meshes, influences, self._influences, strict=True):
             if own is not first and own.distance_from(first) > _SAME_WEIGHT:
                 raise SinewError(
-                    f"{obj.name}: the envelopes of its bones reach other vertices from frame to frame; bake to "
-                    "mdd or pc2"
+                    f"{obj.name}: the envelopes of its bones reach other vertices from frame to frame; bake "
+                    "to mdd or pc2"
                 )
 
     def solve(self, options: HelperOptions) -> Generator[float, None, None]:
@@ -201,8 +201,8 @@ class _Rig:
         return self._motion([*self._rest, *rest], [*self._targets, *targets], [*self._poses, *poses])
 
     def _shape_in(self, pose: np.ndarray, frame: int) -> np.ndarray:
-        """float32 [vertices, 3], armature space: what Sinew makes of all meshes in a pose, all else being as at
-        one of the frames."""
+        """float32 [vertices, 3], armature space: what Sinew makes of all meshes in a pose, all else being as
+        at one of the frames."""
         points = []
         for skin_stack, (rest, at_frame, values) in zip(self._stacks, self._shapes[frame], strict=True):
             skin_stack.deform(rest, [replace(at_frame, pose=pose.astype(np.float32))], values=values)

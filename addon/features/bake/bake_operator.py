@@ -116,7 +116,17 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "asked", False):
             # A dialog's operator can not go on in steps itself.
-            names = ("kind", "frames", "step", "folder", "overwrite", "motion", "helpers", "error", "influences")
+            names = (
+                "kind",
+                "frames",
+                "step",
+                "folder",
+                "overwrite",
+                "motion",
+                "helpers",
+                "error",
+                "influences",
+            )
             bpy.ops.sinew.bake(
                 "INVOKE_DEFAULT", in_steps=True, **{name: getattr(self, name) for name in names}
             )

@@ -645,11 +645,20 @@ TEXTS = {
         "{name}: {key} ist da und stummgeschaltet; der Skelettmodifikator liegt ohne ihn {before} daneben, "
         "mit ihm {after}"
     ),
+    # Edit and sculpt mode
+    "It has no {method} with these settings: what you see here is another shape": (
+        "{method} mit diesen Einstellungen hat er nicht: was hier zu sehen ist, ist eine andere Form"
+    ),
+    "Switch Preserve Volume to see {method} here, too": (
+        "Volumenerhalt umschalten, um {method} auch hier zu sehen"
+    ),
+    "It is the same: {method}": "Sie ist dieselbe: {method}",
     # Lesson
     "Open the Lesson": "Die Lektion öffnen",
     "Sinew Lesson": "Sinew-Lektion",
     "Open a file with an arm, a hand and a page that shows in ten minutes what Sinew does": (
-        "Eine Datei mit einem Arm, einer Hand und einer Seite öffnen, die in zehn Minuten zeigt, was Sinew tut"
+        "Eine Datei mit einem Arm, einer Hand und einer Seite öffnen, die in zehn Minuten zeigt, was Sinew "
+        "tut"
     ),
     "Save this file first: the lesson takes its place": (
         "Erst diese Datei speichern: die Lektion tritt an ihre Stelle"
