@@ -81,10 +81,10 @@ def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bp
     sentence, modifiers = shape_in_mode(obj)
     draw_text(layout, context, sentence, icon="INFO")
     for modifier in modifiers:
-        text = "" if len(modifiers) == 1 else modifier.name
         row = layout.row()
         row.prop(modifier, "use_deform_preserve_volume")
-        row.label(text=text, translate=False)
+        if len(modifiers) > 1:
+            row.label(text=modifier.name, translate=False)
 
 
 def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureModifier]]:

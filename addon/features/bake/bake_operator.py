@@ -36,7 +36,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
             ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
             ("pc2", "PC2 Cache", "A point cache and a Mesh Cache modifier, in this file"),
-            (BONES, "Bones", "Helper bones with keys, and weights, in this file: what engines play"),
+            (BONES, "Bones", "Helper bones and weights, in this file: what engines play"),
             ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
             ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
             ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),

@@ -71,41 +71,48 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.label(text="Compared with")
         column.prop(settings, "other", text="")
+        for name, value in distances(context.scene, subject.measured):
+            split = column.split(factor=0.42)
+            split.label(text=name)
+            split.label(text=value)
 
 
 def _draw_row(layout: bpy.types.UILayout, texts: Sequence[str]) -> None:
-    split = layout.split(factor=0.34)
+    split = layout.split(factor=0.35)
     split.label(text=texts[0])
-    values = split.row()
+    values = split.row(align=True)
     for text in texts[1:]:
         values.label(text=text)
 
 
 def rows(scene: bpy.types.Scene, measured: Measured, other: Measured | None) -> list[tuple[str, ...]]:
     """What each number is, and its values with their units in one frame: at rest, of the shape that is shown
-    and, where it is given, of the other method's. A distance is between these two."""
+    and, where it is given, of the other method's."""
+    shapes = [measured] if other is None else [measured, other]
 
     def row(label: str, name: str, unit: str, at_rest: str, signed: bool = False) -> tuple[str, ...]:
-        shapes = [measured] if other is None else [measured, other]
-        return label, at_rest, *(units.text(scene, unit, each.entry(name), signed) for each in shapes)
+        values = [each.entry(name) for each in shapes]
+        return label, at_rest, *(units.text(scene, unit, value, signed, short=True) for value in values)
 
-    def between(label: str, name: str) -> tuple[str, ...]:
-        return label, "", units.text(scene, "length", measured.entry(name)), *([""] * (other is not None))
+    def rest(unit: str, value: float) -> str:
+        return units.text(scene, unit, value, short=True)
 
-    flipped = [measured] if other is None else [measured, other]
-    none = units.text(scene, "length", 0.0)
     return [
-        row("Volume", "volume_change", "share", units.text(scene, "volume", measured.rest.volume), True),
-        row("Area", "area_change", "share", units.text(scene, "area", measured.rest.area), True),
-        row("Least stretch", "stretch_min", "ratio", units.text(scene, "ratio", 1.0)),
-        row("Most stretch", "stretch_max", "ratio", units.text(scene, "ratio", 1.0)),
-        row("Stretch, RMS", "stretch_rms", "share", units.text(scene, "share", 0.0)),
-        ("Flipped faces", "0", *(f"{each.entry('flipped_faces'):,}" for each in flipped)),
-        row("Collapse", "bulge_min", "length", none),
-        row("Bulge", "bulge_max", "length", none, True),
-        between("Distance, most", "distance_max"),
-        between("Distance, RMS", "distance_rms"),
+        row("Volume", "volume_change", "share", rest("volume", measured.rest.volume), True),
+        row("Area", "area_change", "share", rest("area", measured.rest.area), True),
+        row("Least stretch", "stretch_min", "ratio", rest("ratio", 1.0)),
+        row("Most stretch", "stretch_max", "ratio", rest("ratio", 1.0)),
+        row("Stretch, RMS", "stretch_rms", "share", rest("share", 0.0)),
+        ("Flipped faces", "0", *(f"{each.entry('flipped_faces'):,}" for each in shapes)),
+        row("Collapse", "bulge_min", "length", rest("length", 0.0)),
+        row("Bulge", "bulge_max", "length", rest("length", 0.0), True),
     ]
+
+
+def distances(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
+    """Between the shape that is shown and the other method's."""
+    most, rms = (units.text(scene, "length", measured.entry(f"distance_{name}")) for name in ("max", "rms"))
+    return [("Distance", tr("at most {value}", value=most)), ("Distance, RMS", rms)]
 
 
 class SINEW_PT_worst_frames(Sidebar, bpy.types.Panel):

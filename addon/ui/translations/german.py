@@ -700,8 +700,8 @@ TEXTS = {
     "Where files go; // is beside this file": "Wohin Dateien kommen; // ist neben dieser Datei",
     "Overwrite": "Überschreiben",
     "Replace files that are there already": "Dateien ersetzen, die schon da sind",
-    "Helper bones with keys, and weights, in this file: what engines play": (
-        "Hilfsknochen mit Schlüsselbildern, und Gewichte, in dieser Datei: was Spiele abspielen"
+    "Helper bones and weights, in this file: what engines play": (
+        "Hilfsknochen und Gewichte, in dieser Datei: was Spiele abspielen"
     ),
     "Helper Bones": "Hilfsknochen",
     "How many each armature gets at most; 0: two a joint": (
@@ -863,7 +863,7 @@ TEXTS = {
     "Least stretch": "Kleinste Dehnung",
     "Most stretch": "Größte Dehnung",
     "Collapse": "Einfallen",
-    "Distance, most": "Größter Abstand",
+    "at most {value}": "höchstens {value}",
     "Sinew deforms nothing here now": "Sinew verformt hier zurzeit nichts",
     # Worst frames
     "worst at {frame}": "am schlechtesten bei {frame}",
