@@ -134,6 +134,21 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
     assert found[file] < 0.5 * found[keyed]
 
 
+@pytest.mark.once
+def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path):
+    path, frames = real_rig("human.blend"), (28, 36, 44)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Human"]
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], frames)[0]
+    obj.sinew.method = "lbs"
+    linear = rms_and_worst(world_shapes([obj], frames)[0], expected)[0]
+    out, options = tmp_path / "out", ("--to", "bones", "--motion", "pose", "--frames", "1-24", "--step", "2")
+    run_sinew("bake", path, "--method", METHOD, *options, "--out", out)
+    played = read_elsewhere(out / path.name, frames, tmp_path)["Human"]
+    assert rms_and_worst(played, expected)[0] < 0.15 * linear
+
+
 def test_pose_helpers_in_the_file(arm, tmp_path):
     """No action of their own, no driver, and constraints that mean the rig's own bones."""
     obj, path = arm
