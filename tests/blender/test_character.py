@@ -72,6 +72,9 @@ def test_the_lead_follows_what_belongs_to_the_character_now(armature):
     context.scene.collection.objects.link(other)
     properties.of(first).enabled = False
     first.modifiers["Armature"].object = other
+    # While Sinew is off, too.
+    context.view_layer.update()
+    assert len(character.known_meshes(context)) == 4
     properties.of(first).enabled = True
     context.view_layer.update()
     assert properties.of(first).armature == other

@@ -613,13 +613,15 @@ class SinewSide:
         precomputations.waits = not on
 
     def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
+        from sinew_addon.attach import attach
+
         return [
             obj
             for obj in bpy.context.scene.objects
             if obj.type == "MESH"
             and self.has_sinew(obj)
             and not self.may_react(obj)
-            and obj.sinew.armature == rig
+            and attach.armature_of(obj) == rig
         ]
 
     def is_own(self, obj: bpy.types.Object) -> bool:
