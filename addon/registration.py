@@ -35,6 +35,7 @@ def register() -> None:
     from .ui import (
         character,
         character_operators,
+        lesson,
         main_panel,
         manual,
         menus,
@@ -50,7 +51,7 @@ def register() -> None:
     # Panels appear in this order.
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
-        *(character_operators, presets, menus, main_panel, meshes_panel),
+        *(character_operators, presets, lesson, menus, main_panel, meshes_panel),
         *(suggest, inbetween, blend, bake, corrective, compare, heat, diagnose, gltf),
     ):
         _register_classes(owner.CLASSES)

@@ -31,9 +31,12 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     """The armature that deforms a mesh object, by Sinew, by its first Armature modifier or as its parent."""
     if obj.type != "MESH":
         return None
-    if properties.has_sinew(obj) and properties.of(obj).armature is not None:
-        return properties.of(obj).armature
     modifier = armature_modifier(obj)
+    if properties.has_sinew(obj) and properties.of(obj).armature is not None:
+        # While Sinew is off, the artist may have chosen another in the modifier.
+        is_chosen = modifier is not None and modifier.object is not None
+        if not (is_chosen and not properties.of(obj).replaces_modifiers):
+            return properties.of(obj).armature
     if modifier is not None:
         return modifier.object
     return obj.parent if stack.parent_deforms(obj) else None

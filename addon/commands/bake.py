@@ -15,7 +15,7 @@ from ..core import interrupt
 from ..core.bake import EXPORTS, KINDS
 from ..core.errors import SinewError, WrongUse
 from ..core.frames import parse_frames
-from ..core.helper_bones import HelperOptions, Report
+from ..core.helper_bones import KEYS, MOTIONS, HelperOptions, Report
 from ..jobs.inputs import Job, plan_jobs
 from .arguments import add_copies, add_set, count, frame_step, percent
 from .console import Console
@@ -34,7 +34,8 @@ alembic     an .abc of the final meshes, with UVs and materials
 usd         a .usdc of the same
 gltf        a .glb of the same, the frames as morph targets
 bones       a .blend whose armatures have helper bones with keys, and meshes with weights of all bones: linear
-            blending, as every engine and glTF and FBX files have it, comes as near as the errors say
+            blending, as every engine and glTF and FBX files have it, comes as near as the errors say;
+            with --motion pose they have constraints instead, and follow other animation, too
 
 In a .blend the Armature modifiers stay, switched off (bones: on). Between frames that are not neighbours
 shapes move in straight lines."""
@@ -67,6 +68,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     )
     parser.add_argument(
         "--influences", type=count, default=4, metavar="N", help="bones: of a vertex, at most (default: 4)"
+    )
+    parser.add_argument(
+        "--motion",
+        choices=MOTIONS,
+        default=KEYS,
+        help="bones: helper bones have keys (default), or follow the pose by constraints",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)
@@ -120,7 +127,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     )
     for outcome in outcomes:
         for report in outcome.bones:
-            console.say(f"{outcome.job.target}: {report.sentence(outcome.unit)}")
+            for sentence in report.sentences(outcome.unit):
+                console.say(f"{outcome.job.target}: {sentence}")
     console.say(f"{len(outcomes) - failures} of {len(outcomes)} files baked with {args.method}")
     return 1 if failures else 0
 
@@ -157,7 +165,7 @@ def _bake(
         if not taken:
             raise SinewError(f"{source}: {outcome.left_out.pop()}; nothing written")
         try:
-            helpers = HelperOptions(args.helpers or 0, args.error, args.influences)
+            helpers = HelperOptions(args.helpers or 0, args.error, args.influences, args.motion)
             started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers)
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None

@@ -8,8 +8,8 @@ than there, the rig's bones keep their motions, and a helper bone begins where t
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Generator
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -70,10 +70,24 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Errors:
-    """Over all vertices with weights and all frames, in scene units."""
+    """Over all vertices and frames, in scene units."""
 
     rms: float
     worst: float
+
+
+@dataclass(frozen=True)
+class Blend:
+    """How a helper bone follows the pose: the dual quaternion blend of some of the rig's bones.
+
+    bones    int [n]
+    weights  float64 [n], none below 0, of sum 1
+    head     float64 [3], of the helper bone at rest: scale of bones is about it
+    """
+
+    bones: np.ndarray
+    weights: np.ndarray
+    head: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -86,6 +100,7 @@ class Solution:
     weights  float64 [vertices, influences], of sum 1 where there are any
     before   of linear blend skinning by the rig's bones with the weights that there were
     errors   float32 [vertices]: the rms error of each after it, over all frames
+    blends   of the helper bones, where they follow the pose; else empty
     """
 
     motions: np.ndarray
@@ -96,6 +111,11 @@ class Solution:
     before: Errors
     after: Errors
     errors: np.ndarray
+    blends: tuple[Blend, ...] = ()
+
+
+KEYS, POSE = "keys", "pose"
+MOTIONS = (KEYS, POSE)
 
 
 @dataclass(frozen=True)
@@ -105,11 +125,13 @@ class HelperOptions:
     helpers     for each armature, at most; 0 for two a joint
     error       the rms error, in percent of the diagonal, that as few as possible are to reach; 0 for all
     influences  of a vertex, at most
+    motion      what moves helper bones, of MOTIONS
     """
 
     helpers: int = 0
     error: float = 0.0
     influences: int = 4
+    motion: str = KEYS
 
     def of(self, motion: Motion) -> Wanted:
         # Each weighted bone but the first is jointed to others.
@@ -124,7 +146,9 @@ DEFAULT_HELPERS = HelperOptions()
 class Report:
     """What came of it; lengths in scene units.
 
-    diagonal  of the meshes' bounding box at rest
+    diagonal       of the meshes' bounding box at rest
+    before, after  over the frames
+    unseen_before, unseen_after  where helper bones follow the pose: over poses that they were not made from
     """
 
     armature: str
@@ -133,15 +157,28 @@ class Report:
     diagonal: float
     before: Errors
     after: Errors
+    unseen_before: Errors | None = None
+    unseen_after: Errors | None = None
 
     @classmethod
-    def of(cls, armature: str, solution: Solution, unit: float, diagonal: float) -> Report:
-        """unit  of armature space, in scene units"""
-        before, after = (
-            Errors(unit * errors.rms, unit * errors.worst) for errors in (solution.before, solution.after)
-        )
+    def of(
+        cls,
+        armature: str,
+        solution: Solution,
+        unit: float,
+        diagonal: float,
+        unseen: tuple[Errors, Errors] | None = None,
+    ) -> Report:
+        """
+        unit    of armature space, in scene units
+        unseen  before and after, over poses that the solution was not made from
+        """
+        errors = [
+            Errors(unit * each.rms, unit * each.worst)
+            for each in (solution.before, solution.after, *(unseen or ()))
+        ]
         most = int((solution.weights > 0.0).sum(axis=1).max(initial=0))
-        return cls(armature, len(solution.parents), most, diagonal, before, after)
+        return cls(armature, len(solution.parents), most, diagonal, *errors)
 
     def as_json(self) -> dict[str, Any]:
         """With each error as a share of the diagonal, too."""
@@ -153,11 +190,35 @@ class Report:
                 "rms_share": errors.rms / size,
                 "worst_share": errors.worst / size,
             }
-            for name, errors in (("before", self.before), ("after", self.after))
+            for name, errors in vars(self).items()
+            if isinstance(errors, Errors)
         }
 
-    def sentence(self, unit: str) -> Phrase:
+    def sentences(self, unit: str) -> list[Phrase]:
         """unit  what a scene unit is called"""
+        said = [self._sentence(unit)]
+        if self.unseen_before is not None and self.unseen_after is not None:
+            numbers = (
+                self.unseen_after.rms,
+                self.unseen_after.worst,
+                self.unseen_before.rms,
+                self.unseen_before.worst,
+            )
+            rms, worst, rms_before, worst_before = (f"{number:.2g}" for number in numbers)
+            said.append(
+                phrase(
+                    "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; "
+                    "linear blending has {rms_before} and {worst_before}",
+                    unit=unit,
+                    rms=rms,
+                    worst=worst,
+                    rms_before=rms_before,
+                    worst_before=worst_before,
+                )
+            )
+        return said
+
+    def _sentence(self, unit: str) -> Phrase:
         size = self.diagonal or 1.0
         shares = (f"{100.0 * each / size:.2g}%" for each in (self.after.rms, self.after.worst))
         return phrase(
@@ -174,9 +235,14 @@ class Report:
         )
 
 
-def solve(motion: Motion, wanted: Wanted) -> Generator[float, None, Solution]:
-    """How much is done, 0 to 1; returns the helper bones and the weights of all bones."""
-    solver = _Solver(motion, wanted.influences)
+def solve(
+    motion: Motion, wanted: Wanted, solver_of: Callable[[Motion, int], Solver] | None = None
+) -> Generator[float, None, Solution]:
+    """How much is done, 0 to 1; returns the helper bones and the weights of all bones.
+
+    solver_of  Solver, or another that keeps to motions of its kind
+    """
+    solver = (solver_of or Solver)(motion, wanted.influences)
     before = solver.errors()
     for _part in solver.weigh():
         yield 0.0
@@ -208,22 +274,24 @@ def _rounds(helpers: int) -> list[int]:
 
 
 @dataclass
-class _Helper:
+class Helper:
     """
     motion    float64 [frames, 3, 4]
     scale     float64 [frames], of its parent
     may_move  bool [vertices]
+    blend     of the rig's bones that moves it; None for a motion of its own
     """
 
     motion: np.ndarray
     parent: int
     scale: np.ndarray
     may_move: np.ndarray
+    blend: Blend | None = None
 
 
 @dataclass
-class _Solver:
-    """Vertices here are those with weights.
+class Solver:
+    """Vertices here are those with weights; only errors are of all.
 
     targets   float32 [vertices, frames * 3]
     residual  float32 [vertices, frames * 3]: what the present blend lacks of being 0
@@ -232,7 +300,7 @@ class _Solver:
 
     motion: Motion
     most: int
-    helpers: list[_Helper] = field(default_factory=list)
+    helpers: list[Helper] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         influences = self.motion.influences
@@ -245,14 +313,28 @@ class _Solver:
         self.targets = np.ascontiguousarray(self.motion.targets[:, self.deformed].transpose(1, 0, 2))
         self.targets = self.targets.reshape(len(self.deformed), 3 * frames)
         self.middle = self.rest.mean(axis=1)
+        # Of vertices without weights, which stay at rest whatever the bones do.
+        still = np.ones(len(influences.counts), dtype=bool)
+        still[self.deformed] = False
+        self.still = np.flatnonzero(still)
+        apart = np.square(self.motion.rest[:, still] - self.motion.targets[:, still].astype(np.float64))
+        self.still_squares = apart.sum(axis=2).T
         self.bones, self.weights = self.own, self.own_weights
         self.residual = self._residual_of(self.bones, self.weights)
 
     def errors(self) -> Errors:
-        if not len(self.residual):
-            return Errors(0.0, 0.0)
         squares = np.square(self.residual).reshape(-1, 3).sum(axis=1)
+        squares = np.concatenate([squares, self.still_squares.ravel()])
+        if not len(squares):
+            return Errors(0.0, 0.0)
         return Errors(float(np.sqrt(squares.mean(dtype=np.float64))), float(np.sqrt(squares.max())))
+
+    def errors_of_vertices(self) -> np.ndarray:
+        """float32 [vertices], rms over all frames"""
+        squares = np.zeros(len(self.motion.influences.counts))
+        squares[self.deformed] = np.square(self.residual).sum(axis=1)
+        squares[self.still] = self.still_squares.sum(axis=1)
+        return np.sqrt(squares / max(len(self.motion.targets), 1)).astype(np.float32)
 
     def refine(self) -> Generator[float, None, None]:
         """Motions and weights in turns, until little is gained; how much is done, 0 to 1.
@@ -265,7 +347,8 @@ class _Solver:
             before = self._state
             self.move()
             if sweep:
-                self._go_on(before[0], further)
+                for helper, old in zip(self.helpers, before[0], strict=True):
+                    self._go_on(helper, old, further)
             for share in self.weigh():
                 yield (sweep + share) / _LAST_SWEEPS
             errors.append(self.errors().rms)
@@ -278,22 +361,19 @@ class _Solver:
                 break
 
     @property
-    def _state(self) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-        return [helper.motion for helper in self.helpers], self.bones, self.weights, self.residual.copy()
+    def _state(self) -> tuple[list[Helper], np.ndarray, np.ndarray, np.ndarray]:
+        return [replace(helper) for helper in self.helpers], self.bones, self.weights, self.residual.copy()
 
     @_state.setter
-    def _state(self, state: tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]) -> None:
-        motions, self.bones, self.weights, self.residual = state
-        for helper, motion in zip(self.helpers, motions, strict=True):
-            helper.motion = motion
+    def _state(self, state: tuple[list[Helper], np.ndarray, np.ndarray, np.ndarray]) -> None:
+        self.helpers, self.bones, self.weights, self.residual = state
 
-    def _go_on(self, before: list[np.ndarray], further: float) -> None:
-        """Moves each helper bone on from what it was `before`, by that much more of its way."""
-        for helper, old in zip(self.helpers, before, strict=True):
-            ahead = helper.motion + further * (helper.motion - old)
-            helper.motion = np.concatenate(
-                [helper.scale[:, None, None] * _rotation_near(ahead[:, :, :3]), ahead[:, :, 3:]], axis=2
-            )
+    def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
+        """Moves a helper bone on from what it was, by that much more of its way."""
+        ahead = helper.motion + further * (helper.motion - old.motion)
+        helper.motion = np.concatenate(
+            [helper.scale[:, None, None] * _rotation_near(ahead[:, :, :3]), ahead[:, :, 3:]], axis=2
+        )
 
     # --- Motions
 
@@ -309,7 +389,7 @@ class _Solver:
         parent = self._nearest_bone(middle, np.unique(self.own[seed][self.own[seed] >= 0]))
         own = self.motion.bones[:, parent]
         scale = np.maximum(np.cbrt(np.abs(np.linalg.det(own[:, :, :3]))), _SMALLEST_SCALE)
-        helper = _Helper(own, parent, scale, may_move)
+        helper = Helper(own, parent, scale, may_move)
         # At first it moves the vertices about the seed alone, as one piece.
         helper.motion = self._fitted(helper, near, np.ones(len(near)), self.targets[near].astype(np.float64))
         for _step in range(_SEED_STEPS):
@@ -351,14 +431,14 @@ class _Solver:
         share = np.clip(((point - heads) * along).sum(axis=1) / length, 0.0, 1.0)
         return int(bones[np.linalg.norm(heads + share[:, None] * along - point, axis=1).argmin()])
 
-    def _best_shares(self, helper: _Helper, vertices: np.ndarray) -> np.ndarray:
+    def _best_shares(self, helper: Helper, vertices: np.ndarray) -> np.ndarray:
         """float64 [vertices]: how much of it each takes best, of 1, the rest of the blend that much less."""
         residual = self.residual[vertices]
         change = self._moved(helper.motion, vertices) - self.targets[vertices] - residual
         return _share(residual, change)[0]
 
     def _fitted(
-        self, helper: _Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
+        self, helper: Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
         """float64 [frames, 3, 4]: the motion whose share of the vertices, `weights` times it, is nearest to
         `wanted` [vertices, frames * 3]; Le and Deng's equation 9, with the scale given."""
@@ -489,8 +569,6 @@ class _Solver:
         bones[self.deformed, slots] = np.where(self.bones >= 0, numbers[self.bones], -1)
         weights[self.deformed, slots] = self.weights
         frames = len(self.motion.targets)
-        errors = np.zeros(vertices, dtype=np.float32)
-        errors[self.deformed] = np.sqrt(np.square(self.residual).sum(axis=1) / max(frames, 1))
         return Solution(
             np.array([helper.motion for helper in helpers]).reshape(-1, frames, 3, 4).swapaxes(0, 1),
             np.array([helper.parent for helper in helpers], dtype=int),
@@ -499,10 +577,14 @@ class _Solver:
             weights,
             before,
             self.errors(),
-            errors,
+            self.errors_of_vertices(),
+            tuple(helper.blend for helper in helpers if helper.blend is not None),
         )
 
     def _head(self, bone: int) -> np.ndarray:
+        blend = self.helpers[bone - self.motion.bones.shape[1]].blend
+        if blend is not None:
+            return blend.head
         vertices, slots = np.nonzero(self.bones == bone)
         return np.average(self.middle[vertices], axis=0, weights=self.weights[vertices, slots])
 

@@ -96,6 +96,14 @@ class Influences:
         """int [vertices]: influences of each vertex."""
         return np.diff(self.offsets)
 
+    def distance_from(self, other: Influences) -> float:
+        """The largest difference of a weight, of as many vertices."""
+        bones = 1 + max(int(each.bones.max(initial=0)) for each in (self, other))
+        keys = [np.repeat(np.arange(len(e.counts)), e.counts) * bones + e.bones for e in (self, other)]
+        found, at = np.unique(np.concatenate(keys), return_inverse=True)
+        signed = np.concatenate([self.weights, -other.weights])
+        return float(np.abs(np.bincount(at, signed, minlength=len(found))).max(initial=0.0))
+
 
 def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influences:
     """The influences of several meshes as of one; vertices and bones are concatenated.

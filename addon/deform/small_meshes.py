@@ -37,14 +37,35 @@ def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
         is_used
         and settings.leave_small
         and len(obj.data.vertices) < limits.get(settings.method, 0)
-        and settings.scale_rule == BLENDER_4.name
-        and not stage_settings.names_on(settings)
         # Its colours need the points.
         and not settings.heat
-        and _blend_alike(obj)
+        and has_builtin_shape(obj)
+        and not other_volume(obj)
         and not upstream_proxy.is_needed(obj)
         and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animated_paths(obj))
     )
+
+
+def has_builtin_shape(obj: bpy.types.Object) -> bool:
+    """Whether Armature modifiers, with Preserve Volume set for it, have the shape that Sinew is set to."""
+    settings = properties.of(obj)
+    methods = {settings.method} | {replaced.method for replaced in settings.replaced_modifiers}
+    return (
+        methods - {properties.SAME_METHOD} <= set(VERTICES)
+        and settings.scale_rule == BLENDER_4.name
+        and not stage_settings.names_on(settings)
+    )
+
+
+def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
+    """Those of its Armature modifiers whose Preserve Volume is not that of Sinew's method."""
+    method = properties.of(obj).method
+    return [
+        modifier
+        for number, (modifier, replaced) in enumerate(attach.replaced_modifiers(obj))
+        if attach.method_of(modifier)
+        != properties.method_of_modifier(method, replaced.method, is_first=number == 0)
+    ]
 
 
 def fingerprint(obj: bpy.types.Object) -> list[str]:
@@ -53,13 +74,3 @@ def fingerprint(obj: bpy.types.Object) -> list[str]:
     modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
     methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
     return [settings.method, settings.scale_rule, *stage_settings.names_on(settings), *methods]
-
-
-def _blend_alike(obj: bpy.types.Object) -> bool:
-    """Whether each Armature modifier by itself blends as Sinew does in its place."""
-    method = properties.of(obj).method
-    return all(
-        attach.method_of(modifier)
-        == properties.method_of_modifier(method, replaced.method, is_first=number == 0)
-        for number, (modifier, replaced) in enumerate(attach.replaced_modifiers(obj))
-    )

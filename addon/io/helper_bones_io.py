@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.helper_bones import Blend
+from ..core.pose_samples import Joints
 from ..core.rig import Bones
 from . import actions, mesh_io
 
@@ -21,11 +23,31 @@ _LONGEST_NAME = 63
 _LENGTH = 0.25
 
 
-def add_bones(rig: bpy.types.Object, parents: Sequence[str], heads: np.ndarray) -> list[str]:
-    """Gives an armature object a copy of its armature with a helper bone under each of the `parents`; the one
+def read_joints(rig: bpy.types.Object, bones: Bones) -> Joints:
+    """How far its bones may rotate: the limits of inverse kinematics, where they are set."""
+    number = {name: bone for bone, name in enumerate(bones.names)}
+    parents = np.full(len(bones.names), -1)
+    limits = np.full((len(bones.names), 3, 2), np.nan)
+    for bone, name in enumerate(bones.names):
+        pose_bone = rig.pose.bones[name]
+        if pose_bone.parent is not None:
+            parents[bone] = number[pose_bone.parent.name]
+        for at, axis in enumerate("xyz"):
+            if getattr(pose_bone, f"lock_ik_{axis}"):
+                limits[bone, at] = 0.0
+            elif getattr(pose_bone, f"use_ik_limit_{axis}"):
+                limits[bone, at] = (getattr(pose_bone, f"ik_{end}_{axis}") for end in ("min", "max"))
+    return Joints(bones.rest[: len(bones.names)], parents, limits)
+
+
+def add_bones(
+    rig: bpy.types.Object, parents: Sequence[str], heads: np.ndarray, hanging: bool = True
+) -> list[str]:
+    """Gives an armature object a copy of its armature with a helper bone for each of the `parents`; the one
     without them stays in the file.
 
-    heads  float [helpers, 3], armature space
+    heads    float [helpers, 3], armature space
+    hanging  under these; else without a parent
     Returns their names.
     """
     if rig.data.library is None:
@@ -41,7 +63,7 @@ def add_bones(rig: bpy.types.Object, parents: Sequence[str], heads: np.ndarray) 
             placed = parent.matrix.to_3x3().to_4x4()
             placed.translation = head
             bone.matrix = placed
-            bone.parent, bone.use_connect, bone.use_deform = parent, False, True
+            bone.parent, bone.use_connect, bone.use_deform = parent if hanging else None, False, True
             # A motion that is rigid but for the parent's size.
             bone.inherit_scale = "AVERAGE"
             collection.assign(bone)
@@ -59,6 +81,22 @@ def _free_name(armature: bpy.types.Armature, parent: str) -> str:
         if start + end not in armature.edit_bones:
             return start + end
         number += 1
+
+
+def add_constraints(
+    rig: bpy.types.Object, names: Sequence[str], blends: Sequence[Blend], bones: Sequence[str]
+) -> None:
+    """Has each helper bone follow the pose of the rig's own.
+
+    bones  names of those that blends mean
+    """
+    for name, blend in zip(names, blends, strict=True):
+        constraint = rig.pose.bones[name].constraints.new("ARMATURE")
+        constraint.use_deform_preserve_volume = True
+        for bone, weight in zip(blend.bones, blend.weights, strict=True):
+            if weight > 0.0:
+                target = constraint.targets.new()
+                target.target, target.subtarget, target.weight = rig, bones[bone], weight
 
 
 def write_keys(

@@ -12,11 +12,12 @@ import inspect
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ..attach import attach, properties
 from ..attach.shared_settings import GROUPS, SHARED, assign
 from ..attach.subscribers import subscribers
-from ..deform import session
+from ..deform import events, session
 from . import operators
 
 # What a property that is computed can not have.
@@ -41,8 +42,9 @@ def set_method(context: bpy.types.Context, method: str) -> None:
 
 
 class _Known:
-    """The character's meshes as they were found last, by their names, and what was selected then. To find
-    them goes through the whole scene, and each button reads its value several times."""
+    """The character's meshes as they were found last, by their names, and what was selected then; until
+    Blender evaluates something. To find them goes through the whole scene, and each button reads its value
+    several times."""
 
     selection: tuple[object, ...] = ()
     names: tuple[str, ...] = ()
@@ -56,12 +58,22 @@ def find_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The same as they were found last, as long as the same objects are selected and all still have Sinew."""
+    """The same as they were found last, as long as nothing has changed, the same objects are selected and all
+    still have Sinew."""
     if _Known.names and _Known.selection == _selection(context):
         found = [context.scene.objects.get(name) for name in _Known.names]
         if all(obj is not None and properties.has_sinew(obj) for obj in found):
             return found
     return find_meshes(context)
+
+
+@persistent
+def _forget(*_args: object) -> None:
+    """Others may belong to the character now."""
+    _Known.names = ()
+
+
+_HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post", "load_post"), _forget)
 
 
 def _selection(context: bpy.types.Context) -> tuple[object, ...]:
@@ -188,8 +200,10 @@ def _clear() -> None:
 def register() -> None:
     bpy.types.Scene.sinew_character = bpy.props.PointerProperty(type=SinewCharacter)
     subscribers.after_removal.append(_clear)
+    events.subscribe_all(_HANDLERS)
 
 
 def unregister() -> None:
+    events.unsubscribe_all(_HANDLERS)
     subscribers.after_removal.remove(_clear)
     del bpy.types.Scene.sinew_character

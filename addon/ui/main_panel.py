@@ -29,6 +29,8 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
             draw_text(layout, context, text, icon="INFO")
         if not meshes:
             draw_text(layout, context, "Select a mesh that an armature deforms, or the armature", icon="INFO")
+            if not context.selected_objects:
+                layout.operator("sinew.open_lesson", icon="HELP")
             return
         waits = operators.waits_for_render()
         if waits:

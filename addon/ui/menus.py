@@ -35,7 +35,7 @@ def _over(operator: str, text: str) -> tuple[Entry, ...]:
     )
 
 
-# All operators that act on what is selected, in the menu's order; None is a line.
+# All operators that act on what is selected, and the lesson, in the menu's order; None is a line.
 ENTRIES: tuple[Entry | None, ...] = (
     Entry("sinew.add", icon="MOD_ARMATURE"),
     Entry("sinew.switch"),
@@ -69,6 +69,7 @@ ENTRIES: tuple[Entry | None, ...] = (
     Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
     None,
     Entry("sinew.open_tab"),
+    Entry("sinew.open_lesson", icon="HELP"),
 )
 
 
@@ -134,7 +135,13 @@ def _draw_in_modifiers(self: bpy.types.Menu, _context: bpy.types.Context) -> Non
     self.layout.operator("sinew.add", text="Sinew", icon="MOD_ARMATURE")
 
 
+def _draw_in_help(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator("sinew.open_lesson", text="Sinew Lesson", icon="HELP")
+
+
 MENUS = {
+    "TOPBAR_MT_help": _draw_in_help,
     "VIEW3D_MT_object": _draw_in_menu,
     "VIEW3D_MT_pose": _draw_in_menu,
     "VIEW3D_MT_paint_weight": _draw_in_menu,

@@ -13,8 +13,9 @@ from ..deform import session
 from .operators import OnSinewObjects
 
 FOLDER = "sinew/methods"
+DEFINES = ("character = bpy.context.scene.sinew_character",)
 # Names of vertex groups belong to a mesh, not to a method.
-_PATHS = (
+PATHS = (
     *(f"character.{name}" for name in SHARED),
     *(
         f"character.{group}.{name}"
@@ -32,8 +33,8 @@ class SINEW_OT_method_preset_add(OnSinewObjects, AddPresetBase, bpy.types.Operat
     bl_options = {"REGISTER"}
 
     preset_menu = "SINEW_PT_method_presets"
-    preset_defines = ("character = bpy.context.scene.sinew_character",)
-    preset_values = _PATHS
+    preset_defines = DEFINES
+    preset_values = PATHS
     preset_subdir = FOLDER
 
 
@@ -47,7 +48,10 @@ class SINEW_OT_method_preset(OnSinewObjects, bpy.types.Operator):
         name="File", description="The preset", subtype="FILE_PATH", options={"SKIP_SAVE"}
     )
     menu_idname: bpy.props.StringProperty(
-        name="Menu", description="The one that shows its name", options={"SKIP_SAVE"}
+        name="Menu",
+        description="The one that shows its name",
+        default="SINEW_PT_method_presets",
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:

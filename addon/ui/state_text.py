@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..attach import hooks, properties
-from ..deform import session
+from ..deform import session, small_meshes
 from ..deform.plan import MODES_OF_THE_MODIFIER, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
 from .translations import tr
@@ -73,12 +73,41 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
     return [*found, *(sentence for sentence in hooks.misled(obj) if sentence not in found)]
 
 
+def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """In modes whose tools work through the Armature modifier: whether its shape is Sinew's, and the switch
+    that makes it so where there is one."""
+    if obj.mode not in MODES_OF_THE_MODIFIER or not properties.of(obj).enabled or obj.library is not None:
+        return
+    sentence, modifiers = shape_in_mode(obj)
+    draw_text(layout, context, sentence, icon="INFO")
+    for modifier in modifiers:
+        row = layout.row()
+        row.prop(modifier, "use_deform_preserve_volume")
+        if len(modifiers) > 1:
+            row.label(text=modifier.name, translate=False)
+
+
+def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureModifier]]:
+    """What the Armature modifiers show in such a mode, and those whose Preserve Volume has to be switched for
+    Sinew's shape."""
+    method = tr(properties.method_label(properties.of(obj).method))
+    if not small_meshes.has_builtin_shape(obj):
+        return tr(
+            "It has no {method} with these settings: what you see here is another shape", method=method
+        ), []
+    others = small_meshes.other_volume(obj)
+    if others:
+        return tr("Switch Preserve Volume to see {method} here, too", method=method), others
+    return tr("It is the same: {method}", method=method), []
+
+
 def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
     """All of it, of one mesh."""
     if properties.of(obj).error:
         draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
     elif reason_of(obj):
         draw_text(layout, context, reason_of(obj), icon="INFO")
+    draw_in_mode(layout, context, obj)
     state = session.state_of(obj)
     if state is not None and state.plan.normals_reason:
         text = tr("Blender computes normals: {reason}", reason=tr(state.plan.normals_reason))
@@ -106,6 +135,8 @@ def draw_character(
         if len(names) == len(meshes):
             who = tr("All {count} meshes", count=len(meshes))
         draw_text(layout, context, f"{who}: {tr(reason)}", icon="INFO")
+    if context.active_object in meshes:
+        draw_in_mode(layout, context, context.active_object)
     warned = [obj.name for obj in meshes if not properties.of(obj).error and problems_of(obj)]
     if warned:
         text = tr("{names}: warnings, see Meshes", names=names_text(warned))

@@ -13,6 +13,7 @@ from conftest import BLEND_FILES, REAL_RIGS
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
 from sinew_addon.io import files, mesh_io
+from sinew_addon.ui import state_text
 
 ORACLES = [("lbs", False), ("dq", True)]
 
@@ -362,6 +363,34 @@ def final_points_in_any_mode(obj: bpy.types.Object) -> np.ndarray:
     points = mesh_io.read_points(evaluated.to_mesh())
     evaluated.to_mesh_clear()
     return points
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_the_panel_says_whether_the_modifiers_shape_is_sinews(mode):
+    obj, _armature = scenes.make_arm()
+    bpy.context.scene.frame_set(8)
+    modifier = obj.modifiers["Armature"]
+    modifier.show_in_editmode = True
+    scenes.add_sinew(obj, "dq")
+    ours = scenes.final_points(obj)
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.view_layer.update()
+    assert scenes.worst(final_points_in_any_mode(obj), ours) > 0.01
+    sentence, to_switch = state_text.shape_in_mode(obj)
+    assert sentence == "Switch Preserve Volume to see Dual Quaternion here, too"
+    assert to_switch == [modifier]
+    modifier.use_deform_preserve_volume = True
+    bpy.context.view_layer.update()
+    assert scenes.worst(final_points_in_any_mode(obj), ours) <= 1e-6
+    assert state_text.shape_in_mode(obj) == ("It is the same: Dual Quaternion", [])
+    properties.of(obj).bulge_limit.enabled = True
+    sentence, to_switch = state_text.shape_in_mode(obj)
+    assert "another shape" in sentence
+    assert to_switch == []
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    # What was switched is the artist's own choice from now on.
+    assert modifier.use_deform_preserve_volume
 
 
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])

@@ -89,6 +89,85 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     assert [bone.name for bone in bpy.data.armatures["Arm Rig"].bones] == list(bones)
 
 
+def pose_anew(rig):
+    """Another action than the one that was baked, with rotations that this one has not."""
+    rig.animation_data_clear()
+    for frame, turns in ((1, (0.4, -0.9, 0.3)), (6, (-1.2, 0.2, -0.5)), (11, (0.9, 1.0, 0.8))):
+        for bone in list(rig.pose.bones)[:2]:
+            bone.rotation_mode = "XYZ"
+            bone.rotation_euler, bone.location, bone.scale = turns, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+            bone.keyframe_insert("rotation_euler", frame=frame)
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, scaled):
+    obj, path = arm
+    rig = obj.modifiers["Armature"].object
+    if scaled:
+        rig.scale, rig.rotation_euler = (2.0, 2.0, 2.0), (0.3, 0.2, 0.1)
+        bone = rig.pose.bones["bone.1"]
+        for size, frame in (((1.0, 1.0, 1.0), 1), ((1.2, 1.5, 1.3), 11)):
+            bone.scale = size
+            bone.keyframe_insert("scale", frame=frame)
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], FRAMES)[0]
+    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", "--helpers", "3")
+    assert_states(report, read_elsewhere(file, FRAMES, tmp_path)["Arm"], expected)
+    assert report["after"]["rms"] < 0.25 * report["before"]["rms"]
+    assert report["unseen_after"]["rms"] < 0.25 * report["unseen_before"]["rms"]
+    keyed, _reports = baked(path, tmp_path / "keyed", "--helpers", "3")
+
+    # An animation that neither was made from: what Sinew makes of it, and what is played.
+    pose_anew(rig)
+    expected = world_shapes([obj], FRAMES)[0]
+    obj.sinew.method = "lbs"
+    linear = rms_and_worst(world_shapes([obj], FRAMES)[0], expected)[0]
+    found = {}
+    for each in (file, keyed):
+        bpy.ops.wm.open_mainfile(filepath=str(each))
+        pose_anew(bpy.data.objects["Arm Rig"])
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+        played = read_elsewhere(tmp_path / "other.blend", FRAMES, tmp_path)["Arm"]
+        found[each] = rms_and_worst(played, expected)[0]
+    assert found[file] < 0.25 * linear
+    assert found[file] < 0.5 * found[keyed]
+
+
+@pytest.mark.once
+def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path):
+    path, frames = real_rig("human.blend"), (28, 36, 44)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Human"]
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], frames)[0]
+    obj.sinew.method = "lbs"
+    linear = rms_and_worst(world_shapes([obj], frames)[0], expected)[0]
+    out, options = tmp_path / "out", ("--to", "bones", "--motion", "pose", "--frames", "1-24", "--step", "2")
+    run_sinew("bake", path, "--method", METHOD, *options, "--out", out)
+    played = read_elsewhere(out / path.name, frames, tmp_path)["Human"]
+    assert rms_and_worst(played, expected)[0] < 0.15 * linear
+
+
+def test_pose_helpers_in_the_file(arm, tmp_path):
+    """No action of their own, no driver, and constraints that mean the rig's own bones."""
+    obj, path = arm
+    scenes.add_sinew(obj, METHOD)
+    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose")
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    rig = bpy.data.objects["Arm Rig"]
+    helpers = [bone for bone in rig.pose.bones if bone.name.startswith("Helper_")]
+    assert len(helpers) == report["helpers"] == 2
+    assert rig.animation_data.action.name == "Arm RigAction"
+    assert not rig.animation_data.drivers
+    for bone in helpers:
+        (constraint,) = bone.constraints
+        assert bone.parent is None
+        assert (constraint.type, constraint.use_deform_preserve_volume) == ("ARMATURE", True)
+        assert {target.subtarget for target in constraint.targets} <= {"bone.0", "bone.1"}
+        assert abs(sum(target.weight for target in constraint.targets) - 1.0) < 1e-5
+
+
 def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
     """They share helper bones; shape keys play on, and what is moved and scaled as an object."""
     obj, path = arm
@@ -129,16 +208,19 @@ def skinned_by_gltf(glb, frames, rate):
     header = read_glb.File(glb).header
     assert "JOINTS_1" not in header["meshes"][0]["primitives"][0]["attributes"]
     # The action without helper bones stays in the file, and is exported, too.
-    (name,) = (each["name"] for each in header["animations"] if each["name"].endswith("Helpers"))
+    made = [each["name"] for each in header["animations"] if each["name"].endswith("Helpers")]
+    (name,) = made or [each["name"] for each in header["animations"]]
     (points,) = read_glb.points_at(glb, np.array(frames) / rate, name).values()
     return points
 
 
-def test_gltf_plays_to_the_stated_error(arm, tmp_path):
+@pytest.mark.parametrize("motion", ["keys", "pose"])
+def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion):
+    """The exporter makes keys of constraints."""
     obj, path = arm
     scenes.add_sinew(obj, METHOD)
     expected = world_shapes([obj], FRAMES)[0]
-    file, (report,) = baked(path, tmp_path / "out")
+    file, (report,) = baked(path, tmp_path / "out", "--motion", motion)
     glb = tmp_path / "arm.glb"
     command = [sys.executable, "-c", EXPORT, str(file), str(glb)]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
@@ -204,3 +286,26 @@ def test_in_the_open_file_modes_and_selection_stay(arm, tmp_path):
     moved = {curve.data_path for curve in all_curves if "Helper_" in curve.data_path}
     assert len(all_curves) == curves + 7 * len(moved) // 2
     assert all(len(c.keyframe_points) == len(FRAMES) for c in all_curves if "Helper_" in c.data_path)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm, tmp_path, moving):
+    """As where the armature moves against the mesh; where it takes the mesh along, they are baked."""
+    obj, _path = arm
+    rig = obj.modifiers["Armature"].object
+    obj.vertex_groups.clear()
+    obj.modifiers["Armature"].use_bone_envelopes = True
+    for offset, frame in ((0.0, 1), (1.5, 11)):
+        rig.location.x = offset
+        rig.keyframe_insert("location", frame=frame)
+    if not moving:
+        obj.parent = rig
+    scenes.add_sinew(obj, METHOD)
+    started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False)
+    if moving:
+        with pytest.raises(SinewError, match="envelopes of its bones reach other vertices"):
+            list(started.sample())
+        return
+    list(started.sample())
+    (report,) = started.reports
+    assert report.after.rms < 0.5 * report.before.rms

@@ -61,6 +61,29 @@ def test_all_five_have_the_shape_of_their_armature_modifiers(armature):
         np.testing.assert_allclose(mesh_points(obj), points, atol=1e-5 * scenes.diagonal(obj) * 3)
 
 
+def test_the_lead_follows_what_belongs_to_the_character_now(armature):
+    """Its mesh goes to another armature while the same is selected."""
+    five_meshes.select(armature)
+    bpy.ops.sinew.add()
+    context = bpy.context
+    first = character.lead(context)
+    assert len(character.known_meshes(context)) == 5
+    other = bpy.data.objects.new("Other Rig", armature.data)
+    context.scene.collection.objects.link(other)
+    properties.of(first).enabled = False
+    first.modifiers["Armature"].object = other
+    # While Sinew is off, too.
+    context.view_layer.update()
+    assert len(character.known_meshes(context)) == 4
+    properties.of(first).enabled = True
+    context.view_layer.update()
+    assert properties.of(first).armature == other
+    assert len(character.known_meshes(context)) == 4
+    properties.of(first).method = "log"
+    assert shared().method == "lbs"
+    assert character.lead(context) != first
+
+
 def test_every_shared_setting_goes_to_all_and_only_by_the_character(armature):
     bpy.ops.sinew.add()
     own = properties.of(bpy.data.objects["Hair"])

@@ -251,3 +251,35 @@ def test_a_check_touches_nothing(tmp_path):
     assert not attach.properties.has_sinew(obj)
     assert not obj.is_property_set("sinew")
     assert not bpy.context.scene.is_property_set("sinew_measures")
+
+
+def test_meshes_that_were_deleted_since_are_not_read():
+    """As Sinew's own handler deletes helper objects before this one: Blender still lists them in the update,
+    and reading the deleted ones crashed it."""
+    obj, _armature = faulty_arm()
+    bpy.ops.sinew.check()
+    others = [bpy.data.meshes.new(f"Other {number}") for number in range(40)]
+    for mesh in others:
+        mesh.from_pydata([(0.0, 0.0, 0.0)] * 2000, [], [])
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
+    bpy.context.view_layer.update()
+    listed = []
+
+    def delete(scene, depsgraph):
+        bpy.app.handlers.depsgraph_update_post.remove(delete)
+        listed.extend(update.id.name for update in depsgraph.updates if isinstance(update.id, bpy.types.Mesh))
+        bpy.data.batch_remove([bpy.data.objects[mesh.name] for mesh in others])
+        bpy.data.batch_remove(others)
+        # Their memory is something else's.
+        for number in range(200):
+            bpy.data.meshes.new(f"Next {number}")
+        diagnose.on_depsgraph_update(scene, depsgraph)
+
+    for mesh in others:
+        mesh.update()
+        mesh.update_tag()
+    obj.data.update_tag()
+    bpy.app.handlers.depsgraph_update_post.append(delete)
+    bpy.context.view_layer.update()
+    assert {"Other 0", "Other 39", obj.data.name} <= set(listed)
+    assert not diagnose.of(obj).stale

@@ -141,15 +141,32 @@ def test_numbers_have_units_and_say_what_they_are():
     scene = bpy.context.scene
     scene.unit_settings.system = "METRIC"
     scene.frame_set(15)
-    measured = live.measure(scenes.states_of(obj), "lbs", bpy.context.evaluated_depsgraph_get()).measured
-    rows = dict(heat_panel.rows(scene, measured))
-    summary = measured.summary()
-    assert rows["Volume"] == f"{100 * summary.volume_change:+.3g} %"
-    assert rows["Flipped faces"] == f"{summary.flipped_faces:,}"
-    assert rows["Stretch"] == f"{summary.stretch_min:.2f}\u00d7 to {summary.stretch_max:.2f}\u00d7"
-    assert rows["Distance"].startswith("at most ")
-    centimetres = float(rows["Distance"].removeprefix("at most ").removesuffix(" cm"))
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    measured, other = subject.measured, live.measured_under_other(subject, "lbs", depsgraph)
+    rows = {name: values for name, *values in heat_panel.rows(scene, measured, other)}
+    summary, of_other = measured.summary(), other.summary()
+    changes = [f"{100 * each.volume_change:+.1f} %" for each in (summary, of_other)]
+    assert rows["Volume"][1:] == changes
+    assert rows["Flipped faces"] == ["0", f"{summary.flipped_faces:,}", f"{of_other.flipped_faces:,}"]
+    assert rows["Most stretch"] == [f"{m:.2f}\u00d7" for m in (1, summary.stretch_max, of_other.stretch_max)]
+    distances = dict(heat_panel.distances(scene, measured))
+    assert distances["Distance"].startswith("at most ")
+    centimetres = float(distances["Distance"].removeprefix("at most ").removesuffix(" cm"))
     assert centimetres == pytest.approx(100 * summary.distance_max, rel=0.01)
+    # Its own volume at rest, and the other method's numbers as they are where that one is shown.
+    volume = float(rows["Volume"][0].removesuffix(" m\u00b3"))
+    assert volume == pytest.approx(measured.rest.volume, rel=0.05)
+    obj.sinew.method = "lbs"
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    again = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    for name in ("volume_change", "stretch_max", "bulge_min", "bulge_max"):
+        assert again.measured.entry(name) == pytest.approx(other.entry(name), rel=1e-6)
+    # What is shown is the other method: there is nothing beside it.
+    assert live.measured_under_other(again, "lbs", depsgraph) is None
+    assert {len(row) for row in heat_panel.rows(scene, again.measured, None)} == {3}
+    armature = live.measure(scenes.states_of(obj), "blender", depsgraph)
+    assert live.measured_under_other(armature, "blender", depsgraph) is not None
 
 
 def test_measuring_twice_measures_once():
@@ -159,10 +176,14 @@ def test_measuring_twice_measures_once():
     depsgraph = bpy.context.evaluated_depsgraph_get()
     first = live.measure(scenes.states_of(obj), "lbs", depsgraph).measured
     assert live.measure(scenes.states_of(obj), "lbs", depsgraph).measured is first
+    subject = live.measure(scenes.states_of(obj), "lbs", depsgraph)
+    other = live.measured_under_other(subject, "lbs", depsgraph)
+    assert live.measured_under_other(subject, "lbs", depsgraph) is other
     bpy.context.scene.frame_set(9)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     second = live.measure(scenes.states_of(obj), "lbs", depsgraph)
     assert second.measured is not first
+    assert live.measured_under_other(second, "lbs", depsgraph) is not other
     gauge = second.gauge
     bpy.context.scene.frame_set(10)
     assert live.measure(scenes.states_of(obj), "lbs", depsgraph).gauge is gauge

@@ -527,6 +527,107 @@ def arrange_comparison(w: Walker, r: random.Random) -> str | None:
     return f"comparison {how}"
 
 
+# --- A character: what is set for all meshes of an armature
+
+
+def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
+    """The armature of one that can be selected, and whose settings no keys or library decide."""
+
+    def is_free(obj: bpy.types.Object) -> bool:
+        return obj.library is None and obj.override_library is None and not w.side.is_method_keyed(obj)
+
+    # As a window does between two clicks: Sinew knows by then which armature a modifier has.
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    rigs = [rig for rig in w.armatures() if rig.visible_get()]
+    meshes = {rig: w.side.character(rig) for rig in rigs}
+    return w.one(r, [rig for rig in rigs if meshes[rig] and all(map(is_free, meshes[rig]))])
+
+
+@operation(1.5)
+def character_method(w: Walker, r: random.Random) -> str | None:
+    rig, name = _character(w, r), _method(r)
+    if rig is None or not w.select(rig):
+        return None
+    w.side.set_character_method(rig, name)
+    return f"the character of {rig.name} by {name}"
+
+
+@operation(1.5)
+def own_settings(w: Walker, r: random.Random) -> str | None:
+    rig = _character(w, r)
+    obj = w.one(r, w.side.character(rig)) if rig is not None else None
+    if obj is None or obj not in w.in_layer() or not w.select(obj):
+        return None
+    w.side.switch_own(rig, obj)
+    return f"{obj.name} {'keeps settings of its own' if w.side.is_own(obj) else 'follows its character'}"
+
+
+@operation(0.7)
+def preset(w: Walker, r: random.Random) -> str | None:
+    rig = _character(w, r)
+    if rig is None or not w.select(rig):
+        return None
+    w.side.use_preset(rig, w.folder)
+    return f"a preset for the character of {rig.name}"
+
+
+# --- Features that change the mesh
+
+
+@operation(1.5)
+def mend(w: Walker, r: random.Random) -> str | None:
+    """What diagnostics find in the weights."""
+    obj, how, most = w.editable(r), r.choice(("limit", "limit", "normalize", "fill")), r.choice((1, 2, 3))
+    if obj is None or obj.mode != "OBJECT" or obj.data.is_editmode or obj.parent_type == "ARMATURE":
+        return None
+    modifiers = armature_modifiers(obj)
+    if len(modifiers) != 1 or modifiers[0].object is None or modifiers[0].object.data.is_editmode:
+        return None
+    w.before_evaluation()
+    bpy.context.view_layer.update()
+    found = w.side.mend(obj, how, most)
+    return f"mend {obj.name}: {found} by {how}" if found is not None else None
+
+
+def _and_undo(w: Walker, r: random.Random, act: Callable[[], str]) -> str:
+    """Does what only Sinew's side can, and takes it back. No redo leads there again."""
+    w.object_mode()
+    w.this_frame()
+    w.unpushed = True
+    w.push_undo()
+    said = act()
+    for message in ("done", "after"):
+        w.unpushed = True
+        w.push_undo()
+        if message == "done":
+            bpy.ops.ed.undo()
+    return said
+
+
+@operation(0.5)
+def bake_to_bones(w: Walker, r: random.Random) -> str | None:
+    obj, motion = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.choice(("keys", "pose"))
+    if obj is None or w.compared:
+        return None
+    is_alone = len(w.modifiers(obj)) == 1
+    name = obj.name
+    _and_undo(w, r, lambda: w.side.bake_to_bones(obj, motion, is_alone))
+    return f"bake {name} to bones with {motion}, and undo"
+
+
+@operation(0.5)
+def corrective_key(w: Walker, r: random.Random) -> str | None:
+    obj, driven = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.random() < 0.5
+    if obj is None or w.compared:
+        return None
+    rig = next((m.object for m in armature_modifiers(obj) if m.object is not None), None)
+    bone = w.one(r, rig.pose.bones) if driven and rig is not None else None
+    name = obj.name
+    _and_undo(w, r, lambda: w.side.add_corrective_key(obj, bone))
+    return f"a corrective shape key of {name}, and undo"
+
+
 @operation(0.5)
 def restart(w: Walker, r: random.Random) -> str | None:
     frame = r.choice((None, r.randint(*FRAMES)))

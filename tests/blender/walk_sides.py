@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import logging
 import time
+from pathlib import Path
 
 import bpy
+import numpy as np
 import sinew
 
 OF_BLENDER = ("lbs", "dq")
@@ -39,6 +41,8 @@ STAGES: tuple[dict[str, dict[str, object]], ...] = (
 DRIVEN, ON, KEYED, ADOPTED, CHANGED = 1, 2, 4, 8, 16
 # Numbers in the bits above: places in METHODS and STAGES, each in four bits.
 METHOD, STAGE, FIELD = 32, 512, 15
+# Above these: it keeps settings of its own within its character.
+OWN = 8192
 
 
 def whole_stages(number: int) -> dict[str, dict[str, object]]:
@@ -90,6 +94,23 @@ def curves_of(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     slot = animation.action_slot
     bags = [s.channelbag(slot) for layer in action.layers for s in layer.strips] if slot is not None else []
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+# What mends weights, by the finding: those that both sides can do.
+MENDS = {
+    "no_weights": ("fill",),
+    "small_sums": ("normalize", "fill"),
+    "many_influences": ("limit",),
+}
+
+
+def _world_points(obj: bpy.types.Object) -> np.ndarray:
+    """float64 [vertices, 3], as Blender shows it."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = np.empty((len(evaluated.data.vertices), 3), dtype=np.float32)
+    evaluated.data.vertices.foreach_get("co", points.ravel())
+    matrix = np.array(evaluated.matrix_world)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def animated_paths(obj: bpy.types.Object) -> set[str]:
@@ -229,6 +250,90 @@ class BlenderSide:
             value = values.get(modifier.path_from_id("use_deform_preserve_volume"))
             if value is not None:
                 modifier.use_deform_preserve_volume = value >= 0.5
+
+    # --- A character: all meshes of an armature that Sinew deforms, in the scene's order
+
+    def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
+        def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
+            return next((m.object for m in armature_modifiers(obj) if m.object is not None), None)
+
+        return [
+            obj
+            for obj in bpy.context.scene.objects
+            if obj.type == "MESH" and self.has_sinew(obj) and armature_of(obj) == rig
+        ]
+
+    def is_own(self, obj: bpy.types.Object) -> bool:
+        return bool(obj.pass_index & OWN)
+
+    def set_character_method(self, rig: bpy.types.Object, method: str) -> None:
+        """What is selected is the armature."""
+        for obj in self._followers(rig):
+            self.set_method(obj, method)
+
+    def switch_own(self, rig: bpy.types.Object, obj: bpy.types.Object) -> None:
+        """What is selected is the mesh."""
+        own = not self.is_own(obj)
+        self._set(obj, OWN, own)
+        others = [other for other in self._followers(rig) if other != obj]
+        if not own and others:
+            self._share(others[0], obj)
+
+    def use_preset(self, rig: bpy.types.Object, folder: Path) -> None:
+        """One of the character's own settings, which its meshes then have, and the groups of its stages."""
+        followers = self._followers(rig)
+        for obj in followers[1:]:
+            self._share(followers[0], obj)
+
+    def _followers(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
+        return [obj for obj in self.character(rig) if not self.is_own(obj)]
+
+    def _share(self, source: bpy.types.Object, target: bpy.types.Object) -> None:
+        self.set_method(target, self.method(source))
+        self.set_stages(target, self.stages(source))
+
+    # --- Features that change the mesh
+
+    def mend(self, obj: bpy.types.Object, how: str, most: int) -> str | None:
+        """What was found and mended; None for nothing. By the library's weights alone, without the add-on's
+        reading of what was checked."""
+        from sinew_addon.attach.modifier_options import ModifierOptions
+        from sinew_addon.core.diagnostics import check_weights
+        from sinew_addon.core.mend import WeightMender
+        from sinew_addon.core.spaces import transformed
+        from sinew_addon.io import armature_io, mesh_io
+
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        (modifier,) = armature_modifiers(obj)
+        evaluated = modifier.object.evaluated_get(depsgraph)
+        bones, weights = armature_io.read_bones(evaluated), mesh_io.read_group_weights(obj.data)
+        weighting = ModifierOptions.read(modifier).weighting(obj, weights, bones)
+        space = armature_io.bones_from_model(obj.evaluated_get(depsgraph), evaluated)
+        points = mesh_io.read_points(obj.data)
+        points = points if space is None else transformed(points, space)
+        names = [group.name for group in obj.vertex_groups]
+        findings = check_weights(weighting, points, weights, names, most)
+        found = next((each for each in findings if how in MENDS.get(each.name, ())), None)
+        if found is None:
+            return None
+        mender = WeightMender(weights, bones.of_groups(names) >= 0, np.zeros(len(names), dtype=bool))
+        vertices = found.vertices.tolist()
+        if how == "limit":
+            rows = mender.limited(vertices, most)
+        elif how == "normalize":
+            rows = mender.normalized(vertices)
+        else:
+            rows = mender.filled(vertices, mesh_io.read_topology(obj.data).edges, most)
+        if not rows:
+            return None
+        mesh_io.write_group_weights(obj, rows)
+        return found.name
+
+    def bake_to_bones(self, obj: bpy.types.Object, motion: str, is_alone: bool) -> str:
+        return ""
+
+    def add_corrective_key(self, obj: bpy.types.Object, bone: bpy.types.PoseBone | None) -> str:
+        return ""
 
     def set_option(self, obj: bpy.types.Object, name: str, value: object) -> None:
         """One that changes no shape."""
@@ -507,6 +612,94 @@ class SinewSide:
 
         precomputations.waits = not on
 
+    def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
+        from sinew_addon.attach import attach
+
+        return [
+            obj
+            for obj in bpy.context.scene.objects
+            if obj.type == "MESH"
+            and self.has_sinew(obj)
+            and not self.may_react(obj)
+            and attach.armature_of(obj) == rig
+        ]
+
+    def is_own(self, obj: bpy.types.Object) -> bool:
+        return obj.sinew.is_own
+
+    def set_character_method(self, rig: bpy.types.Object, method: str) -> None:
+        bpy.ops.sinew.use_method(method=method)
+
+    def switch_own(self, rig: bpy.types.Object, obj: bpy.types.Object) -> None:
+        bpy.ops.sinew.own_settings(name=obj.name)
+
+    def use_preset(self, rig: bpy.types.Object, folder: Path) -> None:
+        from sinew_addon.ui import presets
+
+        followers = [obj for obj in self.character(rig) if not obj.sinew.is_own]
+        if not followers:
+            return
+        stages = number_of(self._stages(followers[0]))
+        character = bpy.context.scene.sinew_character
+        # As Blender writes presets.
+        lines = [f"{path} = {eval(path, {'character': character})!r}" for path in presets.PATHS]
+        path = folder / "preset.py"
+        path.write_text("\n".join(["import bpy", *presets.DEFINES, *lines]))
+        bpy.ops.sinew.method_preset(filepath=str(path))
+        for obj in followers[1:]:
+            self.set_stages(obj, stages)
+
+    def mend(self, obj: bpy.types.Object, how: str, most: int) -> str | None:
+        from sinew_addon.core.errors import SinewError
+        from sinew_addon.features.diagnose import diagnose, mending
+
+        diagnose.check(bpy.context.scene, [obj], most)
+        findings = diagnose.of(obj).findings
+        found = next((each for each in findings if how in MENDS.get(each.name, ())), None)
+        if found is None:
+            return None
+        try:
+            mending.mend(obj, found.name, how, most)
+        except SinewError:
+            return None
+        return found.name
+
+    def bake_to_bones(self, obj: bpy.types.Object, motion: str, is_alone: bool) -> str:
+        """is_alone  nothing but one Armature modifier changes the mesh: what plays has the stated error"""
+        from sinew_addon.core.errors import SinewError
+        from sinew_addon.core.helper_bones import HelperOptions
+        from sinew_addon.features.bake import bake
+
+        scene = bpy.context.scene
+        frames = sorted({scene.frame_start, scene.frame_current, scene.frame_end})
+        expected = _world_points(obj)
+        try:
+            options = HelperOptions(helpers=2, motion=motion)
+            started = bake.start([obj], "bones", frames, Path("walk.blend"), overwrite=True, helpers=options)
+            for _share in started.sample():
+                pass
+        except SinewError as refused:
+            return f"refused: {refused}"
+        started.place()
+        bpy.context.view_layer.update()
+        (report,) = started.reports
+        if is_alone and len(expected):
+            distance = np.linalg.norm(_world_points(obj) - expected, axis=1).max()
+            if not distance <= 1.01 * report.after.worst + 1e-4 * report.diagonal:
+                raise ValueError(f"{obj.name}: baked it is {distance:.3g} off, not {report.after.worst:.3g}")
+        return f"{report.helpers} helper bones"
+
+    def add_corrective_key(self, obj: bpy.types.Object, bone: bpy.types.PoseBone | None) -> str:
+        from sinew_addon.core.errors import SinewError
+        from sinew_addon.features.corrective import corrective_key
+
+        try:
+            made = corrective_key.add(obj, bpy.context.evaluated_depsgraph_get(), bone)
+        except SinewError as refused:
+            return f"refused: {refused}"
+        bpy.context.view_layer.update()
+        return f"{made.name}, {made.before:.3g} to {made.after:.3g}"
+
     def wait(self) -> None:
         """What timers of the window see to: that no object waits for what a thread computes, and what Blender
         evaluates without telling anybody."""
@@ -531,7 +724,6 @@ class SinewSide:
         return any(curve.data_path == "sinew.method" for curve in curves_of(obj))
 
     def start_comparison(self, meshes: list[bpy.types.Object], methods: list[str]) -> None:
-        import numpy as np
         from sinew_addon.features.compare import comparison
 
         comparison.start(bpy.context, meshes, methods, np.array((1.0, 0.0, 0.0)))

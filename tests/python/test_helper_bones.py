@@ -151,6 +151,16 @@ def test_a_vertex_without_weights_and_a_mesh_without_vertices():
     solution = solved(Motion(motion.rest, motion.targets, motion.bones, bare, SEGMENTS), Wanted(1))
     assert (solution.bones[0] == -1).all()
     assert (solution.weights[0] == 0.0).all()
+    # It stays at rest, also where a stage behind the method moves it: that is an error, too.
+    distances = np.linalg.norm(motion.targets[:, 0].astype(np.float64) - motion.rest[0, 0], axis=1)
+    assert np.isclose(solution.errors[0], np.sqrt(np.square(distances).mean()), atol=1e-6)
+    targets = motion.targets.copy()
+    targets[3, 0] += 7.0
+    bare_motion = Motion(motion.rest, targets, motion.bones, bare, SEGMENTS)
+    moved = solved(bare_motion, Wanted(1))
+    found = errors_of(played(bare_motion, moved) + (moved.bones[:, :1] < 0) * motion.rest, targets)
+    assert np.allclose((moved.after.rms, moved.after.worst), found, rtol=1e-3)
+    assert moved.after.worst > 12.0
     none = Influences(np.zeros(1, np.int32), np.empty(0, np.int32), np.empty(0, np.float32))
     empty = Motion(motion.rest[:, :0], motion.targets[:, :0], motion.bones, none, SEGMENTS)
     solution = solved(empty, Wanted(3))

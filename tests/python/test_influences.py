@@ -6,7 +6,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from sinew_addon.core.influences import GroupWeights, entries_of_bones
+from sinew_addon.core.influences import GroupWeights, Influences, entries_of_bones
 
 
 def random_groups(seed: int, zeros: bool, vertices: int = 200) -> GroupWeights:
@@ -52,3 +52,20 @@ def test_what_all_counts_is_not_copied():
     assert entries.counts is groups.counts
     assert influences.bones is entries.bones
     assert influences.weights is groups.weights
+
+
+def test_distance_of_influences_is_the_largest_difference_of_a_weight():
+    def of(*rows):
+        counts = [len(row) for row in rows]
+        pairs = [pair for row in rows for pair in row.items()]
+        return Influences(
+            np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+            np.array([bone for bone, _weight in pairs], np.int32),
+            np.array([weight for _bone, weight in pairs], np.float32),
+        )
+
+    first = of({0: 0.5, 2: 0.5}, {}, {1: 1.0})
+    assert first.distance_from(of({2: 0.5, 0: 0.5}, {}, {1: 1.0})) == 0.0
+    assert first.distance_from(of({0: 0.5, 2: 0.25}, {}, {1: 1.0})) == 0.25
+    assert first.distance_from(of({0: 0.5, 2: 0.5}, {4: 0.125}, {1: 1.0})) == 0.125
+    assert of({}, {}).distance_from(of({}, {})) == 0.0

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake to bones: helper bones with plain keys beside a rig's own, and weights, which Blender's Armature
-modifier and every engine play.
+"""A bake to bones: helper bones beside a rig's own, and weights, which Blender's Armature modifier and every
+engine play. Helper bones have plain keys, or follow the pose by constraints of Blender's.
 
 Like bake.Bake it goes in steps: sample(), place(), publish(), discard().
 """
@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ...attach import properties, stack, upstream_proxy
-from ...core import helper_bones
+from ...core import helper_bones, pose_helpers, pose_samples
 from ...core.errors import SinewError
-from ...core.helper_bones import HelperOptions, Motion, Report
+from ...core.helper_bones import POSE, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
+from ...core.session import SkinStack, SkinStageFrame
 from ...core.spaces import transformed
+from ...core.stages import StageValues
 from ...deform import evaluate, session
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io
@@ -28,6 +31,13 @@ from .take_off import take_off
 
 # Of the time that a bake takes, until the frames are read.
 _SAMPLING = 0.2
+# Weights of envelopes, which are computed anew at each frame, are the same to this.
+_SAME_WEIGHT = 1e-3
+# Random poses that helper bones are made from, beside the frames, and others that they are tried with.
+_POSES, _UNSEEN_POSES = 64, 32
+
+# What the shape of a mesh at a frame is made of: its rest points, its pose, the values of its stages.
+Shape = tuple[np.ndarray, SkinStageFrame, StageValues]
 
 
 class BoneBake:
@@ -100,6 +110,9 @@ class _Rig:
         self._rest: list[np.ndarray] = []
         self._poses: list[np.ndarray] = []
         self._influences: list[Influences] = []
+        # Of each mesh, by which it is deformed in other poses; and of each frame, those of all meshes.
+        self._stacks: list[SkinStack] = []
+        self._shapes: list[list[Shape]] = []
 
     def take(self) -> None:
         """The frame as it is evaluated."""
@@ -110,11 +123,14 @@ class _Rig:
         for state, frame in zip(states, frames, strict=True):
             targets.append(transformed(state.points, frame.bones_from_model))
             rest.append(transformed(state.shown.rest_points, frame.bones_from_model))
-        if not self._poses:
-            self._bones = bindings[0].bones
-            self._influences = [b.weighting.influences(p) for b, p in zip(bindings, rest, strict=True)]
+        influences = [b.weighting.influences(p) for b, p in zip(bindings, rest, strict=True)]
+        if self._poses:
+            self._check_same(influences)
+        else:
+            self._bones, self._influences = bindings[0].bones, influences
             scale = np.array(self.rig.matrix_world, dtype=np.float64)[:3, :3]
             self._unit = float(np.cbrt(abs(np.linalg.det(scale))))
+            self._stacks = [state.bound.skin_stack.another() for state in states]
         self._poses.append(frames[0].pose.astype(np.float64))
         self._targets.append(np.concatenate(targets).astype(np.float32))
         together = np.concatenate(rest).astype(np.float32)
@@ -127,33 +143,87 @@ class _Rig:
         # Where nothing but the armature moves them, one array stands for all.
         is_same = bool(self._rest) and np.array_equal(together, self._rest[-1])
         self._rest.append(self._rest[-1] if is_same else together)
+        points = [
+            self._shapes[-1][number][0] if is_same else state.shown.rest_points.copy()
+            for number, state in enumerate(states)
+        ]
+        values = [state.shown.stage_values for state in states]
+        self._shapes.append(list(zip(points, frames, values, strict=True)))
+
+    def _check_same(self, influences: list[Influences]) -> None:
+        """Raises SinewError where others move vertices than at the first frame."""
+        for obj, own, first in zip(self.meshes, influences, self._influences, strict=True):
+            if own is not first and own.distance_from(first) > _SAME_WEIGHT:
+                raise SinewError(
+                    f"{obj.name}: the envelopes of its bones reach other vertices from frame to frame; bake "
+                    "to mdd or pc2"
+                )
 
     def solve(self, options: HelperOptions) -> Generator[float, None, None]:
-        moves = any(rest is not self._rest[0] for rest in self._rest)
+        at_frames = self._motion(self._rest, self._targets, self._poses)
+        diagonal = self._unit * at_frames.diagonal
+        if options.motion != POSE:
+            self._targets.clear()
+            self._solution = yield from helper_bones.solve(at_frames, options.of(at_frames))
+            self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
+            return
+        rest = self._bones.rest
+        motion = self._with(at_frames, _POSES, seed=1)
+        solution = yield from pose_helpers.solve(motion, options.of(motion), rest)
+        before, after, errors = pose_helpers.errors_of(solution, at_frames, rest)
+        self._solution = replace(solution, before=before, after=after, errors=errors)
+        unseen = pose_helpers.errors_of(solution, self._with(None, _UNSEEN_POSES, seed=2), rest)
+        self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal, unseen[:2])
+        self._targets.clear()
+
+    def _motion(self, rest: list[np.ndarray], targets: list[np.ndarray], poses: list[np.ndarray]) -> Motion:
         from_rest = np.linalg.inv(self._bones.rest.astype(np.float64))
-        motion = Motion(
-            np.array(self._rest if moves else self._rest[:1]),
-            np.array(self._targets),
-            np.array([(pose @ from_rest)[:, :3] for pose in self._poses]),
+        moves = any(each is not rest[0] for each in rest)
+        return Motion(
+            np.array(rest if moves else rest[:1]),
+            np.array(targets),
+            np.array([(pose @ from_rest)[:, :3] for pose in poses]),
             joined(self._influences, [0] * len(self._influences)),
             np.stack([self._bones.envelopes.heads, self._bones.envelopes.tails], axis=1).astype(np.float64),
         )
-        self._targets.clear()
-        self._solution = yield from helper_bones.solve(motion, options.of(motion))
-        diagonal = self._unit * motion.diagonal
-        self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
+
+    def _with(self, at_frames: Motion | None, count: int, seed: int) -> Motion:
+        """Random poses, behind those of the frames where these are given."""
+        joints = helper_bones_io.read_joints(self.rig, self._bones)
+        frames, bones = len(self._poses), len(joints.parents)
+        seen = np.array(self._poses)
+        poses = seen[np.arange(count) % frames]
+        poses[:, :bones] = pose_samples.sampled(seen[:, :bones], joints, count, seed)
+        rest = [self._rest[number % frames] for number in range(count)]
+        targets = [self._shape_in(pose, number % frames) for number, pose in enumerate(poses)]
+        if at_frames is None:
+            return self._motion(rest, targets, list(poses))
+        return self._motion([*self._rest, *rest], [*self._targets, *targets], [*self._poses, *poses])
+
+    def _shape_in(self, pose: np.ndarray, frame: int) -> np.ndarray:
+        """float32 [vertices, 3], armature space: what Sinew makes of all meshes in a pose, all else being as
+        at one of the frames."""
+        points = []
+        for skin_stack, (rest, at_frame, values) in zip(self._stacks, self._shapes[frame], strict=True):
+            skin_stack.deform(rest, [replace(at_frame, pose=pose.astype(np.float32))], values=values)
+            points.append(transformed(skin_stack.points, at_frame.bones_from_model))
+        return np.concatenate(points).astype(np.float32)
 
     def place(self, frames: Sequence[float]) -> None:
         solution, bones = self._solution, self._bones
         own = [bones.names[bone] for bone in solution.parents]
-        motions = np.zeros((*solution.motions.shape[:2], 4, 4))
-        motions[:, :, :3], motions[:, :, 3, 3] = solution.motions, 1.0
-        parents = np.array(self._poses)[:, solution.parents]
-        times = shape_animation.key_times(frames)
+        follows_pose = bool(solution.blends)
         # Only what is visible can be edited.
         with nullcontext() if self.rig.visible_get() else evaluate.shown([self.rig]):
-            names = helper_bones_io.add_bones(self.rig, own, solution.heads)
-        helper_bones_io.write_keys(self.rig, names, motions, parents, times)
+            names = helper_bones_io.add_bones(self.rig, own, solution.heads, hanging=not follows_pose)
+        if follows_pose:
+            helper_bones_io.add_constraints(self.rig, names, solution.blends, bones.names)
+        else:
+            motions = np.zeros((*solution.motions.shape[:2], 4, 4))
+            motions[:, :, :3], motions[:, :, 3, 3] = solution.motions, 1.0
+            parents = np.array(self._poses)[:, solution.parents]
+            times = shape_animation.key_times(frames)
+            helper_bones_io.write_keys(self.rig, names, motions, parents, times)
         first = 0
         for obj in self.meshes:
             count = len(obj.data.vertices)

@@ -11,7 +11,7 @@ import bpy
 from ...core.bake import BONES, EXPORTS
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
-from ...core.helper_bones import HelperOptions
+from ...core.helper_bones import KEYS, POSE, HelperOptions
 from ...deform import evaluate
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
@@ -36,7 +36,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             ("shape-keys", "Shape Keys", "One a frame, with keyed values, in this file"),
             ("mdd", "MDD Cache", "A point cache and a Mesh Cache modifier, in this file"),
             ("pc2", "PC2 Cache", "A point cache and a Mesh Cache modifier, in this file"),
-            (BONES, "Bones", "Helper bones with keys, and weights, in this file: what engines play"),
+            (BONES, "Bones", "Helper bones and weights, in this file: what engines play"),
             ("alembic", "Alembic", "The final meshes with UVs and materials; this file stays as it is"),
             ("usd", "USD", "The final meshes with UVs and materials; this file stays as it is"),
             ("gltf", "glTF", "The final meshes, the frames as morph targets; this file stays as it is"),
@@ -83,6 +83,14 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         min=1,
         soft_max=8,
     )
+    motion: bpy.props.EnumProperty(
+        name="Motion",
+        description="What moves helper bones",
+        items=[
+            (KEYS, "Keys", "Plain keys over these frames, the nearest that there are: for engines"),
+            (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
+        ],
+    )
     in_steps: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -94,7 +102,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        of_kind = ("helpers", "error", "influences") if self.kind == BONES else ()
+        of_kind = ("motion", "helpers", "error", "influences") if self.kind == BONES else ()
         if self.kind not in WITHOUT_FILES:
             of_kind = ("folder", "overwrite")
         for name in ("kind", "frames", "step", *of_kind):
@@ -108,7 +116,17 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "asked", False):
             # A dialog's operator can not go on in steps itself.
-            names = ("kind", "frames", "step", "folder", "overwrite", "helpers", "error", "influences")
+            names = (
+                "kind",
+                "frames",
+                "step",
+                "folder",
+                "overwrite",
+                "motion",
+                "helpers",
+                "error",
+                "influences",
+            )
             bpy.ops.sinew.bake(
                 "INVOKE_DEFAULT", in_steps=True, **{name: getattr(self, name) for name in names}
             )
@@ -131,8 +149,8 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         self.report({"INFO"}, tr("Baked {names}", names=self.started.what))
         if isinstance(self.started, bake_bones.BoneBake):
             for report in self.started.reports:
-                sentence = report.sentence(evaluate.length_unit(context.scene))
-                self.report({"INFO"}, tr(sentence))
+                for sentence in report.sentences(evaluate.length_unit(context.scene)):
+                    self.report({"INFO"}, tr(sentence))
         return {"FINISHED"}
 
     def _start(self, context: bpy.types.Context) -> bake.Started:
@@ -143,7 +161,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
         suffix = bake.suffix_of(self.kind)
         target = Path(bpy.path.abspath(self.folder)) / f"{name or 'untitled'}{suffix}"
-        helpers = HelperOptions(self.helpers, self.error, self.influences)
+        helpers = HelperOptions(self.helpers, self.error, self.influences, self.motion)
         meshes, frames = sinew_targets(context), frames[:: self.step]
         return bake.start(meshes, self.kind, frames, target, self.overwrite, helpers)
 

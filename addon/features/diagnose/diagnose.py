@@ -235,22 +235,21 @@ def _edited_weights(mesh: bpy.types.Mesh) -> GroupWeights:
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not _checks:
         return
-    touched, armatures = set(), set()
+    # By names, of evaluated data: originals may be gone by now, as handlers before this one deleted them.
+    meshes, armatures = set(), set()
     for update in depsgraph.updates:
         if isinstance(update.id, bpy.types.Mesh) and update.is_updated_geometry:
-            touched.add(update.id.original.session_uid)
+            meshes.add(update.id.name_full)
         elif isinstance(update.id, bpy.types.Armature):
-            armatures.add(update.id.original.name_full)
-    for found in _checks.values():
-        found.suspect |= found.mesh in touched
-    if armatures:
-        _compare_bones(armatures, depsgraph)
-
-
-def _compare_bones(armatures: set[str], depsgraph: bpy.types.Depsgraph) -> None:
+            armatures.add(update.id.name_full)
+    if not (meshes or armatures):
+        return
     for obj in bpy.data.objects:
         found = _checks.get(obj.session_uid)
-        armature = attach.armature_of(obj) if found is not None else None
+        if found is None:
+            continue
+        found.suspect |= obj.data.name_full in meshes
+        armature = attach.armature_of(obj) if armatures else None
         if armature is None or armature.data.name_full not in armatures or armature.data.is_editmode:
             continue
         bones = armature_io.read_bones(armature.evaluated_get(depsgraph))

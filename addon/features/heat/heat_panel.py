@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ...attach import properties
@@ -57,35 +59,60 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
         if subject is None:
             draw_text(self.layout, context, "Sinew deforms nothing here now", icon="INFO")
             return
+        other = live.measured_under_other(subject, settings.other, depsgraph)
+        shown = {properties.of(obj).method for obj, _skinned in pairs}
+        heads = ["", "At Rest", shown.pop() if len(shown) == 1 else "Shown"]
+        if other is not None:
+            heads.append("Armature" if settings.other == properties.BLENDER else settings.other)
         column = self.layout.column(align=True)
-        for name, value in rows(context.scene, subject.measured):
+        _draw_row(column, heads)
+        for row in rows(context.scene, subject.measured, other):
+            _draw_row(column, row)
+        column = self.layout.column(align=True)
+        column.label(text="Compared with")
+        column.prop(settings, "other", text="")
+        for name, value in distances(context.scene, subject.measured):
             split = column.split(factor=0.42)
             split.label(text=name)
             split.label(text=value)
-        column = self.layout.column(align=True)
-        column.label(text="Distance is to")
-        column.prop(settings, "other", text="")
 
 
-def rows(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
-    """What each number is and its value with its unit, of one frame."""
+def _draw_row(layout: bpy.types.UILayout, texts: Sequence[str]) -> None:
+    split = layout.split(factor=0.35)
+    split.label(text=texts[0])
+    values = split.row(align=True)
+    for text in texts[1:]:
+        values.label(text=text)
 
-    def entry(unit: str, name: str, signed: bool = False) -> str:
-        return units.text(scene, unit, measured.entry(name), signed)
 
-    def between(low: str, high: str) -> str:
-        return tr("{low} to {high}", low=low, high=high)
+def rows(scene: bpy.types.Scene, measured: Measured, other: Measured | None) -> list[tuple[str, ...]]:
+    """What each number is, and its values with their units in one frame: at rest, of the shape that is shown
+    and, where it is given, of the other method's."""
+    shapes = [measured] if other is None else [measured, other]
+
+    def row(label: str, name: str, unit: str, at_rest: str, signed: bool = False) -> tuple[str, ...]:
+        values = [each.entry(name) for each in shapes]
+        return label, at_rest, *(units.text(scene, unit, value, signed, short=True) for value in values)
+
+    def rest(unit: str, value: float) -> str:
+        return units.text(scene, unit, value, short=True)
 
     return [
-        ("Volume", entry("share", "volume_change", signed=True)),
-        ("Area", entry("share", "area_change", signed=True)),
-        ("Stretch", between(entry("ratio", "stretch_min"), entry("ratio", "stretch_max"))),
-        ("Stretch, RMS", entry("share", "stretch_rms")),
-        ("Flipped faces", f"{measured.entry('flipped_faces'):,}"),
-        ("Bulge", between(entry("length", "bulge_min"), entry("length", "bulge_max", signed=True))),
-        ("Distance", tr("at most {value}", value=entry("length", "distance_max"))),
-        ("Distance, RMS", entry("length", "distance_rms")),
+        row("Volume", "volume_change", "share", rest("volume", measured.rest.volume), True),
+        row("Area", "area_change", "share", rest("area", measured.rest.area), True),
+        row("Least stretch", "stretch_min", "ratio", rest("ratio", 1.0)),
+        row("Most stretch", "stretch_max", "ratio", rest("ratio", 1.0)),
+        row("Stretch, RMS", "stretch_rms", "share", rest("share", 0.0)),
+        ("Flipped faces", "0", *(f"{each.entry('flipped_faces'):,}" for each in shapes)),
+        row("Collapse", "bulge_min", "length", rest("length", 0.0)),
+        row("Bulge", "bulge_max", "length", rest("length", 0.0), True),
     ]
+
+
+def distances(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
+    """Between the shape that is shown and the other method's."""
+    most, rms = (units.text(scene, "length", measured.entry(f"distance_{name}")) for name in ("max", "rms"))
+    return [("Distance", tr("at most {value}", value=most)), ("Distance, RMS", rms)]
 
 
 class SINEW_PT_worst_frames(Sidebar, bpy.types.Panel):

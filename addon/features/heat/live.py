@@ -47,6 +47,7 @@ class Subject:
 
     stamp  what `measured` was worked out from
     rest   world points at rest, and what they were made from
+    under_other  the same frame under the method that distances are measured to, once somebody asked
     """
 
     parts: list[Part]
@@ -55,6 +56,7 @@ class Subject:
     rest: np.ndarray | None = None
     rest_made_from: tuple = ()
     measured: Measured | None = None
+    under_other: Measured | None = None
 
     def split(self, values: np.ndarray) -> list[np.ndarray]:
         """Values of all vertices, for each object its own."""
@@ -101,6 +103,7 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
             return _in_world([each.points() for each in others], worlds)
 
         subject.measured, subject.stamp = subject.gauge.measure(shape, reference), stamp
+        subject.under_other = None
     return subject
 
 
@@ -110,6 +113,19 @@ def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph
     worlds = [_world(part.obj, depsgraph) for part in subject.parts]
     shape = _in_world([_Other.of(part, method).points() for part in subject.parts], worlds)
     return subject.gauge.measure(shape, subject.measured.shape.points.T)
+
+
+def measured_under_other(subject: Subject, other: str, depsgraph: bpy.types.Depsgraph) -> Measured | None:
+    """As measured_under(), worked out once for a frame; None where all of it is shown by this method.
+
+    other  as it was given to measure()
+    """
+    shown = [frame for part in subject.parts for frame in part.skinned.shown.frames if frame is not None]
+    if all(frame.method == other and not frame.mix for frame in shown):
+        return None
+    if subject.under_other is None:
+        subject.under_other = measured_under(subject, other, depsgraph)
+    return subject.under_other
 
 
 def _is_current(part: Part, pair: tuple[bpy.types.Object, SkinnedObject]) -> bool:

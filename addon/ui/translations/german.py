@@ -768,6 +768,24 @@ TEXTS = {
         "{name}: {key} ist da und stummgeschaltet; der Skelettmodifikator liegt ohne ihn {before} daneben, "
         "mit ihm {after}"
     ),
+    # Edit and sculpt mode
+    "It has no {method} with these settings: what you see here is another shape": (
+        "{method} mit diesen Einstellungen hat er nicht: was hier zu sehen ist, ist eine andere Form"
+    ),
+    "Switch Preserve Volume to see {method} here, too": (
+        "Volumenerhalt umschalten, um {method} auch hier zu sehen"
+    ),
+    "It is the same: {method}": "Sie ist dieselbe: {method}",
+    # Lesson
+    "Open the Lesson": "Die Lektion öffnen",
+    "Sinew Lesson": "Sinew-Lektion",
+    "Open a file with an arm, a hand and a page that shows in ten minutes what Sinew does": (
+        "Eine Datei mit einem Arm, einer Hand und einer Seite öffnen, die in zehn Minuten zeigt, was Sinew "
+        "tut"
+    ),
+    "Save this file first: the lesson takes its place": (
+        "Erst diese Datei speichern: die Lektion tritt an ihre Stelle"
+    ),
     # Bake
     "Baked {names}": "Gebacken: {names}",
     "Bake": "Backen",
@@ -805,8 +823,8 @@ TEXTS = {
     "Where files go; // is beside this file": "Wohin Dateien kommen; // ist neben dieser Datei",
     "Overwrite": "Überschreiben",
     "Replace files that are there already": "Dateien ersetzen, die schon da sind",
-    "Helper bones with keys, and weights, in this file: what engines play": (
-        "Hilfsknochen mit Schlüsselbildern, und Gewichte, in dieser Datei: was Spiele abspielen"
+    "Helper bones and weights, in this file: what engines play": (
+        "Hilfsknochen und Gewichte, in dieser Datei: was Spiele abspielen"
     ),
     "Helper Bones": "Hilfsknochen",
     "How many each armature gets at most; 0: two a joint": (
@@ -825,6 +843,21 @@ TEXTS = {
     "; linear blending had {rms_before} and {worst_before}": (
         "{name}: {count} Hilfsknochen; Fehler im Mittel {rms} {unit}, höchstens {worst} ({shares} der "
         "Diagonale); lineares Überblenden hatte {rms_before} und {worst_before}"
+    ),
+    "In other poses, which they were not made from: {rms} {unit} rms, {worst} at most; linear blending has "
+    "{rms_before} and {worst_before}": (
+        "In anderen Posen, aus denen sie nicht gemacht wurden: im Mittel {rms} {unit}, höchstens {worst}; "
+        "lineares Überblenden hat {rms_before} und {worst_before}"
+    ),
+    "Motion": "Bewegung",
+    "Keys": "Schlüsselbilder",
+    "Pose": "Pose",
+    "What moves helper bones": "Was Hilfsknochen bewegt",
+    "Plain keys over these frames, the nearest that there are: for engines": (
+        "Schlüsselbilder über diese Einzelbilder, so nah es geht: für Spiele"
+    ),
+    "Constraints by which they follow the pose: other animation has them, too": (
+        "Beschränkungen, durch die sie der Pose folgen: auch andere Animation hat sie"
     ),
     "Sinew bakes": "Sinew backt",
     "Bake stopped; nothing was written": "Backen angehalten; nichts wurde geschrieben",
@@ -948,9 +981,12 @@ TEXTS = {
     "Numbers": "Zahlen",
     "Stretch, RMS": "Dehnung, RMS",
     "Distance, RMS": "Abstand, RMS",
-    "{low} to {high}": "{low} bis {high}",
+    "At Rest": "In Ruhe",
+    "Shown": "Gezeigt",
+    "Least stretch": "Kleinste Dehnung",
+    "Most stretch": "Größte Dehnung",
+    "Collapse": "Einfallen",
     "at most {value}": "höchstens {value}",
-    "Distance is to": "Abstand zu",
     "Sinew deforms nothing here now": "Sinew verformt hier zurzeit nichts",
     # Worst frames
     "worst at {frame}": "am schlechtesten bei {frame}",

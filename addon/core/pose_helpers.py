@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Helper bones that follow the pose, whatever animation there is: each moves as the dual quaternion blend of
+the rig's bones around it, with weights of its own. Blender's Armature constraint with Preserve Volume is it.
+
+Motions of this kind are in the place of those that each frame may choose (helper_bones.py): their weights are
+found by Gauss-Newton, damped (Levenberg, Marquardt), while everything else stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import sinew
+
+from . import helper_bones
+from .helper_bones import Blend, Errors, Helper, Motion, Solution, Solver, Wanted
+
+# So many bones move a helper bone at most.
+_MOST_BONES = 6
+_STEPS, _TRIES = 4, 5
+_DIFFERENCE = 1e-4
+_DAMPING = 1e-3
+# Weights that change by less are found.
+_CLOSE = 1e-4
+
+
+def solve(motion: Motion, wanted: Wanted, rest: np.ndarray) -> Generator[float, None, Solution]:
+    """As helper_bones.solve(), with blends of each helper bone.
+
+    rest  float [bones, 4, 4], the rig's bones at rest, armature space
+    """
+    return helper_bones.solve(motion, wanted, lambda own, most: _PoseSolver(own, most, rest_bones=rest))
+
+
+def errors_of(solution: Solution, motion: Motion, rest: np.ndarray) -> tuple[Errors, Errors, np.ndarray]:
+    """Of linear blend skinning with the weights that there were, and of a solution, in other poses than it
+    was made from; and its rms error at each vertex, float32 [vertices]."""
+    solver = _PoseSolver(motion, solution.bones.shape[1], rest_bones=rest)
+    before = solver.errors()
+    return before, *solver.play(solution)
+
+
+@dataclass
+class _PoseSolver(Solver):
+    """rest_bones  float [bones, 4, 4], armature space"""
+
+    rest_bones: np.ndarray = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        motions = np.zeros((*self.motion.bones.shape[:2], 4, 4))
+        motions[:, :, :3], motions[:, :, 3, 3] = self.motion.bones, 1.0
+        # Blender splits a bone's scale off, and blends it apart.
+        self._split = sinew.affine.split_scale(motions, np.asarray(self.rest_bones, dtype=np.float64))
+
+    def play(self, solution: Solution) -> tuple[Errors, np.ndarray]:
+        """The errors of a solution that was made of other poses; the rms of each vertex, float32."""
+        nothing = np.empty(0)
+        self.helpers = [
+            Helper(self._blended(blend), int(parent), nothing, nothing, blend)
+            for blend, parent in zip(solution.blends, solution.parents, strict=True)
+        ]
+        self.bones, self.weights = solution.bones[self.deformed], solution.weights[self.deformed]
+        self.residual = self._residual_of(self.bones, self.weights)
+        return self.errors(), self.errors_of_vertices()
+
+    def _blended(self, blend: Blend) -> np.ndarray:
+        """float64 [frames, 3, 4]"""
+        used = blend.weights > 0.0
+        bones, weights, head = blend.bones[used], blend.weights[used], blend.head
+        rigid, scale = self._split.rigid[:, bones], self._split.scale[:, bones]
+        linear = None
+        if self._split.has_scale[:, bones].any():
+            # Scale is about the head; how it moves the head goes with the rigid part.
+            moved = scale[..., :3, :3] @ head + scale[..., :3, 3] - head
+            rigid = rigid.copy()
+            rigid[..., :3, 3] += (rigid[..., :3, :3] @ moved[..., None])[..., 0]
+            linear = np.einsum("b,fbij->fij", weights / weights.sum(), scale[..., :3, :3])
+        pairs = sinew.affine.to_dual_quat(rigid)
+        blended = sinew.interpolate.blend(pairs, weights, "dlb", "running_sum")
+        motion = np.array(sinew.dual_quat.to_affine(blended.transforms))[:, :3]
+        if linear is not None:
+            motion[:, :, 3] += (motion[:, :, :3] @ (head - linear @ head)[..., None])[..., 0]
+            motion[:, :, :3] = motion[:, :, :3] @ linear
+        return motion
+
+    def _fitted(
+        self, helper: Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
+    ) -> np.ndarray:
+        rest = self.rest[vertices]
+        rest = weights[:, None, None] * np.concatenate([rest, np.ones((*rest.shape[:2], 1))], axis=2)
+        wanted = wanted.reshape(len(vertices), -1, 3)
+        # Of the sum over vertices of |w T p - y|^2: [frames or 1, 4, 4] and [frames, 3, 4].
+        squares = np.einsum("vfi,vfj->fij", rest, rest)
+        if rest.shape[1] == 1:
+            products = np.tensordot(wanted, rest[:, 0], axes=(0, 0))
+        else:
+            products = np.einsum("vfi,vfj->fij", wanted, rest)
+
+        def error(motion: np.ndarray) -> float:
+            return float(((motion @ squares - 2.0 * products) * motion).sum())
+
+        blend = self._start(vertices, weights) if helper.blend is None else helper.blend
+        motion = self._blended(blend)
+        least, damping = error(motion), _DAMPING
+        for _step in range(_STEPS if len(blend.bones) > 1 else 0):
+            slopes = np.stack(
+                [(self._blended(_more(blend, at)) - motion) / _DIFFERENCE for at in range(len(blend.bones))]
+            )
+            gradient = np.einsum("bfij,fij->b", slopes, motion @ squares - products)
+            curvature = np.einsum("bfij,cfij->bc", slopes @ squares, slopes)
+            size = np.trace(curvature) / len(gradient)
+            if not size > 0.0:
+                break
+            for _try in range(_TRIES):
+                step = np.linalg.solve(curvature + damping * size * np.identity(len(gradient)), -gradient)
+                ahead = _onto_simplex(blend, blend.weights + step)
+                moved = self._blended(ahead)
+                now = error(moved)
+                if now < least:
+                    break
+                damping *= 8.0
+            else:
+                break
+            change = np.abs(ahead.weights - blend.weights).max()
+            blend, motion, least, damping = ahead, moved, now, damping / 8.0
+            if change < _CLOSE:
+                break
+        helper.blend = blend
+        return motion
+
+    def _start(self, vertices: np.ndarray, weights: np.ndarray) -> Blend:
+        """As the vertices themselves are moved, together."""
+        own = self.own[vertices]
+        shares = self.own_weights[vertices] * weights[:, None]
+        total = np.bincount(own[own >= 0], shares[own >= 0], minlength=self.motion.bones.shape[1])
+        bones = np.argsort(-total, kind="stable")[:_MOST_BONES]
+        bones = bones[total[bones] > 0.0]
+        head = np.average(self.middle[vertices], axis=0, weights=weights + 1e-30)
+        return Blend(bones, total[bones] / total[bones].sum(), head)
+
+    def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
+        assert helper.blend is not None
+        assert old.blend is not None
+        ahead = helper.blend.weights + further * (helper.blend.weights - old.blend.weights)
+        helper.blend = _onto_simplex(helper.blend, ahead)
+        helper.motion = self._blended(helper.blend)
+
+
+def _more(blend: Blend, at: int) -> Blend:
+    weights = blend.weights.copy()
+    weights[at] += _DIFFERENCE
+    return replace(blend, weights=weights)
+
+
+def _onto_simplex(blend: Blend, weights: np.ndarray) -> Blend:
+    weights = np.maximum(weights, 0.0)
+    total = weights.sum()
+    return replace(blend, weights=weights / total) if total > 0.0 else blend

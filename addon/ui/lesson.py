@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lesson: a file with an arm, a hand and a page of text (blend_files/make_lesson.py), for who sees Sinew
+for the first time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from .translations import tr
+
+FILE = Path(__file__).resolve().parent.parent / "lesson.blend"
+
+
+class SINEW_OT_open_lesson(bpy.types.Operator):
+    bl_idname = "sinew.open_lesson"
+    bl_label = "Open the Lesson"
+    bl_description = "Open a file with an arm, a hand and a page that shows in ten minutes what Sinew does"
+    bl_options = {"REGISTER"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        # Blender asks whether to save what is open, unless the user has switched that off.
+        if not context.preferences.view.use_save_prompt:
+            return self.execute(context)
+        return _open("INVOKE_DEFAULT")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if bpy.data.is_dirty:
+            self.report({"ERROR"}, tr("Save this file first: the lesson takes its place"))
+            return {"CANCELLED"}
+        return _open("EXEC_DEFAULT")
+
+
+def _open(how: str) -> set[str]:
+    """As a new file, without a name: what is saved from it does not go into the extension's folder."""
+    return bpy.ops.wm.read_homefile(how, filepath=str(FILE), load_ui=True)
+
+
+CLASSES = (SINEW_OT_open_lesson,)

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In Blender's window, with Sinew's zip: the lesson is opened while something is not saved, and once all is. Prints
+"FACTS" and a line of JSON; pictures lie in the folder.
+
+    blender --factory-startup --enable-event-simulate --python lesson_in_window.py -- sinew.zip FOLDER
+"""  # noqa: E501
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import window
+
+ZIP, FOLDER = window.arguments()
+VIEW = (500, 450)
+facts: dict[str, object] = {}
+
+
+def open_lesson() -> None:
+    window.move(VIEW)
+    with window.in_view3d("WINDOW"):
+        try:
+            bpy.ops.sinew.open_lesson("INVOKE_DEFAULT")
+        except RuntimeError as error:
+            facts["said"] = str(error)
+
+
+def is_own() -> bool:
+    return "Unsaved" in bpy.data.objects and "Lesson" not in bpy.data.texts
+
+
+def wait(ticks: int = 3) -> Iterator[None]:
+    for _tick in range(ticks):
+        yield
+
+
+def steps() -> Iterator[None]:
+    window.install(ZIP)
+    yield from wait()
+    bpy.data.objects.new("Unsaved", None)
+    bpy.ops.ed.undo_push(message="work")
+    facts["is dirty"] = bpy.data.is_dirty
+    # Blender asks; Esc keeps what is open.
+    open_lesson()
+    yield from wait()
+    window.photograph(FOLDER / "asked.png")
+    facts["asks first"] = is_own()
+    window.press("ESC", VIEW)
+    yield from wait()
+    facts["kept after Esc"] = is_own()
+    # Who has switched that question off loses nothing, either.
+    bpy.context.preferences.view.use_save_prompt = False
+    open_lesson()
+    yield from wait()
+    facts["kept without the question"] = is_own()
+    bpy.context.preferences.view.use_save_prompt = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "own.blend"))
+    yield from wait()
+    open_lesson()
+    yield from wait()
+    facts["opened"] = ["Lesson" in bpy.data.texts, bpy.data.filepath, hasattr(bpy.types.Object, "sinew")]
+    facts["reading"] = [area.type for area in bpy.context.window_manager.windows[0].screen.areas]
+    window.photograph(FOLDER / "lesson.png")
+    print("FACTS " + json.dumps(facts), flush=True)
+
+
+window.run(steps())
