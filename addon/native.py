@@ -20,6 +20,7 @@ NAMES = (
         "direct_delta_mush",
         "dual_quat",
         "fit",
+        "ik",
         "interpolate",
     ),
     *("keep_thread_state", "methods", "quat_vec", "spline", "stages"),

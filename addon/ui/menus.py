@@ -63,6 +63,8 @@ ENTRIES: tuple[Entry | None, ...] = (
     None,
     Entry("sinew.bake", "Bake Shapes\u2026", icon="RENDER_ANIMATION"),
     Entry("sinew.bake_inbetweens"),
+    *_over("sinew.bake_ik", "Bake Sinew IK"),
+    Entry("sinew.remove_ik"),
     Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
     Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),
     None,

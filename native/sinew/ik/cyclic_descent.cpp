@@ -118,11 +118,6 @@ int IkSolver::State::solve_by_descent(const IkOptions& options) noexcept {
             if (bones[bone].moves) descend(bone);
         }
         update();
-        if (has_pole) {
-            const Vec3<double> line = tips[0].position - bones[tips[0].root].head;
-            bones[tips[0].root].rotate_by(pole_angle().angle() * unit(line, Vec3<double>(0.0)));
-            update();
-        }
         const double found = cost();
         if (found < best) {
             best = found;

@@ -72,26 +72,6 @@ void IkSolver::State::update_columns() noexcept {
                 write(moves ? tip.effector.rotation_weight * axis.screw.angular : Vec3<double>(0.0));
             }
         }
-        if (!has_pole) continue;
-        // The derivative of pole_error(), of the angle alone: the rest counts nothing where the angle is 0.
-        const IkTip& tip = tips[0];
-        const PoleAngle at = pole_angle();
-        const double square = at.sine * at.sine + at.cosine * at.cosine;
-        column[row] = 0.0;
-        if (!tip.is_moved_by[axis.bone] || !(square > 1e-18)) continue;
-        const Vec3<double>& root = bones[tip.root].head;
-        const Vec3<double> p = unit(pole - root, Vec3<double>(0.0));
-        const Vec3<double> u = pole_axis();
-        const Vec3<double> n = (tip.position - root) / at.line_length;
-        const Vec3<double> velocity = axis.screw.linear + glm::cross(axis.screw.angular, tip.position);
-        const Vec3<double> dn = (velocity - glm::dot(velocity, n) * n) / at.line_length;
-        const Vec3<double> du =
-            axis.bone == tip.root ? glm::cross(axis.screw.angular, u) : Vec3<double>(0.0);
-        const double d_sine = glm::dot(dn, glm::cross(u, p)) + glm::dot(n, glm::cross(du, p));
-        const double d_cosine = glm::dot(du, p) - (glm::dot(du, n) + glm::dot(u, dn)) * glm::dot(p, n) -
-                                glm::dot(u, n) * glm::dot(p, dn);
-        const double d_angle = (at.cosine * d_sine - at.sine * d_cosine) / square;
-        column[row] = kPoleWeight * at.line_length * std::sqrt(square) * d_angle;
     }
 }
 
@@ -106,20 +86,18 @@ void IkSolver::State::update_residual() noexcept {
         }
         if (tip.effector.rotation_weight > 0.0) write(tip.effector.rotation_weight * rotation_error(tip));
     }
-    if (has_pole) residual[row] = -kPoleWeight * pole_error();
 }
 
 void IkSolver::State::block_at_boundary(std::size_t x, std::size_t z, const Vec3<double>& outward) noexcept {
     // The two axes become one, along the boundary.
     const Vec3<double> along(-outward.z, 0.0, outward.x);
-    const Vec3<double> velocity = along.x * axes[x].speed * axes[x].screw.angular +
-                                  along.z * axes[z].speed * axes[z].screw.angular;
+    const Vec3<double> velocity =
+        along.x * axes[x].speed * axes[x].screw.angular + along.z * axes[z].speed * axes[z].screw.angular;
     const double speed = glm::length(velocity);
     for (std::size_t row = 0; row < row_count; ++row) {
         double& of_x = columns[x * row_count + row];
-        of_x = (along.x * axes[x].speed * of_x +
-                along.z * axes[z].speed * columns[z * row_count + row]) /
-               speed;
+        of_x =
+            (along.x * axes[x].speed * of_x + along.z * axes[z].speed * columns[z * row_count + row]) / speed;
     }
     axes[x].along = along;
     axes[x].speed = speed;
@@ -259,8 +237,9 @@ void IkSolver::State::bend() noexcept {
     for (const IkTip& tip : tips) {
         const std::size_t count = tip.chain.size();
         if (count < 2) continue;
-        const Vec3<double> line = unit(tip.position - bones[tip.root].head,
-                                       rotate(bones[tip.root].root_from_bone.real, Vec3<double>(0.0, 1.0, 0.0)));
+        const Vec3<double> line =
+            unit(tip.position - bones[tip.root].head,
+                 rotate(bones[tip.root].root_from_bone.real, Vec3<double>(0.0, 1.0, 0.0)));
         Vec3<double> axis(0.0);
         double side = 1.0;
         if (has_pole) axis = unit(glm::cross(line, pole - bones[tip.root].head), Vec3<double>(0.0));

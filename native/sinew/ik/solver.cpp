@@ -167,12 +167,11 @@ IkSolver::State::State(const Skeleton& skeleton, std::span<const BoneLimits> lim
             tip.is_moved_by[tip.root] = true;
             bones[tip.root].moves = true;
         }
-        row_count += (tip.effector.position_weight > 0.0 ? 3u : 0u) +
-                     (tip.effector.rotation_weight > 0.0 ? 3u : 0u);
+        row_count +=
+            (tip.effector.position_weight > 0.0 ? 3u : 0u) + (tip.effector.rotation_weight > 0.0 ? 3u : 0u);
         tips.push_back(std::move(tip));
     }
     has_pole = effectors.size() == 1 && effectors[0].has_pole;
-    if (has_pole) ++row_count;
     for (std::size_t bone = 0; bone < bone_count; ++bone) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             if (bones[bone].moves && bones[bone].is_free[axis]) axes.push_back({bone, axis, {}});
@@ -221,8 +220,8 @@ void IkSolver::State::start(const IkProblem& problem, std::span<const Quat<doubl
     update();
     if (tips.size() != 1 || !(tips[0].effector.position_weight > 0.0)) return;
     const bool was_moved = tips[0].effector.rotation_weight == 0.0 && move_goal_within_reach();
-    if (was_moved) stretch();
     if (has_pole) turn_to_pole();
+    if (was_moved) stretch();
 }
 
 bool IkSolver::State::move_goal_within_reach() noexcept {
@@ -264,7 +263,8 @@ void IkSolver::State::stretch() noexcept {
         const double sine = safe_length(across);
         const double cosine = glm::dot(now, wanted);
         // Opposite: about any axis across.
-        const Vec3<double> other = std::abs(now.x) < 0.7 ? Vec3<double>(1.0, 0.0, 0.0) : Vec3<double>(0.0, 1.0, 0.0);
+        const Vec3<double> other =
+            std::abs(now.x) < 0.7 ? Vec3<double>(1.0, 0.0, 0.0) : Vec3<double>(0.0, 1.0, 0.0);
         const Vec3<double> axis =
             sine > 1e-12 ? across / sine : unit(glm::cross(now, other), Vec3<double>(0.0));
         bone.rotate_by(std::atan2(sine, cosine) * axis);
@@ -284,8 +284,11 @@ void IkSolver::State::turn_to_pole() noexcept {
         result = Mat3<double>(x / length_of_x, y, glm::cross(x / length_of_x, y));
         return true;
     };
+    const double angle = tip.effector.pole_angle;
+    const Vec3<double> axis =
+        rotate(root.root_from_bone.real, Vec3<double>(std::cos(angle), 0.0, std::sin(angle)));
     Mat3<double> now, wanted;
-    if (!frame(tip.position - root.head, pole_axis(), now)) return;
+    if (!frame(tip.position - root.head, axis, now)) return;
     if (!frame(tip.goal - root.head, pole - root.head, wanted)) return;
     const Quat<double> across = to_quat(wanted * glm::transpose(now));
     const Quat<double>& before = root.root_from_rest.real;
@@ -296,9 +299,9 @@ void IkSolver::State::turn_to_pole() noexcept {
 void IkSolver::State::update() noexcept {
     for (IkBone& bone : bones) {
         if (!bone.moves) continue;
-        bone.root_from_rest =
-            bone.parent < 0 ? bone.parent_from_rest
-                            : bones[static_cast<std::size_t>(bone.parent)].root_from_bone * bone.parent_from_rest;
+        bone.root_from_rest = bone.parent < 0 ? bone.parent_from_rest
+                                              : bones[static_cast<std::size_t>(bone.parent)].root_from_bone *
+                                                    bone.parent_from_rest;
         // A product with a quaternion alone: the bone rotates about its own head.
         bone.root_from_bone = {bone.root_from_rest.real * bone.rotation,
                                bone.root_from_rest.dual * bone.rotation};
@@ -323,7 +326,6 @@ double IkSolver::State::cost() const noexcept {
             sum += glm::dot(error, error);
         }
     }
-    if (has_pole) sum += std::pow(kPoleWeight * pole_error(), 2);
     return 0.5 * sum;
 }
 
@@ -336,32 +338,7 @@ bool IkSolver::State::is_reached(double tolerance) const noexcept {
             return false;
         }
     }
-    return !has_pole || std::abs(pole_error()) <= kPoleTolerance;
-}
-
-Vec3<double> IkSolver::State::pole_axis() const noexcept {
-    const IkTip& tip = tips[0];
-    const double angle = tip.effector.pole_angle;
-    return rotate(bones[tip.root].root_from_bone.real, Vec3<double>(std::cos(angle), 0.0, std::sin(angle)));
-}
-
-PoleAngle IkSolver::State::pole_angle() const noexcept {
-    const Vec3<double>& root = bones[tips[0].root].head;
-    const Vec3<double> line = tips[0].position - root;
-    const Vec3<double> to_pole = unit(pole - root, Vec3<double>(0.0));
-    const Vec3<double> axis = pole_axis();
-    PoleAngle result;
-    result.line_length = safe_length(line);
-    if (!(result.line_length > 1e-9)) return result;
-    const Vec3<double> n = line / result.line_length;
-    result.sine = glm::dot(n, glm::cross(axis, to_pole));
-    result.cosine = glm::dot(axis, to_pole) - glm::dot(axis, n) * glm::dot(to_pole, n);
-    return result;
-}
-
-double IkSolver::State::pole_error() const noexcept {
-    const PoleAngle at = pole_angle();
-    return at.line_length * std::hypot(at.sine, at.cosine) * at.angle();
+    return true;
 }
 
 void IkSolver::State::keep(std::vector<Quat<double>>& rotations,

@@ -18,9 +18,9 @@ namespace sinew {
 /// bone             that the tip belongs to; it and all bones above it rotate
 /// position_weight  0: the position does not count
 /// rotation_weight  0: the rotation of the bone does not count. An error of 1 radian counts as one of the chain's length
-/// has_pole         whether the chain is rotated about the line from its root to the tip until the axis
-///                  cos(pole_angle) x + sin(pole_angle) z of the root bone points to the side of the pole, as of
-///                  Blender's constraint
+/// has_pole         whether the chain is first rotated about its root, as by Blender's constraint, until its tip lies to
+///                  its goal and the axis cos(pole_angle) x + sin(pole_angle) z of the root bone to the side of the pole:
+///                  what then bends stays in that plane
 struct IkEffector {
     std::int32_t bone = 0;
     double position_weight = 1.0;
@@ -89,8 +89,8 @@ struct IkResult {
 /// - A chain that is straight to a nearer goal has no direction to bend to: it is bent a little about the first axis
 ///   that is free, to the side where the limits leave more, or to the side of the pole.
 /// - A bone of length 0 moves nothing by its own rotation. A chain of length 0 reaches its root alone.
-/// - A pole on the line from the root to the tip does not count. With several effectors no pole counts. Limits are kept
-///   where a pole wants otherwise.
+/// - A pole on the line from the root to the goal does not count, nor, as in Blender, any with several effectors. Limits
+///   are kept where a pole wants otherwise.
 /// - Limits can leave local minima: the rotations found are then within limits and no step improves them, but others
 ///   may be nearer. Of bones with limits a swing ends at 177.7 degrees.
 class SINEW_EXPORT IkSolver {

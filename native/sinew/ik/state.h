@@ -12,11 +12,6 @@ namespace sinew {
 /// coordinates lose their meaning at 180.
 inline constexpr double kLeastSwing = 0.02;
 
-/// What an angle to the pole counts beside a distance of the chain's length, and when it is reached, in radians: the
-/// tip comes first where limits leave not both.
-inline constexpr double kPoleWeight = 0.1;
-inline constexpr double kPoleTolerance = 1e-5;
-
 /// How often a solve bends a chain that is straight to its goal.
 inline constexpr int kMostBends = 3;
 
@@ -75,19 +70,9 @@ struct IkTip {
     Quat<double> goal_rotation{1.0, 0.0, 0.0, 0.0};
 };
 
-/// The angle about the line from the root to the tip by which the pole is missed, as sine and cosine of one length.
-struct PoleAngle {
-    double line_length = 0.0;
-    double sine = 0.0;
-    double cosine = 0.0;
-
-    [[nodiscard]] double angle() const noexcept {
-        return sine != 0.0 || cosine != 0.0 ? std::atan2(sine, cosine) : 0.0;
-    }
-};
-
 struct IkSolver::State {
-    State(const Skeleton& skeleton, std::span<const BoneLimits> limits, std::span<const IkEffector> effectors);
+    State(const Skeleton& skeleton, std::span<const BoneLimits> limits,
+          std::span<const IkEffector> effectors);
 
     std::vector<IkBone> bones;
     std::vector<IkTip> tips;
@@ -114,11 +99,6 @@ struct IkSolver::State {
     /// Half the sum of squares of what is missing.
     [[nodiscard]] double cost() const noexcept;
     [[nodiscard]] bool is_reached(double tolerance) const noexcept;
-    [[nodiscard]] PoleAngle pole_angle() const noexcept;
-    /// The angle times what makes it count less, down to nothing, where the pole or the root's axis comes near the line
-    /// and where the line is short: there the angle is not defined.
-    [[nodiscard]] double pole_error() const noexcept;
-    [[nodiscard]] Vec3<double> pole_axis() const noexcept;
     void keep(std::vector<Quat<double>>& rotations, std::vector<Vec3<double>>& coordinates) const noexcept;
     void restore(const std::vector<Quat<double>>& rotations,
                  const std::vector<Vec3<double>>& coordinates) noexcept;
