@@ -137,7 +137,7 @@ def test_hinges_with_limits_bend_as_in_blender():
     arm = make_arm()
     knee = arm.pose.bones["arm.1"]
     knee.lock_ik_y = knee.lock_ik_z = True
-    knee.use_ik_limit_x, knee.ik_min_x, knee.ik_max_x = True, -2.5, 0.0
+    knee.use_ik_limit_x, knee.ik_min_x, knee.ik_max_x = True, 0.0, 2.5
     target, pole = make_empty("Target", near(scale=0.9)), make_empty("Pole", [(2, 3, 3)])
     constrain(arm, "arm.1", target, pole, 0.4, iterations=2000)
     before = poses(arm, ["arm.0", "arm.1"])
@@ -149,7 +149,7 @@ def test_hinges_with_limits_bend_as_in_blender():
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
         angles = sinew.ik.swing_twist_angles(np.array(knee.rotation_quaternion))
-        assert -2.5 - 1e-5 <= angles[0] <= 1e-5 and np.abs(angles[1:]).max() < 1e-5
+        assert -1e-5 <= angles[0] <= 2.5 + 1e-5 and np.abs(angles[1:]).max() < 1e-5
 
 
 def test_rotation_is_followed_and_scaled_bones_reach():
@@ -272,11 +272,11 @@ def test_blender_and_sinew_measured():
     assert blender.errors == pytest.approx(np.linalg.norm(tip - places(bpy.data.objects["Target"]), axis=1) / 6.0, abs=1e-6)
     assert dls.errors.max() < 2e-6 and ccd.errors.max() < 2e-6
     assert dls.errors.max() <= blender.errors.max()
-    assert 0 < dls.iterations < 15 < ccd.iterations
+    assert 0 < dls.iterations < 15 and 0 < ccd.iterations < 500
     assert dls.microseconds > 0 and not arm.pose.bones["arm.3"].constraints[0].mute
 
 
-def test_the_command_writes_a_copy_and_compares(tmp_path, capsys):
+def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
     arm = make_arm(3)
     target = make_empty("Target", near())
     constrain(arm, "arm.2", target, chain_count=3)
@@ -285,7 +285,7 @@ def test_the_command_writes_a_copy_and_compares(tmp_path, capsys):
     bytes_before = source.read_bytes()
     status = cli.main(["ik", str(source), "--out", str(tmp_path / "out"), "--frames", "3-20", "--compare"])
     assert status == 0 and source.read_bytes() == bytes_before
-    printed = capsys.readouterr().out
+    printed = capfd.readouterr().out
     assert "blender" in printed and "dls" in printed and "arm.2" in printed
     files.open_file(tmp_path / "out" / "arm.blend")
     arm, target = bpy.data.objects["Arm"], bpy.data.objects["Target"]
