@@ -121,7 +121,8 @@ class Solver:
         end of the reach: a chain without limits stretches straight to it. A chain that is straight to a
         nearer goal is bent a little about its first free axis. A pole on the line from root to goal does not
         count; limits are kept where a pole wants otherwise. With limits the result can be a local minimum:
-        within them, and such that no step improves it.
+        within them, and such that no step improves it; a chain of one effector is tried once more from its
+        start rotated to the goal, and the better result stays.
         """
         return Solution(
             *self._solver.solve(rest, tips, goals, poles, rotations, root, method, tolerance, iterations)

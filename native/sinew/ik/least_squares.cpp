@@ -18,6 +18,8 @@ constexpr double kLeastDamping = 1e-12;
 constexpr double kStagnation = 1e-9;
 // Nor, however large it is, can it be lowered where the square of its slope is less than this part of it: a saddle.
 constexpr double kLevel = 1e-7;
+// Radians: what turns farther at once goes through limits that it would have gone round.
+constexpr double kLargestStep = 0.4;
 constexpr double kAtBoundary = 1e-12;
 constexpr int kMostBlockings = 8;
 
@@ -124,30 +126,38 @@ void IkSolver::State::block_axes() noexcept {
             axes[k].is_blocked = true;
         }
     }
+    block_at_boundaries([&](std::size_t axis) { return gradient[axis] * axes[axis].speed; });
+}
+
+template <class Change>
+bool IkSolver::State::block_at_boundaries(const Change& change_of) noexcept {
+    bool has_blocked = false;
     for (std::size_t x = 0; x < axes.size(); ++x) {
         const IkBone& bone = bones[axes[x].bone];
         if (bone.is_ball || !bone.swings_about_two || axes[x].axis != 0) continue;
         const std::size_t z = bone.is_free[1] ? x + 2 : x + 1;
         if (axes[x].is_blocked || axes[z].is_blocked) continue;
-        const double cx = bone.coordinates.x;
-        const double cz = bone.coordinates.z;
+        const Vec3<double>& c = bone.coordinates;
         const auto is_outward = [&](const Vec3<double>& out) {
-            return out.x * gradient[x] * axes[x].speed + out.z * gradient[z] * axes[z].speed > 0.0;
+            return out.x * change_of(x) + out.z * change_of(z) > 0.0;
         };
-        const double half_x = cx < 0.0 ? bone.low[0] : bone.high[0];
-        const double half_z = cz < 0.0 ? bone.low[2] : bone.high[2];
+        const double half_x = c.x < 0.0 ? bone.low[0] : bone.high[0];
+        const double half_z = c.z < 0.0 ? bone.low[2] : bone.high[2];
+        Vec3<double> outward(c.x, 0.0, c.z);
+        bool is_at_boundary = glm::dot(outward, outward) >= 1.0 - kLeastSwing * kLeastSwing - kAtBoundary;
         if (bone.has_ellipse && std::abs(half_x) > 1e-9 && std::abs(half_z) > 1e-9) {
-            const Vec3<double> outward(cx / (half_x * half_x), 0.0, cz / (half_z * half_z));
-            const bool is_at_boundary = cx * outward.x + cz * outward.z >= 1.0 - kAtBoundary;
-            if (is_at_boundary && is_outward(outward)) {
-                block_at_boundary(x, z, glm::normalize(outward));
-                continue;
+            const Vec3<double> of_ellipse(c.x / (half_x * half_x), 0.0, c.z / (half_z * half_z));
+            if (c.x * of_ellipse.x + c.z * of_ellipse.z >= 1.0 - kAtBoundary) {
+                outward = of_ellipse;
+                is_at_boundary = true;
             }
         }
-        const Vec3<double> radius(cx, 0.0, cz);
-        const bool is_at_end = glm::dot(radius, radius) >= 1.0 - kLeastSwing * kLeastSwing - kAtBoundary;
-        if (is_at_end && is_outward(radius)) block_at_boundary(x, z, glm::normalize(radius));
+        if (is_at_boundary && is_outward(outward)) {
+            block_at_boundary(x, z, glm::normalize(outward));
+            has_blocked = true;
+        }
     }
+    return has_blocked;
 }
 
 bool IkSolver::State::find_steps(double damping) noexcept {
@@ -210,17 +220,21 @@ bool IkSolver::State::block_steps() noexcept {
             axes[k].is_blocked = has_blocked = true;
         }
     }
-    return has_blocked;
+    const auto change_of = [&](std::size_t axis) { return steps[axis] / axes[axis].speed; };
+    return block_at_boundaries(change_of) || has_blocked;
 }
 
 void IkSolver::State::take_steps() noexcept {
+    double largest = 0.0;
+    for (const double step : steps) largest = std::max(largest, std::abs(step));
+    const double share = largest > kLargestStep ? kLargestStep / largest : 1.0;
     std::size_t k = 0;
     while (k < axes.size()) {
         const std::size_t index = axes[k].bone;
         IkBone& bone = bones[index];
         Vec3<double> change(0.0);
         for (; k < axes.size() && axes[k].bone == index; ++k) {
-            change += (steps[k] / axes[k].speed) * axes[k].along;
+            change += (share * steps[k] / axes[k].speed) * axes[k].along;
         }
         if (change == Vec3<double>(0.0)) continue;
         if (bone.is_ball) {

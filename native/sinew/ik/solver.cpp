@@ -184,8 +184,10 @@ IkSolver::State::State(const Skeleton& skeleton, std::span<const BoneLimits> lim
     solution.resize(row_count);
     normal.resize(row_count * row_count);
     factor.resize(row_count * row_count);
-    for (auto* rotations : {&kept_rotations, &best_rotations}) rotations->resize(bone_count);
-    for (auto* coordinates : {&kept_coordinates, &best_coordinates}) coordinates->resize(bone_count);
+    for (auto* rotations : {&first_rotations, &kept_rotations, &best_rotations})
+        rotations->resize(bone_count);
+    for (auto* coordinates : {&first_coordinates, &kept_coordinates, &best_coordinates})
+        coordinates->resize(bone_count);
 }
 
 void IkSolver::State::start(const IkProblem& problem, std::span<const Quat<double>> rotations) noexcept {
@@ -270,6 +272,21 @@ void IkSolver::State::stretch() noexcept {
         bone.rotate_by(std::atan2(sine, cosine) * axis);
         bone.root_from_bone = bone.root_from_rest * DualQuat<double>{bone.rotation};
     }
+    update();
+}
+
+bool IkSolver::State::can_turn_to_goal() const noexcept {
+    return tips.size() == 1 && !has_pole && tips[0].effector.position_weight > 0.0 &&
+           tips[0].chain.size() > 1;
+}
+
+void IkSolver::State::turn_to_goal() noexcept {
+    const IkTip& tip = tips[0];
+    IkBone& root = bones[tip.root];
+    const Vec3<double> now = tip.position - root.head;
+    const Vec3<double> wanted = tip.goal - root.head;
+    const Vec3<double> axis = unit(glm::cross(now, wanted), Vec3<double>(0.0));
+    root.rotate_by(std::atan2(safe_length(glm::cross(now, wanted)), glm::dot(now, wanted)) * axis);
     update();
 }
 
@@ -375,11 +392,21 @@ IkResult IkSolver::solve(const IkProblem& problem, std::span<Quat<double>> rotat
     assert(problem.tips.size() == state.tips.size() && problem.goals.size() == state.tips.size());
     assert(!state.has_pole || !problem.poles.empty());
     assert(rotations.size() == state.bones.size());
+    const auto run = [&] {
+        return options.method == IkMethod::damped_least_squares ? state.solve_by_least_squares(options)
+                                                                : state.solve_by_descent(options);
+    };
     state.start(problem, rotations);
     IkResult result;
-    result.iterations = options.method == IkMethod::damped_least_squares
-                            ? state.solve_by_least_squares(options)
-                            : state.solve_by_descent(options);
+    result.iterations = run();
+    if (!state.is_reached(options.tolerance) && state.can_turn_to_goal()) {
+        const double error = state.cost();
+        state.keep(state.first_rotations, state.first_coordinates);
+        state.start(problem, rotations);
+        state.turn_to_goal();
+        result.iterations += run();
+        if (!(state.cost() < error)) state.restore(state.first_rotations, state.first_coordinates);
+    }
     for (std::size_t i = 0; i < rotations.size(); ++i) {
         const Quat<double>& q = state.bones[i].rotation;
         rotations[i] = q.w < 0.0 ? -q : q;

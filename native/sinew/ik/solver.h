@@ -91,8 +91,9 @@ struct IkResult {
 /// - A bone of length 0 moves nothing by its own rotation. A chain of length 0 reaches its root alone.
 /// - A pole on the line from the root to the goal does not count, nor, as in Blender, any with several effectors. Limits
 ///   are kept where a pole wants otherwise.
-/// - Limits can leave local minima: the rotations found are then within limits and no step improves them, but others
-///   may be nearer. Of bones with limits a swing ends at 177.7 degrees.
+/// - Limits can leave local minima, such as a chain that folds onto itself. A chain of one effector is tried once more,
+///   rotated about its root to its goal first; then the better one stays: within limits, and no step improves it, but
+///   others may be nearer. Of bones with limits a swing ends at 177.7 degrees.
 class SINEW_EXPORT IkSolver {
 public:
     /// limits     [bones], or empty: none

@@ -86,8 +86,8 @@ struct IkSolver::State {
     std::vector<double> columns;  ///< [axes, rows]
     std::vector<double> residual, solution, normal, factor;
     std::vector<double> steps, gradient;
-    std::vector<Quat<double>> kept_rotations, best_rotations;
-    std::vector<Vec3<double>> kept_coordinates, best_coordinates;
+    std::vector<Quat<double>> first_rotations, kept_rotations, best_rotations;
+    std::vector<Vec3<double>> first_coordinates, kept_coordinates, best_coordinates;
 
     void start(const IkProblem& problem, std::span<const Quat<double>> rotations) noexcept;
     /// Poses of all bones that move, and of the tips.
@@ -105,6 +105,9 @@ struct IkSolver::State {
 
     int solve_by_least_squares(const IkOptions& options) noexcept;
     int solve_by_descent(const IkOptions& options) noexcept;
+    /// For a second try, where a chain has folded onto itself on the way to a goal behind it.
+    [[nodiscard]] bool can_turn_to_goal() const noexcept;
+    void turn_to_goal() noexcept;
     /// Bends straight chains a little, where no axis moves a tip nearer to its goal.
     void bend() noexcept;
 
@@ -117,6 +120,9 @@ private:
     void update_columns() noexcept;
     void update_residual() noexcept;
     void block_axes() noexcept;
+    /// Of swings at the end of their ellipse whose change, of either axis, leads out of it.
+    template <class Change>
+    bool block_at_boundaries(const Change& change_of) noexcept;
     void block_at_boundary(std::size_t x, std::size_t z, const Vec3<double>& outward) noexcept;
     bool find_steps(double damping) noexcept;
     bool block_steps() noexcept;
