@@ -18,13 +18,14 @@ from .console import Console
 from .outcome import Outcome
 
 HELP = """\
-Writes a copy of each file in which bones that an inverse kinematics constraint pulls are keyed as Sinew solves
-it: target, pole, chain length, weights, rotation, and the limits, locks and stiffness of the bones are those of
-Blender's constraint, which the copy has muted. Inputs are never written to. A folder stands for all .blend files
-below it. Constraints with stretch, and bones with other constraints, are refused, each with a sentence.
+Writes a copy of each file in which bones that an inverse kinematics constraint pulls are keyed as Sinew
+solves it: target, pole, chain length, weights, rotation, and the limits, locks and stiffness of the bones
+are those of Blender's constraint, which the copy has muted. Inputs are never written to. A folder stands for
+all .blend files below it. Constraints with stretch, and bones with other constraints, are refused, each with
+a sentence.
 
-With --compare nothing has to be written: for each chain how far the tip is from its goal (parts of the chain's
-length), how smoothly the bones move (rms of their angular acceleration, radians per frame squared), how many
+With --compare nothing has to be written: for each chain how far the tip is from its goal (parts of the
+chain's length), how smoothly the bones move (rms of their angular acceleration, radians per frame squared), how many
 iterations it took and how long, by Blender and by each method of Sinew's."""
 
 
@@ -42,7 +43,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     parser.add_argument("--armature", metavar="NAME", help="only this armature object")
     parser.add_argument(
-        "--bone", action="append", metavar="NAME", help="only chains with this bone; may be given several times"
+        "--bone",
+        action="append",
+        metavar="NAME",
+        help="only chains with this bone; may be given several times",
     )
     parser.add_argument("--method", choices=sinew.ik.METHODS, default="dls", help="default: dls")
     parser.add_argument("--frames", metavar="FIRST-LAST", help="default: the scene's frames")
@@ -74,7 +78,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if args.compare:
         columns = ("file", "tip", "solver", "error rms", "error max", "iterations", "acceleration", "time")
         console.table(columns, rows)
-        console.note("Blender does not tell its iterations; its time is an update with less one without, by turns")
+        console.note(
+            "Blender does not tell its iterations; its time is an update with less one without, by turns"
+        )
     if args.out is not None:
         console.table(
             ("file", "chains", "bones", "farthest tip", "result"),

@@ -83,8 +83,8 @@ def stack(frames: list[Posed]) -> Posed:
 
 
 def problem_of(tree: Tree, posed: Posed) -> Problem:
-    """Of frames. As Blender's solver has it: bones rotate and keep their lengths as they are scaled; a goal of
-    less influence lies between the tip and the target, but for one with a pole, where the result does."""
+    """Of frames. As Blender's solver has it: bones rotate and keep their lengths as they are scaled; a goal
+    of less influence lies between the tip and the target, but for one with a pole, where the result does."""
     scales = np.linalg.norm(posed.bones[..., :3, :3], axis=-2)
     axes = _axes_of(posed.bones)
     heads = posed.bones[..., :3, 3].astype(np.float64)

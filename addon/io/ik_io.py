@@ -33,8 +33,8 @@ def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) 
     if not trees:
         of = "" if only is None else " that moves a selected bone"
         raise SinewError(
-            f"{armature.name}: no inverse kinematics constraint{of}; add one (Pose > Inverse Kinematics), with a "
-            "target"
+            f"{armature.name}: no inverse kinematics constraint{of}; add one (Pose > Inverse Kinematics), "
+            "with a target"
         )
     for tree in trees:
         _check(armature, tree)
@@ -114,9 +114,7 @@ def _chain(bone: bpy.types.PoseBone, constraint: bpy.types.Constraint) -> list[b
     return list(reversed(chain[:count] if count else chain))
 
 
-def _tree(
-    armature: bpy.types.Object, pairs: list[tuple[bpy.types.PoseBone, bpy.types.Constraint]]
-) -> Tree:
+def _tree(armature: bpy.types.Object, pairs: list[tuple[bpy.types.PoseBone, bpy.types.Constraint]]) -> Tree:
     chains = [_chain(bone, constraint) for bone, constraint in pairs]
     names = list(dict.fromkeys(bone.name for chain in chains for bone in chain))
     index = {name: number for number, name in enumerate(names)}
@@ -144,9 +142,7 @@ def _tree(
 
     return Tree(
         tuple(names),
-        np.array(
-            [index[b.parent.name] if b.parent and b.name != names[0] else -1 for b in bones], np.int32
-        ),
+        np.array([index[b.parent.name] if b.parent and b.name != names[0] else -1 for b in bones], np.int32),
         np.array([bone.bone.matrix for bone in bones], dtype=np.float64),
         np.array([bone.bone.length for bone in bones]),
         of_axes("lock_ik"),
@@ -163,8 +159,8 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
         stretched = [name for name in tree.bones if armature.pose.bones[name].ik_stretch > 0.0]
         if constraint.use_stretch and stretched:
             raise SinewError(
-                f"{armature.name}: {', '.join(stretched)} may stretch, which Sinew's bones do not; set IK Stretch "
-                f"to 0, or switch Stretch off in {bone}'s constraint"
+                f"{armature.name}: {', '.join(stretched)} may stretch, which Sinew's bones do not; set IK "
+                f"Stretch to 0, or switch Stretch off in {bone}'s constraint"
             )
         for target, part in (
             (constraint.target, constraint.subtarget),
@@ -172,8 +168,8 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
         ):
             if target is not None and part and target.type != "ARMATURE":
                 raise SinewError(
-                    f"{armature.name}: {bone}'s target is a vertex group of {target.name}, which Sinew does not "
-                    "follow; choose an object or a bone"
+                    f"{armature.name}: {bone}'s target is a vertex group of {target.name}, which Sinew does "
+                    "not follow; choose an object or a bone"
                 )
     own = set(tree.constraints)
     for name in tree.bones:
@@ -181,8 +177,8 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
             acts = not constraint.mute and constraint.influence > 0.0
             if acts and (name, constraint.name) not in own and constraint.type != "IK":
                 raise SinewError(
-                    f"{armature.name}: {name} has the constraint {constraint.name} besides, which keys can not "
-                    "keep; mute it, or bake with Object > Animation > Bake Action"
+                    f"{armature.name}: {name} has the constraint {constraint.name} besides, which keys can "
+                    "not keep; mute it, or bake with Object > Animation > Bake Action"
                 )
 
 
@@ -196,5 +192,7 @@ def _target(
         return matrix
     bone = evaluated.pose.bones.get(part)
     if bone is None:
-        raise SinewError(f"{armature.name}: {target.name} has no bone {part!r}, an IK target; choose another one")
+        raise SinewError(
+            f"{armature.name}: {target.name} has no bone {part!r}, an IK target; choose another one"
+        )
     return matrix @ np.array(bone.matrix, dtype=np.float64)

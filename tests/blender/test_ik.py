@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's inverse kinematics in the place of Blender's: the oracle is Blender's own solver where the solution is
-the only one, and where the target is elsewhere."""
+"""Sinew's inverse kinematics in the place of Blender's: the oracle is Blender's own solver where the
+solution is the only one, and where the target is elsewhere."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def make_empty(name, places):
 
 
 def make_arm(count=2, mode="QUATERNION", lean=0.25):
-    """A base bone, `count` bones behind each other up Z, bent a little, and a hand that hangs on them; in an object
-    that is moved, rotated and scaled."""
+    """A base bone, `count` bones behind each other up Z, bent a little, and a hand that hangs on them; in an
+    object that is moved, rotated and scaled."""
     arm = bpy.data.objects.new("Arm", bpy.data.armatures.new("Arm"))
     bpy.context.scene.collection.objects.link(arm)
     bpy.context.view_layer.objects.active = arm
@@ -48,7 +48,9 @@ def make_arm(count=2, mode="QUATERNION", lean=0.25):
     bpy.ops.object.mode_set(mode="OBJECT")
     for bone in arm.pose.bones:
         bone.rotation_mode = mode
-    arm.matrix_world = Matrix.LocRotScale((0.3, -0.2, 0.5), Matrix.Rotation(0.4, 3, "Z").to_quaternion(), (1.5,) * 3)
+    arm.matrix_world = Matrix.LocRotScale(
+        (0.3, -0.2, 0.5), Matrix.Rotation(0.4, 3, "Z").to_quaternion(), (1.5,) * 3
+    )
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = FRAMES[0], FRAMES[-1]
     return arm
 
@@ -86,7 +88,9 @@ def places(empty, frames=FRAMES):
     result = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
-        result.append(empty.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy())
+        result.append(
+            empty.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy()
+        )
     return np.array(result)
 
 
@@ -103,12 +107,14 @@ def test_a_pole_decides_two_bones_as_in_blender(method, mode):
     names = ["arm.0", "arm.1", "hand"]
     before = poses(arm, names)
     bake(method)
-    assert constraint.mute and ik_bake.is_baked(arm)
+    assert constraint.mute
+    assert ik_bake.is_baked(arm)
     # Blender stops at steps of a thousandth; here the solution is the only one.
     np.testing.assert_allclose(poses(arm, names), before, atol=5e-3)
     np.testing.assert_allclose(tails(arm, "arm.1"), places(target), atol=1e-5)
     assert bpy.ops.sinew.remove_ik() == {"FINISHED"}
-    assert not constraint.mute and not ik_bake.is_baked(arm)
+    assert not constraint.mute
+    assert not ik_bake.is_baked(arm)
     np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
     assert arm.animation_data is None or arm.animation_data.action is None
 
@@ -129,7 +135,8 @@ def test_keys_of_the_action_come_back_and_those_of_others_stay():
     np.testing.assert_allclose(tails(arm, "arm.2"), places(target), atol=1e-5)
     np.testing.assert_allclose(poses(arm, ["base"]), before[:, :1], atol=1e-6)
     bpy.ops.sinew.remove_ik()
-    assert arm.animation_data.action == action and not constraint.mute
+    assert arm.animation_data.action == action
+    assert not constraint.mute
     np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
 
 
@@ -149,7 +156,8 @@ def test_hinges_with_limits_bend_as_in_blender():
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
         angles = sinew.ik.swing_twist_angles(np.array(knee.rotation_quaternion))
-        assert -1e-5 <= angles[0] <= 2.5 + 1e-5 and np.abs(angles[1:]).max() < 1e-5
+        assert -1e-5 <= angles[0] <= 2.5 + 1e-5
+        assert np.abs(angles[1:]).max() < 1e-5
 
 
 def test_rotation_is_followed_and_scaled_bones_reach():
@@ -189,7 +197,9 @@ def test_one_tree_of_two_constraints_and_a_bone_as_target():
         constraint = constrain(arm, f"branch.{side}.1", arm, chain_count=4)
         constraint.subtarget = f"control.{side}"
     trees = ik_io.read_trees(arm)
-    assert len(trees) == 1 and len(trees[0].effectors) == 2 and trees[0].bones[0] == "base"
+    assert len(trees) == 1
+    assert len(trees[0].effectors) == 2
+    assert trees[0].bones[0] == "base"
     bake()
     for side in (-1, 1):
         bpy.context.scene.frame_set(12)
@@ -219,8 +229,11 @@ def test_stopped_it_leaves_all_as_it_was():
     for _step in range(5):
         next(running)
     running.close()
-    assert not constraint.mute and arm.animation_data.action == action and not ik_bake.is_baked(arm)
-    assert len(bpy.data.actions) == count and found == []
+    assert not constraint.mute
+    assert arm.animation_data.action == action
+    assert not ik_bake.is_baked(arm)
+    assert len(bpy.data.actions) == count
+    assert found == []
     np.testing.assert_allclose(poses(arm, ["arm.0", "arm.2"]), before, atol=1e-6)
 
 
@@ -235,7 +248,8 @@ def test_undo_takes_it_back(undo):
     bpy.ops.ed.undo_push(message="baked")
     bpy.ops.ed.undo()
     arm = bpy.data.objects["Arm"]
-    assert not ik_bake.is_baked(arm) and not arm.pose.bones["arm.1"].constraints[0].mute
+    assert not ik_bake.is_baked(arm)
+    assert not arm.pose.bones["arm.1"].constraints[0].mute
     np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1"]), before, atol=1e-6)
 
 
@@ -269,11 +283,16 @@ def test_blender_and_sinew_measured():
     assert (blender.solver, dls.solver, ccd.solver) == ("blender", "dls", "ccd")
     # Its own claim against the evaluated scene.
     tip = tails(arm, "arm.3")
-    assert blender.errors == pytest.approx(np.linalg.norm(tip - places(bpy.data.objects["Target"]), axis=1) / 6.0, abs=1e-6)
-    assert dls.errors.max() < 2e-6 and ccd.errors.max() < 2e-6
+    assert blender.errors == pytest.approx(
+        np.linalg.norm(tip - places(bpy.data.objects["Target"]), axis=1) / 6.0, abs=1e-6
+    )
+    assert dls.errors.max() < 2e-6
+    assert ccd.errors.max() < 2e-6
     assert dls.errors.max() <= blender.errors.max()
-    assert 0 < dls.iterations < 15 and 0 < ccd.iterations < 500
-    assert dls.microseconds > 0 and not arm.pose.bones["arm.3"].constraints[0].mute
+    assert 0 < dls.iterations < 15
+    assert 0 < ccd.iterations < 500
+    assert dls.microseconds > 0
+    assert not arm.pose.bones["arm.3"].constraints[0].mute
 
 
 def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
@@ -284,9 +303,12 @@ def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
     bpy.ops.wm.save_as_mainfile(filepath=str(source))
     bytes_before = source.read_bytes()
     status = cli.main(["ik", str(source), "--out", str(tmp_path / "out"), "--frames", "3-20", "--compare"])
-    assert status == 0 and source.read_bytes() == bytes_before
+    assert status == 0
+    assert source.read_bytes() == bytes_before
     printed = capfd.readouterr().out
-    assert "blender" in printed and "dls" in printed and "arm.2" in printed
+    assert "blender" in printed
+    assert "dls" in printed
+    assert "arm.2" in printed
     files.open_file(tmp_path / "out" / "arm.blend")
     arm, target = bpy.data.objects["Arm"], bpy.data.objects["Target"]
     assert arm.pose.bones["arm.2"].constraints[0].mute

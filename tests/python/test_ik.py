@@ -200,12 +200,14 @@ def test_layouts_and_frames_broadcast():
     start = quaternions_of(rng.uniform(-0.4, 0.4, (3, 3)))
     together = solver.solve(rest, tips, goals, rotations=start, root=root)
     assert together.rotations.shape == (5, 3, 4)
-    assert together.iterations.shape == (5,) and together.iterations.dtype == np.int32
+    assert together.iterations.shape == (5,)
+    assert together.iterations.dtype == np.int32
     for frame in range(5):
         for layout in (sinew.quat_vec.to_dual_quat, sinew.quat_vec.to_affine):
             one = solver.solve(layout(rest), tips, layout(goals[frame]), rotations=start, root=layout(root))
             np.testing.assert_allclose(one.rotations, together.rotations[frame], atol=1e-9)
-    assert isinstance(one.is_reached, bool | np.bool_) and one.rotations.dtype == np.float64
+    assert isinstance(one.is_reached, bool | np.bool_)
+    assert one.rotations.dtype == np.float64
     float32 = solver.solve(rest.astype(np.float32), tips, goals.astype(np.float32), rotations=start)
     assert float32.rotations.dtype == np.float64
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's inverse kinematics as plain keys in an action of their own, which plays without Sinew, in the place of
-Blender's constraints; and back."""
+"""Sinew's inverse kinematics as plain keys in an action of their own, which plays without Sinew, in the place
+of Blender's constraints; and back."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ def steps(
     method: core.ik.Method,
     found: list[Baked],
 ) -> Iterator[float]:
-    """Bakes trees, nearest to the root first: yields the share that is done. At the end the armature plays a copy
-    of its action with keys of the bones' rotations at every frame, straight between them, and the constraints are
-    muted; what has keys at other frames keeps them. Closed before the end, all is as it was.
+    """Bakes trees, nearest to the root first: yields the share that is done. At the end the armature plays a
+    copy of its action with keys of the bones' rotations at every frame, straight between them, and the
+    constraints are muted; what has keys at other frames keeps them. Closed before the end, all is as it was.
 
     The caller keeps the scene's frame. Raises SinewError where the armature can not be keyed.
     """
@@ -127,37 +127,43 @@ def restore(armature: bpy.types.Object) -> None:
 
 def _check(armature: bpy.types.Object, trees: Sequence[core.Tree]) -> None:
     if not armature.is_editable:
-        raise SinewError(f"{armature.name} is linked: make a library override first (Object > Library Override)")
+        raise SinewError(
+            f"{armature.name} is linked: make a library override first (Object > Library Override)"
+        )
     if armature.sinew_inbetween != BLENDER:
-        raise SinewError(f"{armature.name}: Sinew plays its in-betweens; bake these first, or switch them off")
+        raise SinewError(
+            f"{armature.name}: Sinew plays its in-betweens; bake these first, or switch them off"
+        )
     animation = armature.animation_data
     if animation is None:
         return
     if animation.action_blend_type != "REPLACE" or animation.action_influence != 1.0:
         raise SinewError(
-            f"{armature.name}: its action is mixed with NLA strips; set its blending to Replace and its influence "
-            "to 1, or bake the strips into one action (Object > Animation > Bake Action)"
+            f"{armature.name}: its action is mixed with NLA strips; set its blending to Replace and its "
+            "influence to 1, or bake the strips into one action (Object > Animation > Bake Action)"
         )
     if animation.use_tweak_mode:
         raise SinewError(f"{armature.name} is tweaking an NLA strip: leave tweak mode first (Tab)")
-    muting = {
-        f'pose.bones["{bpy.utils.escape_identifier(bone)}"].constraints["{bpy.utils.escape_identifier(name)}"].mute'
-        for tree in trees
-        for bone, name in tree.constraints
-    }
+    muting = set()
+    for tree in trees:
+        for bone, name in tree.constraints:
+            owner, constraint = map(bpy.utils.escape_identifier, (bone, name))
+            path = f'pose.bones["{owner}"].constraints["{constraint}"]'
+            muting |= {f"{path}.mute", f"{path}.enabled"}
     curves = [*actions.all_curves(animation.action, actions.slot_of(animation)), *animation.drivers]
     for curve in curves:
-        if curve.data_path in {*muting, *(path.replace("].mute", "].enabled") for path in muting)}:
+        if curve.data_path in muting:
             raise SinewError(
-                f"{armature.name}: keys or a driver switch a constraint on and off ({curve.data_path}); key its "
-                "influence instead"
+                f"{armature.name}: keys or a driver switch a constraint on and off ({curve.data_path}); key "
+                "its influence instead"
             )
 
 
 def _own_action(
     armature: bpy.types.Object, action: bpy.types.Action | None, handle: int
 ) -> bpy.types.Action | None:
-    """A copy of the action that the armature plays from now on; None where it has none: the first key makes it."""
+    """A copy of the action that the armature plays from now on; None where it has none, as the first key
+    makes one."""
     if action is None:
         return None
     copy = action.copy()
@@ -197,7 +203,8 @@ def _bake(
 
 
 def _rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """float64 [frames, 4]: the quaternion that each armature-space matrix asks for, whatever the bone inherits."""
+    """float64 [frames, 4]: the quaternion that each armature-space matrix asks for, whatever the bone
+    inherits."""
     rest = bone.bone
     result = np.empty((len(matrices), 4))
     for number, (matrix, parent) in enumerate(zip(matrices, parents, strict=True)):

@@ -45,8 +45,9 @@ def measure(
     methods: Sequence[core.ik.Method],
     progress: Callable[[float], None] = lambda _part: None,
 ) -> list[Measured]:
-    """Blender's solver first, then `methods`. Blender's time is that of an update with the constraints less that
-    without them, by turns; it holds what Blender does for a constraint besides. The caller keeps the frame."""
+    """Blender's solver first, then `methods`. Blender's time is that of an update with the constraints less
+    that without them, by turns; it holds what Blender does for a constraint besides. All times are the
+    processor's. The caller keeps the frame."""
     scene = bpy.context.scene
     theirs, posed = [], []
     for number, frame in enumerate(frames):
@@ -99,9 +100,9 @@ def _summary(turns: Sequence[float]) -> tuple[float, float]:
 def _time_of(work: Callable[[], object], count: int) -> tuple[float, float]:
     turns = []
     for _turn in range(TURNS):
-        began = time.perf_counter()
+        began = time.process_time()
         work()
-        turns.append((time.perf_counter() - began) * 1e6 / count)
+        turns.append((time.process_time() - began) * 1e6 / count)
     return _summary(turns)
 
 
@@ -109,11 +110,11 @@ def _time_of_blender(armature: bpy.types.Object, tree: core.Tree) -> tuple[float
     def update() -> float:
         # The first one builds relations anew.
         bpy.context.view_layer.update()
-        began = time.perf_counter()
+        began = time.process_time()
         for _update in range(UPDATES):
             armature.update_tag(refresh={"DATA"})
             bpy.context.view_layer.update()
-        return (time.perf_counter() - began) * 1e6 / UPDATES
+        return (time.process_time() - began) * 1e6 / UPDATES
 
     turns = []
     for _turn in range(TURNS):

@@ -30,8 +30,8 @@ class SINEW_OT_bake_ik(stepped.Stepped, bpy.types.Operator):
     bl_idname = "sinew.bake_ik"
     bl_label = "Bake Sinew IK"
     bl_description = (
-        "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in a copy "
-        "of the action; the constraints are muted until Remove"
+        "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in "
+        "a copy of the action; the constraints are muted until Remove"
     )
     bl_options = {"REGISTER", "UNDO"}
 

@@ -548,10 +548,10 @@ TEXTS = {
     "Bake Sinew IK": "Sinew-IK backen",
     "Bake Sinew IK over the Scene's Frames": "Sinew-IK über die Einzelbilder der Szene backen",
     "Bake Sinew IK over the Action's Frames": "Sinew-IK über die Einzelbilder der Aktion backen",
-    "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in a copy "
-    "of the action; the constraints are muted until Remove": (
-        "Die IK-Zwänge der Ketten der ausgewählten Knochen, oder alle, durch Sinew lösen und das Ergebnis in einer "
-        "Kopie der Aktion mit Schlüsselbildern versehen; bis Entfernen sind die Zwänge stumm"
+    "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in "
+    "a copy of the action; the constraints are muted until Remove": (
+        "Die IK-Zwänge der Ketten der ausgewählten Knochen, oder alle, durch Sinew lösen und das Ergebnis in "
+        "einer Kopie der Aktion mit Schlüsselbildern versehen; bis Entfernen sind die Zwänge stumm"
     ),
     "Sinew solves inverse kinematics": "Sinew löst inverse Kinematik",
     "How the rotations are found": "Wie die Drehungen gefunden werden",
