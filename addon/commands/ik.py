@@ -25,8 +25,8 @@ all .blend files below it. Constraints with stretch, and bones with other constr
 a sentence.
 
 With --compare nothing has to be written: for each chain how far the tip is from its goal (parts of the
-chain's length), how smoothly the bones move (rms of their angular acceleration, radians per frame squared), how many
-iterations it took and how long, by Blender and by each method of Sinew's."""
+chain's length), how smoothly the bones move (rms of their angular acceleration, radians per frame squared),
+how many iterations it took and how long, by Blender and by each method of Sinew's."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParser:

@@ -237,8 +237,28 @@ def test_stopped_it_leaves_all_as_it_was():
     np.testing.assert_allclose(poses(arm, ["arm.0", "arm.2"]), before, atol=1e-6)
 
 
-@pytest.mark.parametrize("undo", [True])
-def test_undo_takes_it_back(undo):
+def test_a_second_bake_keeps_what_was_there_first():
+    arm = make_arm(4)
+    lower = constrain(arm, "arm.1", make_empty("Low", near(scale=0.7)))
+    upper = constrain(arm, "arm.3", make_empty("High", near(scale=1.3)))
+    arm.pose.bones["base"].keyframe_insert("location", frame=1)
+    action, names = arm.animation_data.action, ["arm.0", "arm.1", "arm.2", "arm.3"]
+    before = poses(arm, names)
+    upper.mute = True
+    bake()
+    upper.mute = False
+    bake()
+    assert lower.mute
+    assert upper.mute
+    np.testing.assert_allclose(tails(arm, "arm.1"), places(bpy.data.objects["Low"]), atol=1e-5)
+    assert len(bpy.data.actions) == 4
+    bpy.ops.sinew.remove_ik()
+    assert arm.animation_data.action == action
+    assert len(bpy.data.actions) == 3
+    np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
+
+
+def test_undo_takes_it_back():
     arm = make_arm()
     constrain(arm, "arm.1", make_empty("Target", near()))
     bpy.ops.ed.undo_push(message="before")
@@ -299,6 +319,8 @@ def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
     arm = make_arm(3)
     target = make_empty("Target", near())
     constrain(arm, "arm.2", target, chain_count=3)
+    arm.pose.bones["base"].keyframe_insert("location", frame=1)
+    arm.animation_data.action.name = "Walk"
     source = tmp_path / "arm.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source))
     bytes_before = source.read_bytes()
@@ -314,6 +336,11 @@ def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
     assert arm.pose.bones["arm.2"].constraints[0].mute
     frames = range(3, 21)
     np.testing.assert_allclose(tails(arm, "arm.2", frames), places(target, frames), atol=1e-5)
+    # What the bake replaced is in the file.
+    assert ik_bake.is_baked(arm)
+    ik_bake.restore(arm)
+    assert arm.animation_data.action.name == "Walk"
+    assert not arm.pose.bones["arm.2"].constraints[0].mute
     assert cli.main(["ik", str(source)]) == 2
     assert cli.main(["ik", str(source), "--out", str(tmp_path / "out")]) == 1
     assert cli.main(["ik", str(source), "--armature", "Leg", "--compare"]) == 1

@@ -101,12 +101,11 @@ def steps(
         record.channels = json.dumps(
             {bone.name: row for bone, row in zip(armature.pose.bones, channels.tolist(), strict=True)}
         )
-    elif action is not None and action == record.baked and not action.users:
-        bpy.data.actions.remove(action)
     record.muted = json.dumps([*json.loads(record.muted or "[]"), *muted])
+    earlier = record.baked
     record.is_on, record.baked = True, armature.animation_data.action
-    if record.before is not None and record.before.is_editable:
-        record.before.use_fake_user = True
+    if earlier is not None and not earlier.users:
+        bpy.data.actions.remove(earlier)
 
 
 def restore(armature: bpy.types.Object) -> None:
