@@ -23,7 +23,7 @@ NAMES = (
         "ik",
         "interpolate",
     ),
-    *("keep_thread_state", "methods", "quat_vec", "spline", "stages"),
+    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages"),
 )
 
 
