@@ -137,9 +137,10 @@ IkOptions checked_options(const py::object& method, const py::object& tolerance,
         names += (names.empty() ? "" : ", ") + std::string(name);
     }
     const std::string name = checked_name(method, "method", "one of " + names);
-    const auto* const found = std::find(kIkMethods.begin(), kIkMethods.end(), name);
-    if (found == kIkMethods.end()) fail("method", "one of " + names, "'" + name + "'");
-    options.method = static_cast<IkMethod>(found - kIkMethods.begin());
+    std::size_t found = 0;
+    while (found < kIkMethods.size() && kIkMethods[found] != name) ++found;
+    if (found == kIkMethods.size()) fail("method", "one of " + names, "'" + name + "'");
+    options.method = static_cast<IkMethod>(found);
     const std::string positive = "a finite number above 0";
     options.tolerance = checked_number(tolerance, "tolerance", positive);
     if (!(options.tolerance > 0.0) || !std::isfinite(options.tolerance)) {
