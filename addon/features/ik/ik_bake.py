@@ -23,12 +23,12 @@ from ...io import actions, ik_io, pose_io
 class SinewIkBake(bpy.types.PropertyGroup):
     """What a bake replaced: see restore()."""
 
-    is_on: bpy.props.BoolProperty()
-    before: bpy.props.PointerProperty(type=bpy.types.Action)
-    baked: bpy.props.PointerProperty(type=bpy.types.Action)
-    # JSON: [bone, constraint] of each that was muted, and the channels of each bone.
-    muted: bpy.props.StringProperty()
-    channels: bpy.props.StringProperty()
+    is_on: bpy.props.BoolProperty(description="Whether keys of Sinew IK play")
+    before: bpy.props.PointerProperty(type=bpy.types.Action, description="The action before the bake")
+    baked: bpy.props.PointerProperty(type=bpy.types.Action, description="The action with the baked keys")
+    # JSON: [bone, constraint] of each; by bone, as pose_io.read_channels() has them.
+    muted: bpy.props.StringProperty(description="The IK constraints that the bake muted")
+    channels: bpy.props.StringProperty(description="The pose before the bake")
 
 
 @dataclass

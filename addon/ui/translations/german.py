@@ -571,6 +571,11 @@ TEXTS = {
     "Give back the action and the IK constraints that were there before the bake": (
         "Die Aktion und die IK-Zwänge zurückgeben, die vor dem Backen da waren"
     ),
+    "Whether keys of Sinew IK play": "Ob Schlüsselbilder von Sinew-IK laufen",
+    "The action before the bake": "Die Aktion vor dem Backen",
+    "The action with the baked keys": "Die Aktion mit den gebackenen Schlüsselbildern",
+    "The IK constraints that the bake muted": "Die IK-Zwänge, die das Backen stummgeschaltet hat",
+    "The pose before the bake": "Die Pose vor dem Backen",
     "Nothing is baked by Sinew IK here": "Hier ist nichts durch Sinew-IK gebacken",
     "{count} bones to {names}": "{count} Knochen bis {names}",
     "Keys of Sinew IK play; its constraints are muted": (
