@@ -20,9 +20,10 @@ NAMES = (
         "direct_delta_mush",
         "dual_quat",
         "fit",
+        "ik",
         "interpolate",
     ),
-    *("keep_thread_state", "methods", "quat_vec", "spline", "stages"),
+    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages"),
 )
 
 

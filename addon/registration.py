@@ -30,6 +30,7 @@ def register() -> None:
     from .features.diagnose import feature as diagnose
     from .features.gltf import feature as gltf
     from .features.heat import feature as heat
+    from .features.ik import feature as ik
     from .features.inbetween import feature as inbetween
     from .features.suggest import feature as suggest
     from .ui import (
@@ -52,7 +53,7 @@ def register() -> None:
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
         *(character_operators, presets, lesson, menus, main_panel, meshes_panel),
-        *(suggest, inbetween, blend, bake, corrective, compare, heat, diagnose, gltf),
+        *(suggest, inbetween, blend, ik, bake, corrective, compare, heat, diagnose, gltf),
     ):
         _register_classes(owner.CLASSES)
     translations.register()
@@ -67,7 +68,7 @@ def register() -> None:
     inbetween.register()
     handlers.register()
     exporters.register()
-    for feature in (suggest, blend, bake, compare, heat, diagnose, gltf):
+    for feature in (suggest, blend, ik, bake, compare, heat, diagnose, gltf):
         feature.register()
     handlers.adopt_open_file()
     atexit.unregister(_end)
@@ -84,6 +85,7 @@ def unregister() -> None:
         from .features.diagnose import feature as diagnose
         from .features.gltf import feature as gltf
         from .features.heat import feature as heat
+        from .features.ik import feature as ik
         from .features.inbetween import feature as inbetween
         from .features.suggest import feature as suggest
         from .ui import character, manual, menus, modifier_panel, precomputing, translations
@@ -91,7 +93,7 @@ def unregister() -> None:
         # As in a saved file: the Armature modifiers deform.
         session.prepare_for_save()
         note.remove()
-        for feature in (gltf, diagnose, heat, compare, bake, blend, suggest):
+        for feature in (gltf, diagnose, heat, compare, bake, ik, blend, suggest):
             feature.unregister()
         exporters.unregister()
         handlers.unregister()

@@ -286,7 +286,7 @@ def public_headers() -> list[str]:
     listed = re.search(r"install\(FILES\s+((?:deform/\w+\.h\s+)+)DESTINATION", described)
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
-    folders = ("transform", "interpolate", "fit", "skeleton")
+    folders = ("transform", "interpolate", "fit", "skeleton", "ik")
     others = [path.relative_to(HEADERS).as_posix() for f in folders for path in (HEADERS / f).glob("*.h")]
     lists = [f"skinning/{name}.h" for name in ("method_info", "methods", "stages")]
     return [*listed[1].split(), *lists, *sorted(others)]

@@ -18,6 +18,7 @@ _SECTIONS = {
     "bpy.ops.sinew.suggest*": "suggest",
     "bpy.ops.sinew.bake_inbetweens*": "in-betweens",
     "bpy.ops.sinew.blend*": "blend-actions",
+    "bpy.ops.sinew.*_ik*": "inverse-kinematics",
     "bpy.ops.sinew.bake*": "bake",
     "bpy.ops.sinew.corrective_key*": "bake",
     "bpy.ops.sinew.compare*": "compare",

@@ -8,6 +8,7 @@ PYBIND11_MODULE(_native, m) {
     sinew::bindings::bind_skeleton(m);
     sinew::bindings::bind_transforms(m);
     sinew::bindings::bind_fit(m);
+    sinew::bindings::bind_ik(m);
     sinew::bindings::bind_interpolate(m);
     sinew::bindings::bind_deformer(m);
     sinew::bindings::bind_bulge_limit(m);

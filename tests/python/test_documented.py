@@ -31,6 +31,7 @@ PROGRAMS = Path(sys.executable).parent
 ELSEWHERE = {
     "sinew reskin --scheduler": "tests/blender/test_cluster.py",
     "sinew check --blender": "tests/blender/test_check.py",
+    "sinew ik": "tests/blender/test_ik.py",
     "dask scheduler": "tests/blender/test_cluster.py",
     "dask worker": "tests/blender/test_cluster.py",
     "pytest --sinew-update": "tests/blender/test_compare.py",

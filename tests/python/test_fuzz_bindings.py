@@ -280,6 +280,26 @@ def fit_calls(draw):
     return of_fit.average, [rows(KINDS[layout], 0), weights, is_robust]
 
 
+@st.composite
+def ik_calls(draw):
+    count = draw(st.integers(1, 3))
+    wild = wild_one(draw, 6)
+    layout = draw(st.sampled_from(["affine", "rows", "quat_vec", "dual_quat"]))
+
+    def rows(shape, index):
+        return draw(or_garbage(arrays(shape, wild[index]), wild[index]))
+
+    solver = sinew._native.ik.Solver(
+        np.arange(-1, count - 1, dtype=np.int32), np.int32([count - 1]), [[1.0, 0.5]], [[1.0, 0.2]],
+        None, None, None,
+    )  # fmt: skip
+    method = draw(names(st.sampled_from(sinew.ik.METHODS), wild[5]).map(lambda name: (name, None)))
+    return solver.solve, [
+        *(rows((count, *KINDS[layout]), 0), rows((1, 3), 1), rows((1, *KINDS[layout]), 2), rows((1, 3), 3)),
+        *(rows((count, 4), 4), (None, None), method, (1e-6, None), (5, None)),
+    ]
+
+
 def run(function, arguments):
     result = attempt(function, [given for given, _ in arguments], names_of_arguments(function))
     if result is not None:
@@ -312,6 +332,29 @@ def test_blends_and_splines(call):
 @given(fit_calls())
 def test_fits(call):
     run(*call)
+
+
+@many(0.05)
+@given(ik_calls())
+def test_inverse_kinematics(call):
+    run(*call)
+
+
+@many(0.05)
+@given(st.data())
+def test_solvers_of_inverse_kinematics(data):
+    count, wild = data.draw(st.integers(1, 3)), data.draw(st.booleans())
+    drawn = [
+        data.draw(or_garbage(integers(range(-1, count - 1), wild), wild)),
+        data.draw(or_garbage(integers([count - 1], wild), wild)),
+        *(data.draw(or_garbage(arrays(shape, wild), wild)) for shape in [(1, 2), (1, 2)]),
+        *(
+            data.draw(st.one_of(st.just((None, None)), or_garbage(arrays(shape, wild), wild)))
+            for shape in [(count, 3), (count, 3, 2), (count, 3)]
+        ),
+    ]
+    arguments = {"parents", "effectors", "weights", "pole_angle", "locked", "limits", "stiffness"}
+    attempt(sinew._native.ik.Solver, [given for given, _ in drawn], arguments)
 
 
 @many(0.15)

@@ -543,6 +543,44 @@ TEXTS = {
     "How many triangles cross others that they do not at rest": (
         "Wie viele Dreiecke andere durchdringen, die sie in Ruhe nicht durchdringen"
     ),
+    # Inverse kinematics
+    "Inverse Kinematics": "Inverse Kinematik",
+    "Bake Sinew IK": "Sinew-IK backen",
+    "Bake Sinew IK over the Scene's Frames": "Sinew-IK über die Einzelbilder der Szene backen",
+    "Bake Sinew IK over the Action's Frames": "Sinew-IK über die Einzelbilder der Aktion backen",
+    "Solve the IK constraints of the selected bones' chains, or of all, by Sinew, and key the result in "
+    "a copy of the action; the constraints are muted until Remove": (
+        "Die IK-Zwänge der Ketten der ausgewählten Knochen, oder alle, durch Sinew lösen und das Ergebnis in "
+        "einer Kopie der Aktion mit Schlüsselbildern versehen; bis Entfernen sind die Zwänge stumm"
+    ),
+    "Sinew solves inverse kinematics": "Sinew löst inverse Kinematik",
+    "How the rotations are found": "Wie die Drehungen gefunden werden",
+    "Damped least squares": "Gedämpfte kleinste Quadrate",
+    "A few steps of all bones at once; the faster one nearly always": (
+        "Wenige Schritte aller Knochen zugleich; fast immer das schnellere"
+    ),
+    "Cyclic descent": "Zyklischer Abstieg",
+    "One bone after the other from the tip: bends most near the tip": (
+        "Ein Knochen nach dem anderen von der Spitze an: beugt am meisten nahe der Spitze"
+    ),
+    "Select an armature": "Ein Skelett auswählen",
+    "{count} bones keyed; the tips are at most {share} of a chain's length off": (
+        "{count} Knochen mit Schlüsselbildern; die Spitzen liegen höchstens {share} einer Kettenlänge daneben"
+    ),
+    "Remove Sinew IK": "Sinew-IK entfernen",
+    "Give back the action and the IK constraints that were there before the bake": (
+        "Die Aktion und die IK-Zwänge zurückgeben, die vor dem Backen da waren"
+    ),
+    "Whether keys of Sinew IK play": "Ob Schlüsselbilder von Sinew-IK laufen",
+    "The action before the bake": "Die Aktion vor dem Backen",
+    "The action with the baked keys": "Die Aktion mit den gebackenen Schlüsselbildern",
+    "The IK constraints that the bake muted": "Die IK-Zwänge, die das Backen stummgeschaltet hat",
+    "The pose before the bake": "Die Pose vor dem Backen",
+    "Nothing is baked by Sinew IK here": "Hier ist nichts durch Sinew-IK gebacken",
+    "{count} bones to {names}": "{count} Knochen bis {names}",
+    "Keys of Sinew IK play; its constraints are muted": (
+        "Schlüsselbilder von Sinew-IK laufen; ihre Zwänge sind stumm"
+    ),
     # In-betweens
     "In-betweens": "Zwischenbilder",
     "How the bones move between the keyed poses of the action": (

@@ -3,10 +3,10 @@
 
 Rigid transforms, and what lies between them: sinew.affine, sinew.quat_vec, sinew.dual_quat,
 sinew.interpolate, sinew.spline; their parts: sinew.quat, sinew.dual; and what fits them to measurements:
-sinew.fit.
+sinew.fit. Rotations that bring bones to where they are wanted: sinew.ik.
 """
 
-from . import affine, dual, dual_quat, fit, interpolate, quat, quat_vec, spline
+from . import affine, dual, dual_quat, fit, ik, interpolate, quat, quat_vec, spline
 from ._native import (
     Binding,
     BulgeLimit,
@@ -44,6 +44,7 @@ __all__ = [
     "dual",
     "dual_quat",
     "fit",
+    "ik",
     "interpolate",
     "keep_thread_state",
     "methods",

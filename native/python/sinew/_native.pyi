@@ -12,6 +12,7 @@ affine: ModuleType
 dual: ModuleType
 dual_quat: ModuleType
 fit: ModuleType
+ik: ModuleType
 interpolate: ModuleType
 quat: ModuleType
 quat_vec: ModuleType

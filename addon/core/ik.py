@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Inverse kinematics over frames: what Blender's constraint asks for, solved by `sinew.ik`, and measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from sinew import affine, ik, quat, quat_vec
+
+# What commands and the panel solve with: Blender's own limit, which dls never comes near.
+ITERATIONS = 500
+
+LABELS = {
+    "dls": ("Damped least squares", "A few steps of all bones at once; the faster one nearly always"),
+    "ccd": ("Cyclic descent", "One bone after the other from the tip: bends most near the tip"),
+}
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Bones that are solved together, parents first, and what pulls them.
+
+    bones        names; the first is the root
+    parents      int32 [bones], -1 of the root
+    rest         float64 [bones, 3, 3], each bone's axes at rest, relative to its parent's
+    constraints  of each effector: the bone that has the constraint, and its name
+    effectors    of sinew.ik
+    """
+
+    bones: tuple[str, ...]
+    parents: np.ndarray
+    rest: np.ndarray
+    lengths: np.ndarray
+    locked: np.ndarray
+    limits: np.ndarray
+    stiffness: np.ndarray
+    constraints: tuple[tuple[str, str], ...]
+    effectors: tuple[ik.Effector, ...]
+
+    @property
+    def has_pole(self) -> bool:
+        return len(self.effectors) == 1 and self.effectors[0].has_pole
+
+    def solver(self) -> ik.Solver:
+        return ik.Solver(
+            self.parents, self.effectors, locked=self.locked, limits=self.limits, stiffness=self.stiffness
+        )
+
+
+class Posed(NamedTuple):
+    """A tree at a frame, or at frames in front; armature space, columns of matrices as Blender has them.
+
+    bones       [bones, 4, 4], without the constraints
+    parent      [4, 4], of the root's parent; the identity where it has none
+    goals       [effectors, 4, 4]
+    poles       [effectors, 3]
+    influences  [effectors]
+    """
+
+    bones: np.ndarray
+    parent: np.ndarray
+    goals: np.ndarray
+    poles: np.ndarray
+    influences: np.ndarray
+
+
+class Problem(NamedTuple):
+    """Arguments of sinew.ik.Solver.solve(), and the scale of each bone's axes, [frames, bones, 3]."""
+
+    rest: np.ndarray
+    tips: np.ndarray
+    goals: np.ndarray
+    poles: np.ndarray
+    rotations: np.ndarray
+    root: np.ndarray
+    scales: np.ndarray
+
+
+def stack(frames: list[Posed]) -> Posed:
+    return Posed(*(np.stack(part) for part in zip(*frames, strict=True)))
+
+
+def problem_of(tree: Tree, posed: Posed) -> Problem:
+    """Of frames. As Blender's solver has it: bones rotate and keep their lengths as they are scaled; a goal
+    of less influence lies between the tip and the target, but for one with a pole, where the result does."""
+    scales = np.linalg.norm(posed.bones[..., :3, :3], axis=-2)
+    axes = _axes_of(posed.bones)
+    heads = posed.bones[..., :3, 3].astype(np.float64)
+    parent_axes, parent_heads = axes[:, tree.parents], heads[:, tree.parents]
+    parent_axes[:, 0], parent_heads[:, 0] = _axes_of(posed.parent), heads[:, 0]
+    to_parent = np.swapaxes(parent_axes, -1, -2)
+    rest = np.broadcast_to(np.eye(4), posed.bones.shape).copy()
+    rest[..., :3, :3] = tree.rest
+    rest[..., :3, 3] = (to_parent @ (heads - parent_heads)[..., None])[..., 0]
+    root = np.broadcast_to(np.eye(4), posed.parent.shape).copy()
+    root[..., :3, :3], root[..., :3, 3] = parent_axes[:, 0], heads[:, 0]
+    own = np.swapaxes(tree.rest, -1, -2) @ to_parent @ axes
+    tip_bones = [effector.bone for effector in tree.effectors]
+    tips = np.zeros((*posed.goals.shape[:2], 3))
+    tips[..., 1] = (tree.lengths * scales[..., 1])[:, tip_bones]
+    goals = np.broadcast_to(np.eye(4), posed.goals.shape).copy()
+    goals[..., :3, :3], goals[..., :3, 3] = _axes_of(posed.goals), posed.goals[..., :3, 3]
+    goals = affine.to_quat_vec(goals)
+    if not tree.has_pole:
+        now = np.broadcast_to(np.eye(4), posed.goals.shape).copy()
+        now[..., :3, :3] = axes[:, tip_bones]
+        now[..., :3, 3] = heads[:, tip_bones] + (axes[:, tip_bones] @ tips[..., None])[..., 0]
+        goals = _between(affine.to_quat_vec(now), goals, posed.influences)
+    return Problem(
+        affine.to_quat_vec(rest),
+        tips,
+        goals,
+        posed.poles.astype(np.float64),
+        affine.to_quat_vec(_with_axes(own))[..., :4],
+        affine.to_quat_vec(root),
+        scales,
+    )
+
+
+def solve(tree: Tree, problem: Problem, method: ik.Method, iterations: int = ITERATIONS) -> ik.Solution:
+    return tree.solver().solve(
+        problem.rest,
+        problem.tips,
+        problem.goals,
+        problem.poles if tree.has_pole else None,
+        rotations=problem.rotations,
+        root=problem.root,
+        method=method,
+        iterations=iterations,
+    )
+
+
+def blended(tree: Tree, problem: Problem, rotations: np.ndarray, influences: np.ndarray) -> np.ndarray:
+    """[frames, bones, 4]: of a constraint with a pole and less influence, as far as that from the pose."""
+    if not tree.has_pole or (influences == 1.0).all():
+        return rotations
+    start = np.pad(problem.rotations, ((0, 0), (0, 0), (0, 3)))
+    end = np.pad(rotations, ((0, 0), (0, 0), (0, 3)))
+    return _between(start, end, influences[:, :1])[..., :4]
+
+
+def matrices_of(tree: Tree, problem: Problem, rotations: np.ndarray) -> np.ndarray:
+    """float64 [frames, bones, 4, 4]: bones in armature space, scaled as they were."""
+    own = np.pad(rotations, ((0, 0), (0, 0), (0, 3)))
+    relative = quat_vec.compose(problem.rest, own)
+    poses = np.empty_like(relative)
+    for bone, parent in enumerate(tree.parents):
+        before = problem.root if parent < 0 else poses[:, parent]
+        poses[:, bone] = quat_vec.compose(before, relative[:, bone])
+    matrices = quat_vec.to_affine(poses)
+    matrices[..., :3, :3] *= problem.scales[..., None, :]
+    return matrices
+
+
+def tip_errors(tree: Tree, problem: Problem, matrices: np.ndarray) -> np.ndarray:
+    """[frames]: the largest distance of a tip to its goal, in lengths of the longest chain; `matrices` as of
+    matrices_of()."""
+    bones = [effector.bone for effector in tree.effectors]
+    scaled = problem.tips / np.maximum(problem.scales[:, bones], 1e-30)
+    tips = (matrices[:, bones][..., :3, :3] @ scaled[..., None])[..., 0] + matrices[:, bones][..., :3, 3]
+    distances = np.linalg.norm(tips - problem.goals[..., 4:], axis=-1)
+    counted = np.array([effector.position_weight > 0.0 for effector in tree.effectors])
+    longest = np.array([_reach(tree, problem, effector.bone) for effector in tree.effectors]).max(axis=0)
+    return distances[:, counted].max(axis=1, initial=0.0) / np.maximum(longest, 1e-30)
+
+
+def angular_acceleration(matrices: np.ndarray) -> float:
+    """The root of the mean square over frames and bones of the second difference of rotations, radians per
+    frame squared; 0 below three frames. matrices: [frames, bones, 4, 4]."""
+    if len(matrices) < 3:
+        return 0.0
+    rigid = affine.to_quat_vec(_with_axes(_axes_of(matrices)))[..., :4]
+    steps = quat.to_rotation_vector(quat.compose(rigid[1:], quat.conjugate(rigid[:-1])))
+    return float(np.sqrt((np.diff(steps, axis=0) ** 2).sum(axis=-1).mean()))
+
+
+def _reach(tree: Tree, problem: Problem, bone: int) -> np.ndarray:
+    reach = tree.lengths[bone] * problem.scales[:, bone, 1]
+    while tree.parents[bone] >= 0:
+        reach = reach + np.linalg.norm(problem.rest[:, bone, 4:], axis=-1)
+        bone = tree.parents[bone]
+    return reach
+
+
+def _between(a: np.ndarray, b: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """From a to b, [.., 7]: rotations along the shortest arc, positions straight."""
+    share = np.asarray(share, dtype=np.float64)
+    positions = a[..., 4:] + share[..., None] * (b[..., 4:] - a[..., 4:])
+    return np.concatenate([quat.slerp(a[..., :4], b[..., :4], share), positions], axis=-1)
+
+
+def _axes_of(matrices: np.ndarray) -> np.ndarray:
+    """Columns at length 1; one of length 0 stays."""
+    axes = np.asarray(matrices, dtype=np.float64)[..., :3, :3]
+    return axes / np.maximum(np.linalg.norm(axes, axis=-2, keepdims=True), 1e-30)
+
+
+def _with_axes(axes: np.ndarray) -> np.ndarray:
+    result = np.zeros((*axes.shape[:-2], 4, 4))
+    result[..., :3, :3], result[..., 3, 3] = axes, 1.0
+    return result

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Inverse kinematics beside Blender's constraint, in one process by turns: times of a solve, what is left,
+how smoothly bones move; docs/ik.svg."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import common
+import matplotlib
+import numpy as np
+import sinew
+import sinew_addon
+from sinew_addon.core import ik as core
+from sinew_addon.io import ik_io
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+BONES = (2, 5, 10)
+KINDS = ("free", "limited")
+CHAINS = 100
+FRAMES = 120
+SOLVERS = ("blender", *sinew.ik.METHODS)
+LABELS = {"blender": "Blender", "dls": "Sinew, dls", "ccd": "Sinew, ccd"}
+
+
+def make_chains(bones: int, kind: str, count: int) -> tuple[bpy.types.Object, list]:
+    """An armature of `count` chains side by side, each bent a little, with a constraint and a target."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    armature = bpy.data.objects.new("Chains", bpy.data.armatures.new("Chains"))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    armature.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    for chain in range(count):
+        parent = None
+        for number in range(bones):
+            bone = armature.data.edit_bones.new(f"{chain}.{number}")
+            bone.head = (3.0 * bones * chain, 0.0, number) if parent is None else parent.tail
+            bone.tail = (bone.head.x, bone.head.y, number + 1.0)
+            bone.parent, bone.use_connect = parent, parent is not None
+            parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    targets = []
+    for chain in range(count):
+        target = bpy.data.objects.new(f"Target.{chain}", None)
+        bpy.context.scene.collection.objects.link(target)
+        constraint = armature.pose.bones[f"{chain}.{bones - 1}"].constraints.new("IK")
+        constraint.target, constraint.chain_count = target, bones
+        targets.append(target)
+    for bone in armature.pose.bones:
+        bone.rotation_mode = "XYZ"
+        bone.rotation_euler = (0.3, 0.0, 0.0)
+        if kind == "limited" and bone.parent is not None:
+            bone.lock_ik_y = True
+            for axis, least, largest in (("x", -0.2, 2.5), ("z", -0.5, 0.5)):
+                setattr(bone, f"use_ik_limit_{axis}", True)
+                setattr(bone, f"ik_min_{axis}", least)
+                setattr(bone, f"ik_max_{axis}", largest)
+    return armature, targets
+
+
+def place_targets(targets: list, bones: int, rng: np.random.Generator) -> None:
+    for chain, target in enumerate(targets):
+        towards = rng.normal(size=3)
+        towards *= rng.uniform(0.3, 0.95) * bones / np.linalg.norm(towards)
+        target.location = towards + np.array([3.0 * bones * chain, 0.0, 0.0])
+
+
+def times(bones: int, kind: str, seconds: float) -> dict:
+    """{solver: microseconds a solve, and what is left}: Blender's time is an update of the armature with the
+    constraints, less one without; Sinew solves the same chains in one call. The clock is the processor's, of
+    all threads: what other programs do counts little."""
+    armature, targets = make_chains(bones, kind, CHAINS)
+    place_targets(targets, bones, np.random.default_rng(bones))
+    bpy.context.view_layer.update()
+    trees = ik_io.read_trees(armature)
+    theirs = np.stack([ik_io.read_posed(armature, tree).bones for tree in trees]).astype(float)
+    names = [pair for tree in trees for pair in tree.constraints]
+    ik_io.set_muted(armature, names, True)
+    bpy.context.view_layer.update()
+    # All trees have the same bones and limits: as if they were frames of one.
+    problem = core.problem_of(trees[0], core.stack([ik_io.read_posed(armature, tree) for tree in trees]))
+    solver = trees[0].solver()
+
+    def update() -> float:
+        bpy.context.view_layer.update()
+        began = time.process_time()
+        for _ in range(3):
+            armature.update_tag(refresh={"DATA"})
+            bpy.context.view_layer.update()
+        return (time.process_time() - began) / 3
+
+    def solve(method: str, tolerance: float) -> sinew.ik.Solution:
+        return solver.solve(
+            problem.rest,
+            problem.tips,
+            problem.goals,
+            rotations=problem.rotations,
+            root=problem.root,
+            method=method,
+            tolerance=tolerance,
+            iterations=core.ITERATIONS,
+        )
+
+    ways = [(method, tolerance) for method in sinew.ik.METHODS for tolerance in (1e-3, 1e-6)]
+    taken: dict[str, list[float]] = {"blender": [], **{f"{m} {t:g}": [] for m, t in ways}}
+    with_it, without = [], []
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end or len(taken["blender"]) < 5:
+        ik_io.set_muted(armature, names, False)
+        with_it.append(update() / CHAINS)
+        ik_io.set_muted(armature, names, True)
+        without.append(update() / CHAINS)
+        taken["blender"].append(with_it[-1] - without[-1])
+        for method, tolerance in ways:
+            began = time.process_time()
+            solve(method, tolerance)
+            taken[f"{method} {tolerance:g}"].append((time.process_time() - began) / CHAINS)
+    found = {}
+    for name, turns in taken.items():
+        low, median, high = np.percentile(turns, [25, 50, 75]) * 1e6
+        if name == "blender":
+            errors, iterations, least = (
+                core.tip_errors(trees[0], problem, theirs),
+                None,
+                min(with_it) - min(without),
+            )
+        else:
+            method, tolerance = name.split()
+            solution = solve(method, float(tolerance))
+            matrices = core.matrices_of(trees[0], problem, solution.rotations)
+            errors = core.tip_errors(trees[0], problem, matrices)
+            iterations, least = float(np.mean(solution.iterations)), min(turns)
+        found[name] = {
+            "median": median,
+            "quartiles": [low, high],
+            "least": least * 1e6,
+            "turns": len(turns),
+            "error median": float(np.median(errors)),
+            "error max": float(np.max(errors)),
+            "reached to 1e-3": int((errors < 1e-3).sum()),
+            "iterations": iterations,
+        }
+    return found
+
+
+def animated(bones: int, kind: str) -> dict:
+    """{solver: errors of frames, angular acceleration} with a target on a smooth curve within reach."""
+    armature, (target,) = make_chains(bones, kind, 1)
+    tree = ik_io.read_trees(armature)[0]
+    theirs, posed = [], []
+    for frames, mute in ((theirs, False), (posed, True)):
+        ik_io.set_muted(armature, tree.constraints, mute)
+        for frame in range(FRAMES):
+            phase = 2.0 * np.pi * frame / FRAMES
+            target.location = bones * np.array(
+                [0.45 * np.sin(2 * phase), 0.35 * np.cos(phase) + 0.2, 0.5 + 0.25 * np.sin(phase)]
+            )
+            bpy.context.view_layer.update()
+            frames.append(ik_io.read_posed(armature, tree))
+    problem = core.problem_of(tree, core.stack(posed))
+    matrices = {"blender": core.stack(theirs).bones.astype(float)}
+    for method in sinew.ik.METHODS:
+        matrices[method] = core.matrices_of(tree, problem, core.solve(tree, problem, method).rotations)
+    return {
+        solver: {
+            "errors": core.tip_errors(tree, problem, of).tolist(),
+            "acceleration": core.angular_acceleration(of),
+        }
+        for solver, of in matrices.items()
+    }
+
+
+def draw(spreads: dict, motions: dict) -> None:
+    figure, (first, second, third) = plt.subplots(1, 3, figsize=(12.6, 3.6), layout="constrained")
+    styles = dict(zip(SOLVERS, (("#ee6677", "^"), ("#4477aa", "o"), ("#ccbb44", "s")), strict=True))
+    for solver, (colour, marker) in styles.items():
+        name = solver if solver == "blender" else f"{solver} 1e-06"
+        for kind, line in zip(KINDS, ("-", ":"), strict=True):
+            values = [spreads[f"{bones} {kind}"][name]["median"] for bones in BONES]
+            label = LABELS[solver] if kind == "free" else None
+            first.loglog(BONES, values, line, color=colour, marker=marker, label=label)
+        errors = np.maximum(motions["5 free"][solver]["errors"], 1e-12)
+        second.semilogy(errors, color=colour, label=LABELS[solver])
+        for kind, line in zip(KINDS, ("-", ":"), strict=True):
+            values = [motions[f"{bones} {kind}"][solver]["acceleration"] for bones in BONES]
+            third.loglog(
+                BONES,
+                values,
+                line,
+                color=colour,
+                marker=marker,
+                label=LABELS[solver] if kind == "free" else None,
+            )
+    first.set(xlabel="bones", ylabel="microseconds a solve", title="Time (dotted: with limits)")
+    second.set(xlabel="frame", ylabel="distance to the goal, chain's lengths", title="What is left, 5 bones")
+    third.set(xlabel="bones", ylabel="rms, radians per frame²", title="Angular acceleration")
+    for axes in (first, third):
+        axes.set_xticks(BONES, [str(bones) for bones in BONES])
+        axes.minorticks_off()
+    for axes in (first, second, third):
+        axes.grid(alpha=0.3)
+        axes.legend()
+    figure.savefig(DOCS / "ik.svg", metadata={"Date": None})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="shorter runs, no picture")
+    parser.add_argument("--name", default="ik", help="of the file in bench/results")
+    arguments = parser.parse_args()
+    sinew_addon.register()
+    facts = common.machine() | {"blender": bpy.app.version_string}
+    common.heading("inverse kinematics", facts)
+    spreads, motions = {}, {}
+    columns = (
+        "bones",
+        "solver",
+        "us, least",
+        "median",
+        "quartiles",
+        "",
+        "median left",
+        "most left",
+        "to 1e-3",
+        "steps",
+    )
+    print("".join(f"{column:>12}" for column in columns))
+    for bones in BONES:
+        for kind in KINDS:
+            key = f"{bones} {kind}"
+            spreads[key] = times(bones, kind, 0.5 if arguments.quick else 8.0)
+            motions[key] = animated(bones, kind)
+            for name, of in spreads[key].items():
+                cells = [key, name, *(f"{n:.1f}" for n in (of["least"], of["median"], *of["quartiles"]))]
+                cells += [f"{of['error median']:.1e}", f"{of['error max']:.1e}", f"{of['reached to 1e-3']} %"]
+                cells.append("-" if of["iterations"] is None else f"{of['iterations']:.1f}")
+                print("".join(f"{cell:>12}" for cell in cells), flush=True)
+    print("\nrms of angular acceleration, and the largest error, over an animated target")
+    for key, of in motions.items():
+        texts = (f"{name}: {m['acceleration']:.4f} {max(m['errors']):.1e}  " for name, m in of.items())
+        print(f"{key:12}", *texts)
+    common.write(arguments.name, machine=facts, microseconds=spreads, animated=motions)
+    if not arguments.quick:
+        draw(spreads, motions)
+    sinew_addon.unregister()
+    sys.stdout.flush()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "sinew/transform/rotation.h"
+
+namespace sinew {
+
+/// How a bone may rotate about one of its own axes, x, y (along the bone) or z, as Blender's pose bones say it.
+///
+/// min, max   radians, -pi <= min <= 0 <= max <= pi; read where is_limited
+/// stiffness  0 to below 1: how much less than others the bone rotates about it
+struct AxisLimit {
+    bool is_locked = false;
+    bool is_limited = false;
+    double min = -std::numbers::pi;
+    double max = std::numbers::pi;
+    double stiffness = 0.0;
+};
+
+/// Of the three axes, x, y, z.
+using BoneLimits = std::array<AxisLimit, 3>;
+
+/// A rotation as a twist about y and then a swing without twist: (x, y, z) in radians. y is the angle of the twist, -pi
+/// to pi; x and z are twice the arcsines of the swing's quaternion, so that of a swing about x alone x is its angle.
+///
+/// The range of each of the three is what Blender's IK limits bound. Of a swing by 180 degrees, whose twist is free, the
+/// twist is 0. The signs of `q`, unit, do not matter.
+[[nodiscard]] inline Vec3<double> swing_twist_angles(const Quat<double>& q) noexcept {
+    const double length = std::hypot(q.w, q.y);
+    const double cosine = length > 0.0 ? q.w / length : 1.0;
+    const double sine = length > 0.0 ? q.y / length : 0.0;
+    const double x = std::clamp(q.x * cosine + q.z * sine, -1.0, 1.0);
+    const double z = std::clamp(q.z * cosine - q.x * sine, -1.0, 1.0);
+    double twist = 2.0 * std::atan2(sine, cosine);
+    if (twist > std::numbers::pi) twist -= 2.0 * std::numbers::pi;
+    if (twist <= -std::numbers::pi) twist += 2.0 * std::numbers::pi;
+    return {2.0 * std::asin(x), twist, 2.0 * std::asin(z)};
+}
+
+/// By how many radians a rotation is beyond the limits of its bone: the largest of the three angles. A locked axis is
+/// at 0. Where both x and z are limited, they are bounded by the ellipse through the four limits, whose half axes are
+/// sines of half angles; an ellipse without width or height is a rectangle.
+[[nodiscard]] inline double limit_violation(const BoneLimits& limits, const Quat<double>& q) noexcept {
+    const Vec3<double> angles = swing_twist_angles(q);
+    double beyond = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        const AxisLimit& limit = limits[static_cast<std::size_t>(i)];
+        if (limit.is_locked) {
+            beyond = std::max(beyond, std::abs(angles[i]));
+        } else if (limit.is_limited) {
+            beyond = std::max({beyond, limit.min - angles[i], angles[i] - limit.max});
+        }
+    }
+    const AxisLimit& x = limits[0];
+    const AxisLimit& z = limits[2];
+    if (x.is_locked || z.is_locked || !x.is_limited || !z.is_limited) return beyond;
+    const double half_x = std::sin(0.5 * (angles.x < 0.0 ? x.min : x.max));
+    const double half_z = std::sin(0.5 * (angles.z < 0.0 ? z.min : z.max));
+    if (std::abs(half_x) < 1e-9 || std::abs(half_z) < 1e-9) return beyond;
+    const double radius = std::hypot(std::sin(0.5 * angles.x) / half_x, std::sin(0.5 * angles.z) / half_z);
+    if (radius <= 1.0) return beyond;
+    return std::max(beyond, (1.0 - 1.0 / radius) * std::hypot(angles.x, angles.z));
+}
+
+}  // namespace sinew

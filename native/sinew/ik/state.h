@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "sinew/ik/solver.h"
+#include "sinew/transform/twist.h"
+
+namespace sinew {
+
+/// The least cosine of half a swing about two axes that are not both free without limits: 177.7 degrees. The two
+/// coordinates lose their meaning at 180.
+inline constexpr double kLeastSwing = 0.02;
+
+/// How often a solve bends a chain that is straight to its goal.
+inline constexpr int kMostBends = 3;
+
+/// A bone of the solver.
+///
+/// is_ball    no limit and no lock: its rotation is kept as it is. Otherwise three coordinates say it: the twist's angle
+///            about y; and of the swing, about one axis the angle, about two the x and z of its quaternion
+/// low, high  of the coordinates
+struct IkBone {
+    std::int32_t parent = -1;
+    bool moves = false;
+    bool is_ball = true;
+    bool swings_about_two = false;
+    bool has_ellipse = false;
+    std::array<bool, 3> is_free{true, true, true};
+    std::array<double, 3> low{};
+    std::array<double, 3> high{};
+    std::array<double, 3> weight{1.0, 1.0, 1.0};
+
+    Quat<double> rotation{1.0, 0.0, 0.0, 0.0};
+    Vec3<double> coordinates{0.0};
+    DualQuat<double> parent_from_rest;
+
+    /// Not rotated by itself, and rotated; in the space of the root, lengths divided by that of the longest chain.
+    DualQuat<double> root_from_rest;
+    DualQuat<double> root_from_bone;
+    Vec3<double> head{0.0};
+
+    void set_rotation(const Quat<double>& q) noexcept;
+    void set_coordinates(const Vec3<double>& values) noexcept;
+    /// Rotated further by `axis`, a vector in the space of the root of length of the angle, as far as its limits allow.
+    void rotate_by(const Vec3<double>& axis) noexcept;
+};
+
+/// A free axis of a bone: its screw, and how fast its coordinate makes it rotate.
+struct IkAxis {
+    std::size_t bone;
+    std::size_t axis;
+    Twist<double> screw;
+    double speed = 1.0;
+    Vec3<double> along{0.0};  ///< the coordinates that a step changes: its own, or along a boundary of two
+    bool is_blocked = false;
+};
+
+struct IkTip {
+    IkEffector effector;
+    std::size_t bone;
+    std::size_t root;
+    std::vector<std::size_t> chain;  ///< bones, from the root
+    std::vector<bool> is_moved_by;   ///< [bones]
+    double reach = 0.0;              ///< of this solve, in lengths of the longest chain
+    Vec3<double> offset{0.0};        ///< in the space of the bone
+    Vec3<double> position{0.0};
+    Quat<double> rotation{1.0, 0.0, 0.0, 0.0};
+    Vec3<double> goal{0.0};
+    Quat<double> goal_rotation{1.0, 0.0, 0.0, 0.0};
+};
+
+struct IkSolver::State {
+    State(const Skeleton& skeleton, std::span<const BoneLimits> limits,
+          std::span<const IkEffector> effectors);
+
+    std::vector<IkBone> bones;
+    std::vector<IkTip> tips;
+    std::vector<IkAxis> axes;
+    std::size_t row_count = 0;
+    bool has_pole = false;
+    double length = 1.0;  ///< of the longest chain
+    Vec3<double> pole{0.0};
+
+    // Of damped least squares.
+    std::vector<double> columns;  ///< [axes, rows]
+    std::vector<double> residual, solution, normal, factor;
+    std::vector<double> steps, gradient;
+    std::vector<Quat<double>> first_rotations, kept_rotations, best_rotations;
+    std::vector<Vec3<double>> first_coordinates, kept_coordinates, best_coordinates;
+
+    void start(const IkProblem& problem, std::span<const Quat<double>> rotations) noexcept;
+    /// Poses of all bones that move, and of the tips.
+    void update() noexcept;
+    /// The rotation vector from the tip's rotation to its goal's.
+    [[nodiscard]] static Vec3<double> rotation_error(const IkTip& tip) noexcept {
+        return rotation_vector(tip.goal_rotation * glm::conjugate(tip.rotation));
+    }
+    /// Half the sum of squares of what is missing.
+    [[nodiscard]] double cost() const noexcept;
+    [[nodiscard]] bool is_reached(double tolerance) const noexcept;
+    void keep(std::vector<Quat<double>>& rotations, std::vector<Vec3<double>>& coordinates) const noexcept;
+    void restore(const std::vector<Quat<double>>& rotations,
+                 const std::vector<Vec3<double>>& coordinates) noexcept;
+
+    int solve_by_least_squares(const IkOptions& options) noexcept;
+    int solve_by_descent(const IkOptions& options) noexcept;
+    /// For a second try, where a chain has folded onto itself on the way to a goal behind it.
+    [[nodiscard]] bool can_turn_to_goal() const noexcept;
+    void turn_to_goal() noexcept;
+    /// Bends straight chains a little, where no axis moves a tip nearer to its goal.
+    void bend() noexcept;
+
+private:
+    bool move_goal_within_reach() noexcept;
+    void turn_to_pole() noexcept;
+    void stretch() noexcept;
+
+    void update_axes() noexcept;
+    void update_columns() noexcept;
+    void update_residual() noexcept;
+    void block_axes() noexcept;
+    /// Of swings at the end of their ellipse whose change, of either axis, leads out of it.
+    template <class Change>
+    bool block_at_boundaries(const Change& change_of) noexcept;
+    void block_at_boundary(std::size_t x, std::size_t z, const Vec3<double>& outward) noexcept;
+    bool find_steps(double damping) noexcept;
+    bool block_steps() noexcept;
+    void take_steps() noexcept;
+
+    void descend(std::size_t index) noexcept;
+    static Quat<double> rotation_since(const IkBone& bone, const Quat<double>& rotation) noexcept;
+    /// The unit vector that the bone rotates about as its coordinate grows, and how fast.
+    static Vec3<double> direction_of(const IkBone& bone, std::size_t axis, double& speed) noexcept;
+};
+
+}  // namespace sinew

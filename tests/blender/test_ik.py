@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sinew's inverse kinematics in the place of Blender's: the oracle is Blender's own solver where the
+solution is the only one, and where the target is elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+import sinew
+from mathutils import Matrix, Vector
+from sinew_addon import cli
+from sinew_addon.core.errors import SinewError
+from sinew_addon.features.ik import ik_bake, ik_compare
+from sinew_addon.io import files, ik_io
+
+FRAMES = range(1, 25)
+
+
+def make_empty(name, places):
+    empty = bpy.data.objects.new(name, None)
+    bpy.context.scene.collection.objects.link(empty)
+    for frame, place in zip((1, 9, 17, 24), places, strict=False):
+        empty.location = place
+        empty.rotation_euler = (0.1 * frame, 0.03 * frame, 0.0)
+        for path in ("location", "rotation_euler"):
+            empty.keyframe_insert(path, frame=frame)
+    return empty
+
+
+def make_arm(count=2, mode="QUATERNION", lean=0.25):
+    """A base bone, `count` bones behind each other up Z, bent a little, and a hand that hangs on them; in an
+    object that is moved, rotated and scaled."""
+    arm = bpy.data.objects.new("Arm", bpy.data.armatures.new("Arm"))
+    bpy.context.scene.collection.objects.link(arm)
+    bpy.context.view_layer.objects.active = arm
+    arm.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent, head = None, Vector()
+    for number, name in enumerate(["base", *(f"arm.{i}" for i in range(count)), "hand"]):
+        bone = arm.data.edit_bones.new(name)
+        turn = Matrix.Rotation(lean * (-1) ** number, 3, "X")
+        bone.head, bone.tail = head, head + turn @ Vector((0.0, 0.0, 1.0 if number else 0.4))
+        bone.parent, bone.use_connect = parent, number > 1
+        parent, head = bone, bone.tail.copy()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for bone in arm.pose.bones:
+        bone.rotation_mode = mode
+    arm.matrix_world = Matrix.LocRotScale(
+        (0.3, -0.2, 0.5), Matrix.Rotation(0.4, 3, "Z").to_quaternion(), (1.5,) * 3
+    )
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = FRAMES[0], FRAMES[-1]
+    return arm
+
+
+def constrain(arm, bone, target, pole=None, pole_angle=0.0, **settings):
+    constraint = arm.pose.bones[bone].constraints.new("IK")
+    constraint.target = target
+    if pole is not None:
+        constraint.pole_target, constraint.pole_angle = pole, pole_angle
+    for name, value in {"chain_count": 2, **settings}.items():
+        setattr(constraint, name, value)
+    return constraint
+
+
+def near(*, scale=1.0):
+    return [Vector(p) * scale for p in ((0.9, 0.8, 2.2), (-0.6, 0.5, 2.9), (0.2, -1.0, 1.9), (1.1, 0.3, 2.6))]
+
+
+def poses(arm, names, frames=FRAMES):
+    """[frames, bones, 4, 4], in the world."""
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        evaluated = arm.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        result.append([evaluated.matrix_world @ evaluated.pose.bones[name].matrix for name in names])
+    return np.array(result)
+
+
+def tails(arm, name, frames=FRAMES):
+    matrices = poses(arm, [name], frames)[:, 0]
+    return matrices[:, :3, 1] * arm.data.bones[name].length + matrices[:, :3, 3]
+
+
+def places(empty, frames=FRAMES):
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        result.append(
+            empty.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy()
+        )
+    return np.array(result)
+
+
+def bake(method="dls"):
+    assert bpy.ops.sinew.bake_ik(method=method, over="SCENE") == {"FINISHED"}
+
+
+@pytest.mark.parametrize("mode", ["QUATERNION", "XYZ", "AXIS_ANGLE"])
+@pytest.mark.parametrize("method", sinew.ik.METHODS)
+def test_a_pole_decides_two_bones_as_in_blender(method, mode):
+    arm = make_arm(mode=mode)
+    target, pole = make_empty("Target", near()), make_empty("Pole", [(2, 3, 3), (1, 3, 2), (2, 2, 4)])
+    constraint = constrain(arm, "arm.1", target, pole, -0.7, iterations=2000)
+    names = ["arm.0", "arm.1", "hand"]
+    before = poses(arm, names)
+    bake(method)
+    assert constraint.mute
+    assert ik_bake.is_baked(arm)
+    # Blender stops at steps of a thousandth; here the solution is the only one.
+    np.testing.assert_allclose(poses(arm, names), before, atol=5e-3)
+    np.testing.assert_allclose(tails(arm, "arm.1"), places(target), atol=1e-5)
+    assert bpy.ops.sinew.remove_ik() == {"FINISHED"}
+    assert not constraint.mute
+    assert not ik_bake.is_baked(arm)
+    np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
+    assert arm.animation_data is None or arm.animation_data.action is None
+
+
+def test_keys_of_the_action_come_back_and_those_of_others_stay():
+    arm = make_arm(3)
+    for frame, turn in ((1, 0.0), (24, 0.5)):
+        for name in ("base", "arm.0"):
+            arm.pose.bones[name].rotation_quaternion = Matrix.Rotation(turn, 3, "X").to_quaternion()
+            arm.pose.bones[name].keyframe_insert("rotation_quaternion", frame=frame)
+    action = arm.animation_data.action
+    target = make_empty("Target", near())
+    constraint = constrain(arm, "arm.2", target, chain_count=3)
+    names = ["base", "arm.0", "arm.1", "arm.2"]
+    before = poses(arm, names)
+    bake()
+    assert arm.animation_data.action != action
+    np.testing.assert_allclose(tails(arm, "arm.2"), places(target), atol=1e-5)
+    np.testing.assert_allclose(poses(arm, ["base"]), before[:, :1], atol=1e-6)
+    bpy.ops.sinew.remove_ik()
+    assert arm.animation_data.action == action
+    assert not constraint.mute
+    np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
+
+
+def test_hinges_with_limits_bend_as_in_blender():
+    arm = make_arm()
+    knee = arm.pose.bones["arm.1"]
+    knee.lock_ik_y = knee.lock_ik_z = True
+    knee.use_ik_limit_x, knee.ik_min_x, knee.ik_max_x = True, 0.0, 2.5
+    target, pole = make_empty("Target", near(scale=0.9)), make_empty("Pole", [(2, 3, 3)])
+    constrain(arm, "arm.1", target, pole, 0.4, iterations=2000)
+    before = poses(arm, ["arm.0", "arm.1"])
+    tree = ik_io.read_trees(arm)[0]
+    assert tree.locked.tolist() == [[False] * 3, [False, True, True]]
+    bake()
+    np.testing.assert_allclose(tails(arm, "arm.1"), places(target), atol=1e-5)
+    np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1"]), before, atol=1e-2)
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        angles = sinew.ik.swing_twist_angles(np.array(knee.rotation_quaternion))
+        assert -1e-5 <= angles[0] <= 2.5 + 1e-5
+        assert np.abs(angles[1:]).max() < 1e-5
+
+
+def test_rotation_is_followed_and_scaled_bones_reach():
+    arm = make_arm(4)
+    arm.pose.bones["arm.1"].scale = (1.3, 1.3, 1.3)
+    arm.pose.bones["base"].scale = (0.8, 0.8, 0.8)
+    arm.data.bones["arm.2"].inherit_scale = "NONE"
+    target = make_empty("Target", near())
+    constrain(arm, "arm.3", target, chain_count=4, use_rotation=True)
+    bake()
+    np.testing.assert_allclose(tails(arm, "arm.3"), places(target), atol=1e-4)
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        graph = bpy.context.evaluated_depsgraph_get()
+        bone = arm.evaluated_get(graph).pose.bones["arm.3"].matrix
+        wanted = target.evaluated_get(graph).matrix_world.to_quaternion()
+        turn = (arm.matrix_world @ bone).to_quaternion().rotation_difference(wanted).angle
+        assert min(turn, 2 * math.pi - turn) < 1e-3
+
+
+def test_one_tree_of_two_constraints_and_a_bone_as_target():
+    arm = make_arm(1)
+    bpy.ops.object.mode_set(mode="EDIT")
+    for side in (-1, 1):
+        parent = arm.data.edit_bones["arm.0"]
+        for number in range(2):
+            bone = arm.data.edit_bones.new(f"branch.{side}.{number}")
+            bone.head = parent.tail
+            bone.tail = bone.head + Vector((0.8 * side, 0.2 * (-1) ** number, 0.5))
+            bone.parent, bone.use_connect = parent, True
+            parent = bone
+        control = arm.data.edit_bones.new(f"control.{side}")
+        control.head = parent.tail + Vector((-0.4 * side, 0.4, 0.3))
+        control.tail = control.head + Vector((0, 0.2, 0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for side in (-1, 1):
+        constraint = constrain(arm, f"branch.{side}.1", arm, chain_count=4)
+        constraint.subtarget = f"control.{side}"
+    trees = ik_io.read_trees(arm)
+    assert len(trees) == 1
+    assert len(trees[0].effectors) == 2
+    assert trees[0].bones[0] == "base"
+    bake()
+    for side in (-1, 1):
+        bpy.context.scene.frame_set(12)
+        at = arm.matrix_world @ arm.pose.bones[f"control.{side}"].head
+        np.testing.assert_allclose(tails(arm, f"branch.{side}.1", [12])[0], at, atol=1e-4)
+
+
+def test_influence_lies_between():
+    arm = make_arm()
+    target = make_empty("Target", near())
+    constraint = constrain(arm, "arm.1", target)
+    constraint.influence = 0.4
+    before = tails(arm, "arm.1")
+    bake()
+    np.testing.assert_allclose(tails(arm, "arm.1"), before, atol=5e-3)
+
+
+def test_stopped_it_leaves_all_as_it_was():
+    arm = make_arm(3)
+    arm.pose.bones["arm.0"].rotation_quaternion = (0.9, 0.1, 0.0, 0.2)
+    arm.pose.bones["base"].keyframe_insert("location", frame=1)
+    action = arm.animation_data.action
+    constraint = constrain(arm, "arm.2", make_empty("Target", near()), chain_count=3)
+    before, count = poses(arm, ["arm.0", "arm.2"]), len(bpy.data.actions)
+    found = []
+    running = ik_bake.steps(arm, ik_io.read_trees(arm), list(FRAMES), "dls", found)
+    for _step in range(5):
+        next(running)
+    running.close()
+    assert not constraint.mute
+    assert arm.animation_data.action == action
+    assert not ik_bake.is_baked(arm)
+    assert len(bpy.data.actions) == count
+    assert found == []
+    np.testing.assert_allclose(poses(arm, ["arm.0", "arm.2"]), before, atol=1e-6)
+
+
+def test_a_second_bake_keeps_what_was_there_first():
+    arm = make_arm(4)
+    lower = constrain(arm, "arm.1", make_empty("Low", near(scale=0.7)))
+    upper = constrain(arm, "arm.3", make_empty("High", near(scale=1.3)))
+    arm.pose.bones["base"].keyframe_insert("location", frame=1)
+    action, names = arm.animation_data.action, ["arm.0", "arm.1", "arm.2", "arm.3"]
+    before = poses(arm, names)
+    upper.mute = True
+    bake()
+    upper.mute = False
+    bake()
+    assert lower.mute
+    assert upper.mute
+    np.testing.assert_allclose(tails(arm, "arm.1"), places(bpy.data.objects["Low"]), atol=1e-5)
+    assert len(bpy.data.actions) == 4
+    bpy.ops.sinew.remove_ik()
+    assert arm.animation_data.action == action
+    assert len(bpy.data.actions) == 3
+    np.testing.assert_allclose(poses(arm, names), before, atol=1e-6)
+
+
+def test_undo_takes_it_back():
+    arm = make_arm()
+    constrain(arm, "arm.1", make_empty("Target", near()))
+    bpy.ops.ed.undo_push(message="before")
+    before = poses(arm, ["arm.0", "arm.1"])
+    bpy.ops.ed.undo_push(message="still before")
+    bake()
+    bpy.ops.ed.undo_push(message="baked")
+    bpy.ops.ed.undo()
+    arm = bpy.data.objects["Arm"]
+    assert not ik_bake.is_baked(arm)
+    assert not arm.pose.bones["arm.1"].constraints[0].mute
+    np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1"]), before, atol=1e-6)
+
+
+def test_only_chains_with_selected_bones():
+    arm = make_arm(3)
+    constrain(arm, "arm.2", make_empty("Target", near()), chain_count=2)
+    assert ik_io.read_trees(arm, ["arm.1"])[0].bones == ("arm.1", "arm.2")
+    with pytest.raises(SinewError, match="no inverse kinematics constraint that moves a selected bone"):
+        ik_io.read_trees(arm, ["base"])
+
+
+def test_what_it_does_not_do_is_said():
+    arm = make_arm()
+    with pytest.raises(SinewError, match="no inverse kinematics constraint; add one"):
+        ik_io.read_trees(arm)
+    constrain(arm, "arm.1", make_empty("Target", near()))
+    arm.pose.bones["arm.0"].ik_stretch = 0.5
+    with pytest.raises(SinewError, match=r"arm\.0 may stretch"):
+        ik_io.read_trees(arm)
+    arm.pose.bones["arm.0"].ik_stretch = 0.0
+    arm.pose.bones["arm.0"].constraints.new("LIMIT_ROTATION")
+    with pytest.raises(SinewError, match="has the constraint Limit Rotation besides"):
+        ik_io.read_trees(arm)
+
+
+def test_blender_and_sinew_measured():
+    arm = make_arm(4)
+    constrain(arm, "arm.3", make_empty("Target", near()), chain_count=4)
+    tree = ik_io.read_trees(arm)[0]
+    blender, dls, ccd = ik_compare.measure(arm, tree, list(FRAMES), sinew.ik.METHODS)
+    assert (blender.solver, dls.solver, ccd.solver) == ("blender", "dls", "ccd")
+    # Its own claim against the evaluated scene.
+    tip = tails(arm, "arm.3")
+    assert blender.errors == pytest.approx(
+        np.linalg.norm(tip - places(bpy.data.objects["Target"]), axis=1) / 6.0, abs=1e-6
+    )
+    assert dls.errors.max() < 2e-6
+    assert ccd.errors.max() < 2e-6
+    assert dls.errors.max() <= blender.errors.max()
+    assert 0 < dls.iterations < 15
+    assert 0 < ccd.iterations < 500
+    assert dls.microseconds > 0
+    assert not arm.pose.bones["arm.3"].constraints[0].mute
+
+
+def test_the_command_writes_a_copy_and_compares(tmp_path, capfd):
+    arm = make_arm(3)
+    target = make_empty("Target", near())
+    constrain(arm, "arm.2", target, chain_count=3)
+    arm.pose.bones["base"].keyframe_insert("location", frame=1)
+    arm.animation_data.action.name = "Walk"
+    source = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    bytes_before = source.read_bytes()
+    status = cli.main(["ik", str(source), "--out", str(tmp_path / "out"), "--frames", "3-20", "--compare"])
+    assert status == 0
+    assert source.read_bytes() == bytes_before
+    printed = capfd.readouterr().out
+    assert "blender" in printed
+    assert "dls" in printed
+    assert "arm.2" in printed
+    files.open_file(tmp_path / "out" / "arm.blend")
+    arm, target = bpy.data.objects["Arm"], bpy.data.objects["Target"]
+    assert arm.pose.bones["arm.2"].constraints[0].mute
+    frames = range(3, 21)
+    np.testing.assert_allclose(tails(arm, "arm.2", frames), places(target, frames), atol=1e-5)
+    # What the bake replaced is in the file.
+    assert ik_bake.is_baked(arm)
+    ik_bake.restore(arm)
+    assert arm.animation_data.action.name == "Walk"
+    assert not arm.pose.bones["arm.2"].constraints[0].mute
+    assert cli.main(["ik", str(source)]) == 2
+    assert cli.main(["ik", str(source), "--out", str(tmp_path / "out")]) == 1
+    assert cli.main(["ik", str(source), "--armature", "Leg", "--compare"]) == 1

@@ -1,0 +1,429 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "sinew/ik/solver.h"
+#include "support.h"
+
+namespace sinew {
+namespace {
+
+using test::Random;
+
+constexpr IkMethod kDls = IkMethod::damped_least_squares;
+constexpr IkMethod kCcd = IkMethod::cyclic_descent;
+
+/// Bones along y, one behind the other unless parents say otherwise.
+struct Rig {
+    std::vector<std::int32_t> parents;
+    std::vector<DualQuat<double>> rest;
+    std::vector<double> lengths;
+    std::vector<BoneLimits> limits;
+
+    static Rig chain(const std::vector<double>& lengths) {
+        Rig rig;
+        for (std::size_t i = 0; i < lengths.size(); ++i) {
+            rig.parents.push_back(static_cast<std::int32_t>(i) - 1);
+            const double before = i > 0 ? lengths[i - 1] : 0.0;
+            rig.rest.push_back(to_dual_quat(QuatVec<double>{{1, 0, 0, 0}, {0, before, 0}}));
+        }
+        rig.lengths = lengths;
+        rig.limits.resize(lengths.size());
+        return rig;
+    }
+
+    [[nodiscard]] double length() const {
+        double sum = 0.0;
+        for (const double each : lengths) sum += each;
+        return sum;
+    }
+
+    /// The oracle of poses: matrices, and not the solver's own.
+    [[nodiscard]] std::vector<Affine<double>> poses(const std::vector<Quat<double>>& rotations) const {
+        std::vector<Affine<double>> result;
+        for (std::size_t i = 0; i < parents.size(); ++i) {
+            const Affine<double> own =
+                to_affine(rest[i]) * Affine<double>{to_mat3(rotations[i]), Vec3<double>(0.0)};
+            result.push_back(parents[i] < 0 ? own : result[static_cast<std::size_t>(parents[i])] * own);
+        }
+        return result;
+    }
+
+    [[nodiscard]] Vec3<double> tip(const std::vector<Quat<double>>& rotations, std::size_t bone) const {
+        return transform_point(poses(rotations)[bone], Vec3<double>(0.0, lengths[bone], 0.0));
+    }
+};
+
+DualQuat<double> at(const Vec3<double>& position, const Quat<double>& rotation = {1, 0, 0, 0}) {
+    return to_dual_quat(QuatVec<double>{rotation, position});
+}
+
+struct Solved {
+    IkResult result;
+    std::vector<Quat<double>> rotations;
+};
+
+Solved solve(const Rig& rig, const std::vector<IkEffector>& effectors,
+             const std::vector<DualQuat<double>>& goals, std::vector<Quat<double>> rotations,
+             const IkOptions& options = {}, const std::vector<Vec3<double>>& poles = {},
+             const DualQuat<double>& root = {}) {
+    IkSolver solver(Skeleton(rig.parents), rig.limits, effectors);
+    std::vector<Vec3<double>> tips;
+    for (const IkEffector& effector : effectors) {
+        tips.emplace_back(0.0, rig.lengths[static_cast<std::size_t>(effector.bone)], 0.0);
+    }
+    const IkResult result = solver.solve({root, rig.rest, tips, goals, poles}, rotations, options);
+    return {result, rotations};
+}
+
+IkEffector last(const Rig& rig) { return {.bone = static_cast<std::int32_t>(rig.parents.size()) - 1}; }
+
+std::vector<double> random_lengths(Random& random) {
+    std::vector<double> lengths;
+    const std::int32_t count = 2 + random.index(9);
+    for (std::int32_t i = 0; i < count; ++i) lengths.push_back(random.uniform(0.5, 1.5));
+    return lengths;
+}
+
+std::vector<Quat<double>> random_rotations(Random& random, std::size_t count, double angle) {
+    std::vector<Quat<double>> rotations;
+    for (std::size_t i = 0; i < count; ++i) {
+        rotations.push_back(quat_from_rotation_vector(random.vector(angle)));
+    }
+    return rotations;
+}
+
+/// Of kinds: none, hinges, elbows, swings without twist, boxes and ellipses.
+BoneLimits random_limits(Random& random) {
+    BoneLimits limits;
+    for (AxisLimit& limit : limits) {
+        const double kind = random.uniform(0.0, 1.0);
+        limit.is_locked = kind < 0.3;
+        limit.is_limited = kind > 0.6;
+        limit.min = -random.uniform(0.1, 2.5);
+        limit.max = random.uniform(0.1, 2.5);
+    }
+    if (limits[0].is_locked && limits[2].is_locked) limits[0].is_locked = false;
+    return limits;
+}
+
+TEST(Ik, chains_without_limits_reach_what_is_in_reach) {
+    Random random(1);
+    for (int i = 0; i < 300; ++i) {
+        const Rig rig = Rig::chain(random_lengths(random));
+        const std::size_t end = rig.parents.size() - 1;
+        const Vec3<double> goal = rig.tip(random_rotations(random, end + 1, 1.2), end);
+        const auto found = solve(rig, {last(rig)}, {at(goal)}, random_rotations(random, end + 1, 0.3));
+        EXPECT_LT(test::distance(rig.tip(found.rotations, end), goal), 1e-6 * rig.length()) << i;
+        EXPECT_TRUE(found.result.is_reached);
+        EXPECT_LT(found.result.iterations, 40) << i;
+    }
+}
+
+TEST(Ik, cyclic_descent_reaches_with_many_sweeps) {
+    Random random(2);
+    for (int i = 0; i < 300; ++i) {
+        const Rig rig = Rig::chain(random_lengths(random));
+        const std::size_t end = rig.parents.size() - 1;
+        const Vec3<double> goal = rig.tip(random_rotations(random, end + 1, 1.2), end);
+        const auto found = solve(rig, {last(rig)}, {at(goal)}, random_rotations(random, end + 1, 0.3),
+                                 {.method = kCcd, .iterations = 20000});
+        EXPECT_LT(test::distance(rig.tip(found.rotations, end), goal), 1e-6 * rig.length()) << i;
+    }
+}
+
+TEST(Ik, wanted_rotations_are_reached_too) {
+    Random random(3);
+    for (const IkMethod method : {kDls, kCcd}) {
+        int reached = 0;
+        for (int i = 0; i < 200; ++i) {
+            Rig rig = Rig::chain(random_lengths(random));
+            if (rig.parents.size() < 3) rig = Rig::chain({1, 1.2, 0.5});
+            const std::size_t end = rig.parents.size() - 1;
+            const auto posed = random_rotations(random, end + 1, 0.8);
+            const Affine<double> pose = rig.poses(posed)[end];
+            const Vec3<double> goal = rig.tip(posed, end);
+            IkEffector effector = last(rig);
+            effector.rotation_weight = 1.0;
+            const auto found =
+                solve(rig, {effector}, {at(goal, to_quat(pose.linear))},
+                      random_rotations(random, end + 1, 0.3), {.method = method, .iterations = 3000});
+            const double apart =
+                angle_between(to_quat(rig.poses(found.rotations)[end].linear), to_quat(pose.linear));
+            const bool is_there =
+                test::distance(rig.tip(found.rotations, end), goal) < 1.1e-6 * rig.length() && apart < 1.1e-6;
+            EXPECT_EQ(is_there, found.result.is_reached);
+            reached += is_there;
+        }
+        EXPECT_GE(reached, method == kDls ? 200 : 150);
+    }
+}
+
+TEST(Ik, what_is_out_of_reach_is_stretched_to_straight) {
+    Random random(4);
+    for (const IkMethod method : {kDls, kCcd}) {
+        for (int i = 0; i < 100; ++i) {
+            const Rig rig = Rig::chain(random_lengths(random));
+            const std::size_t end = rig.parents.size() - 1;
+            const Vec3<double> towards = unit(random.vector(1.0), Vec3<double>(1, 0, 0));
+            const Vec3<double> goal = random.uniform(1.0, 4.0) * rig.length() * towards;
+            const auto found = solve(rig, {last(rig)}, {at(goal)}, random_rotations(random, end + 1, 0.3),
+                                     {.method = method});
+            EXPECT_LT(test::distance(rig.tip(found.rotations, end), rig.length() * towards),
+                      1e-9 * rig.length());
+            double along = 0.0;
+            for (std::size_t bone = 0; bone <= end; ++bone) {
+                along += rig.lengths[bone];
+                EXPECT_LT(test::distance(rig.tip(found.rotations, bone), along * towards),
+                          1e-9 * rig.length());
+            }
+        }
+    }
+}
+
+TEST(Ik, limits_are_never_violated_and_nearly_always_what_is_reachable_is_reached) {
+    Random random(5);
+    for (const IkMethod method : {kDls, kCcd}) {
+        int reached = 0;
+
+        for (int i = 0; i < 400; ++i) {
+            Rig rig = Rig::chain(random_lengths(random));
+            for (BoneLimits& limits : rig.limits) limits = random_limits(random);
+            const std::size_t end = rig.parents.size() - 1;
+            // Within the limits, by what the solver does to a start: a solve without a step.
+            const auto within = [&](const std::vector<Quat<double>>& any) {
+                return solve(rig, {last(rig)}, {at({0, 0, 0})}, any, {.iterations = 0}).rotations;
+            };
+            const auto posed = within(random_rotations(random, end + 1, 1.5));
+            for (std::size_t bone = 0; bone <= end; ++bone) {
+                EXPECT_LT(limit_violation(rig.limits[bone], posed[bone]), 1e-7) << i << " " << bone;
+            }
+            const Vec3<double> goal = rig.tip(posed, end);
+            const auto found = solve(rig, {last(rig)}, {at(goal)}, random_rotations(random, end + 1, 0.3),
+                                     {.method = method, .iterations = method == kDls ? 200 : 3000});
+            for (std::size_t bone = 0; bone <= end; ++bone) {
+                EXPECT_LT(limit_violation(rig.limits[bone], found.rotations[bone]), 1e-7) << i << " " << bone;
+            }
+            reached += found.result.is_reached;
+        }
+        RecordProperty(method == kDls ? "dls" : "ccd", reached);
+        EXPECT_GE(reached, method == kDls ? 390 : 380);
+    }
+}
+
+TEST(Ik, far_goals_keep_limits) {
+    Random random(6);
+    for (const IkMethod method : {kDls, kCcd}) {
+        for (int i = 0; i < 200; ++i) {
+            Rig rig = Rig::chain(random_lengths(random));
+            for (BoneLimits& limits : rig.limits) limits = random_limits(random);
+            const std::size_t end = rig.parents.size() - 1;
+            const auto found = solve(rig, {last(rig)}, {at(random.vector(3.0 * rig.length()))},
+                                     random_rotations(random, end + 1, 3.0), {.method = method});
+            for (std::size_t bone = 0; bone <= end; ++bone) {
+                EXPECT_LT(limit_violation(rig.limits[bone], found.rotations[bone]), 1e-7);
+                EXPECT_NEAR(glm::length(found.rotations[bone]), 1.0, 1e-12);
+            }
+        }
+    }
+}
+
+/// A trunk of two bones, and two branches of three.
+Rig tree() {
+    Rig rig;
+    rig.parents = {-1, 0, 1, 2, 3, 1, 5, 6};
+    rig.lengths = {1, 1, 0.5, 1, 1, 0.5, 1, 1};
+    for (std::size_t i = 0; i < rig.parents.size(); ++i) {
+        const double before = i > 0 ? rig.lengths[static_cast<std::size_t>(rig.parents[i])] : 0.0;
+        const double side = i == 2 ? 60.0 : i == 5 ? -60.0 : 0.0;
+        rig.rest.push_back(at({0, before, 0}, test::about(Vec3<double>(0, 0, 1), side)));
+    }
+    rig.limits.resize(rig.parents.size());
+    return rig;
+}
+
+TEST(Ik, trees_reach_two_goals) {
+    Random random(7);
+    const Rig rig = tree();
+    for (const IkMethod method : {kDls, kCcd}) {
+        for (int i = 0; i < 100; ++i) {
+            const auto posed = random_rotations(random, 8, 0.6);
+            const std::vector<Vec3<double>> goals{rig.tip(posed, 4), rig.tip(posed, 7)};
+            const auto found =
+                solve(rig, {{.bone = 4}, {.bone = 7}}, {at(goals[0]), at(goals[1])},
+                      random_rotations(random, 8, 0.3), {.method = method, .iterations = 5000});
+            EXPECT_LT(test::distance(rig.tip(found.rotations, 4), goals[0]), 4.5e-6) << i;
+            EXPECT_LT(test::distance(rig.tip(found.rotations, 7), goals[1]), 4.5e-6) << i;
+        }
+    }
+}
+
+TEST(Ik, poles_choose_the_plane_and_the_side_of_the_bend) {
+    Random random(8);
+    for (const IkMethod method : {kDls, kCcd}) {
+        for (int i = 0; i < 200; ++i) {
+            // Bent about x, so that its plane holds z, the axis that the pole angle names.
+            const Rig rig = Rig::chain(random_lengths(random));
+            const std::size_t end = rig.parents.size() - 1;
+            const std::vector<Quat<double>> start(end + 1,
+                                                  quat_from_rotation_vector(Vec3<double>(0.15, 0.0, 0.0)));
+            const Vec3<double> towards = unit(random.vector(1.0), {1, 0, 0});
+            const Vec3<double> goal = random.uniform(0.5, 0.9) * rig.length() * towards;
+            const Vec3<double> pole = 3.0 * unit(random.vector(1.0), {0, 1, 0});
+            IkEffector effector = last(rig);
+            effector.has_pole = true;
+            effector.pole_angle = 0.5 * std::numbers::pi;
+            const auto found =
+                solve(rig, {effector}, {at(goal)}, start, {.method = method, .iterations = 5000}, {pole});
+            EXPECT_TRUE(found.result.is_reached);
+            const Vec3<double> up = glm::normalize(pole - glm::dot(pole, towards) * towards);
+            const Vec3<double> normal = glm::cross(towards, up);
+            for (std::size_t bone = 0; bone < end; ++bone) {
+                EXPECT_NEAR(glm::dot(rig.tip(found.rotations, bone), normal), 0.0, 1e-9);
+            }
+            // The chain is bent away from where its bones' z points.
+            EXPECT_LT(glm::dot(rig.tip(found.rotations, 0), up), 0.0) << i;
+        }
+    }
+}
+
+TEST(Ik, a_straight_chain_bends_to_a_goal_on_its_line) {
+    for (const IkMethod method : {kDls, kCcd}) {
+        for (const double goal : {0.3, 1.0, 2.0, -0.5, -2.0}) {
+            Rig rig = Rig::chain({1, 1, 1});
+            const std::vector<Quat<double>> straight(3, Quat<double>(1, 0, 0, 0));
+            const auto found =
+                solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.method = method, .iterations = 5000});
+            EXPECT_LT(test::distance(rig.tip(found.rotations, 2), {0, goal, 0}), 3e-6) << goal;
+            // A knee: bends to one side alone.
+            for (std::size_t bone : {1, 2}) {
+                for (std::size_t axis : {1, 2}) rig.limits[bone][axis].is_locked = true;
+                rig.limits[bone][0].is_limited = true;
+                rig.limits[bone][0].min = 0.0;
+                rig.limits[bone][0].max = 2.6;
+            }
+            const auto knee =
+                solve(rig, {last(rig)}, {at({0, goal, 0})}, straight, {.method = method, .iterations = 5000});
+            EXPECT_LT(test::distance(rig.tip(knee.rotations, 2), {0, goal, 0}), 3e-6) << goal;
+            for (std::size_t bone : {1, 2}) {
+                EXPECT_LT(limit_violation(rig.limits[bone], knee.rotations[bone]), 1e-7);
+            }
+        }
+    }
+}
+
+TEST(Ik, degenerate_chains_are_finite) {
+    for (const IkMethod method : {kDls, kCcd}) {
+        const std::vector<Quat<double>> straight(3, Quat<double>(1, 0, 0, 0));
+        for (const std::vector<double>& lengths :
+             {std::vector<double>{0, 0, 0}, {1, 0, 1}, {0, 1, 0}, {3, 1, 0.5}, {1, 1, 1}}) {
+            for (const Vec3<double>& goal : {Vec3<double>(0, 0, 0), {0, 0.4, 0}, {1, 1, 0}, {1e9, 0, 0}}) {
+                const Rig rig = Rig::chain(lengths);
+                IkEffector effector = last(rig);
+                effector.has_pole = true;
+                const auto found = solve(rig, {effector}, {at(goal)}, straight,
+                                         {.method = method, .iterations = 2000}, {{0, 5, 0}});
+                for (const Quat<double>& q : found.rotations) EXPECT_NEAR(glm::length(q), 1.0, 1e-9);
+                EXPECT_TRUE(std::isfinite(found.result.distance));
+                double least = test::distance(goal, Vec3<double>(0.0)) - rig.length();
+                least = std::max(least, 2.0 * *std::max_element(lengths.begin(), lengths.end()) -
+                                            rig.length() - test::distance(goal, Vec3<double>(0.0)));
+                EXPECT_LE(found.result.distance, std::max(least, 0.0) * (1 + 1e-9) + 1e-4 * rig.length())
+                    << lengths[0] << lengths[1] << lengths[2] << " " << goal.x << " " << goal.y;
+            }
+        }
+    }
+}
+
+TEST(Ik, a_rigid_motion_of_everything_changes_nothing) {
+    Random random(9);
+    for (int i = 0; i < 100; ++i) {
+        const Rig rig = Rig::chain({1, 1.2, 0.8, 0.6});
+        const DualQuat<double> motion = to_dual_quat(random.motion(3.0));
+        const DualQuat<double> goal = at(random.vector(1.5), random.rotation());
+        const Vec3<double> pole = random.vector(4.0);
+        const auto start = random_rotations(random, 4, 0.4);
+        const IkEffector effector{.bone = 3, .rotation_weight = i % 2 ? 0.5 : 0.0, .has_pole = i % 3 == 0};
+        for (const IkMethod method : {kDls, kCcd}) {
+            const auto here =
+                solve(rig, {effector}, {goal}, start, {.method = method, .iterations = 30}, {pole});
+            const auto there =
+                solve(rig, {effector}, {motion * goal}, start, {.method = method, .iterations = 30},
+                      {transform_point(motion, pole)}, motion);
+            for (std::size_t bone = 0; bone < 4; ++bone) {
+                EXPECT_LT(angle_between(here.rotations[bone], there.rotations[bone]), 1e-5)
+                    << i << " " << bone;
+            }
+        }
+    }
+}
+
+TEST(Ik, signs_of_quaternions_do_not_matter_and_the_same_gives_the_same_bits) {
+    Random random(10);
+    for (int i = 0; i < 100; ++i) {
+        Rig rig = Rig::chain({1, 1.2, 0.8});
+        for (BoneLimits& limits : rig.limits) {
+            if (i % 2) limits = random_limits(random);
+        }
+        const auto start = random_rotations(random, 3, 1.5);
+        std::vector<Quat<double>> negative;
+        for (const Quat<double>& q : start) negative.push_back(-q);
+        const DualQuat<double> goal = at(random.vector(1.5), random.rotation());
+        const IkEffector effector{.bone = 2, .rotation_weight = 0.5};
+        for (const IkMethod method : {kDls, kCcd}) {
+            const auto once = solve(rig, {effector}, {goal}, start, {.method = method});
+            const auto again = solve(rig, {effector}, {-goal}, negative, {.method = method});
+            const auto same = solve(rig, {effector}, {goal}, start, {.method = method});
+            for (std::size_t bone = 0; bone < 3; ++bone) {
+                EXPECT_LT(glm::length(once.rotations[bone] - again.rotations[bone]), 1e-9) << i;
+                EXPECT_GE(once.rotations[bone].w, 0.0);
+            }
+            EXPECT_EQ(std::memcmp(once.rotations.data(), same.rotations.data(), 3 * sizeof(Quat<double>)), 0);
+        }
+    }
+}
+
+TEST(Ik, stiff_bones_rotate_less) {
+    Rig rig = Rig::chain({1, 1, 1});
+    const std::vector<Quat<double>> start(3, quat_from_rotation_vector(Vec3<double>(0.2, 0, 0)));
+    const auto turn_of_root = [&](IkMethod method) {
+        const auto found =
+            solve(rig, {last(rig)}, {at({0.5, 2, 1})}, start, {.method = method, .iterations = 5000});
+        EXPECT_TRUE(found.result.is_reached);
+        return angle_between(start[0], found.rotations[0]);
+    };
+    for (const IkMethod method : {kDls, kCcd}) {
+        for (AxisLimit& limit : rig.limits[0]) limit.stiffness = 0.0;
+        const double loose = turn_of_root(method);
+        for (AxisLimit& limit : rig.limits[0]) limit.stiffness = 0.9;
+        EXPECT_LT(turn_of_root(method), 0.7 * loose);
+    }
+}
+
+TEST(Ik, wrong_arguments_are_named) {
+    const Skeleton skeleton(std::vector<std::int32_t>{-1, 0});
+    const auto message = [&](const std::vector<BoneLimits>& limits,
+                             const std::vector<IkEffector>& effectors) {
+        try {
+            IkSolver(skeleton, limits, effectors);
+        } catch (const std::invalid_argument& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(message({}, {}), "effectors: expected at least one, got none");
+    EXPECT_NE(message({}, {{.bone = 2}}).find("effectors: expected the index of one of 2 bones, got 2"),
+              std::string::npos);
+    EXPECT_NE(message({}, {{.bone = 1, .position_weight = -1.0}}).find("weights"), std::string::npos);
+    EXPECT_NE(message({BoneLimits{}}, {{.bone = 1}}).find("limits"), std::string::npos);
+    std::vector<BoneLimits> limits(2);
+    limits[1][2] = {.is_limited = true, .min = 0.5, .max = 1.0};
+    EXPECT_NE(message(limits, {{.bone = 1}}).find("limits: expected -pi <= min <= 0"), std::string::npos);
+    limits[1][2] = {.stiffness = 1.0};
+    EXPECT_NE(message(limits, {{.bone = 1}}).find("stiffness"), std::string::npos);
+    EXPECT_EQ(message({}, {{.bone = 1}}), "");
+}
+
+}  // namespace
+}  // namespace sinew

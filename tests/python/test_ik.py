@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""sinew.ik against scipy's least squares, the law of cosines, and plain matrices for the poses."""
+
+import numpy as np
+import pytest
+import sinew
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+from sinew import ik
+
+CHAINS = 220
+
+
+def rest_of(lengths):
+    """Bones along y, one behind the other, [bones, 7]."""
+    rest = np.zeros((len(lengths), 7))
+    rest[:, 0] = 1.0
+    rest[1:, 5] = lengths[:-1]
+    return rest
+
+
+def matrices(quaternions):
+    return Rotation.from_quat(np.roll(quaternions, -1, axis=-1)).as_matrix()
+
+
+def poses_of(rest, rotations):
+    """The oracle of poses, in matrices: rotation and head of each bone of a chain."""
+    rotation, head, poses = np.eye(3), np.zeros(3), []
+    for own, at_rest, q in zip(rest, matrices(rest[:, :4]), matrices(rotations), strict=True):
+        head = head + rotation @ own[4:]
+        rotation = rotation @ at_rest @ q
+        poses.append((rotation, head))
+    return poses
+
+
+def tip_of(rest, rotations, length):
+    rotation, head = poses_of(rest, rotations)[-1]
+    return head + rotation @ (0.0, length, 0.0)
+
+
+def quaternions_of(vectors):
+    return np.roll(Rotation.from_rotvec(vectors).as_quat(), 1, axis=-1)
+
+
+def chain(parents, **limits):
+    return ik.Solver(parents, [ik.Effector(len(parents) - 1)], **limits)
+
+
+def line_of(count):
+    return np.arange(count) - 1
+
+
+def test_two_bones_by_the_law_of_cosines():
+    rng = np.random.default_rng(1)
+    for method in ik.METHODS:
+        solver = chain(line_of(2))
+        for _ in range(100):
+            a, b = rng.uniform(0.5, 1.5, 2)
+            distance = rng.uniform(abs(a - b) + 0.05, a + b - 0.05)
+            goal = rng.normal(size=3)
+            goal *= distance / np.linalg.norm(goal)
+            rest, start = rest_of([a, b]), quaternions_of(rng.uniform(-0.5, 0.5, (2, 3)))
+            found = solver.solve(
+                rest, [[0, b, 0]], [[1, 0, 0, 0, *goal]], rotations=start, method=method, iterations=5000
+            )
+            assert found.is_reached
+            at_root = (a * a + distance * distance - b * b) / (2 * a * distance)
+            at_knee = (a * a + b * b - distance * distance) / (2 * a * b)
+            poses = poses_of(rest, found.rotations)
+            first, second = poses[0][0][:, 1], poses[1][0][:, 1]
+            assert first @ goal / distance == pytest.approx(at_root, abs=1e-4)
+            assert -first @ second == pytest.approx(at_knee, abs=1e-4)
+
+
+@pytest.mark.parametrize("method", ik.METHODS)
+def test_chains_without_limits_reach_where_scipy_does(method):
+    rng = np.random.default_rng(2)
+    for _ in range(CHAINS // 2):
+        count = int(rng.integers(2, 9))
+        lengths = rng.uniform(0.5, 1.5, count)
+        rest, total = rest_of(lengths), lengths.sum()
+        goal = rng.normal(size=3)
+        goal *= rng.uniform(0.0, 1.4) * total / np.linalg.norm(goal)
+        start = rng.uniform(-0.4, 0.4, (count, 3))
+
+        def error(vectors, rest=rest, length=lengths[-1], goal=goal):
+            return tip_of(rest, quaternions_of(vectors.reshape(-1, 3)), length) - goal
+
+        theirs = np.linalg.norm(least_squares(error, start.ravel(), xtol=1e-12, ftol=1e-12).fun)
+        solver = chain(line_of(count))
+        found = solver.solve(
+            rest,
+            [[0, lengths[-1], 0]],
+            [[1, 0, 0, 0, *goal]],
+            rotations=quaternions_of(start),
+            method=method,
+            iterations=100 if method == "dls" else 5000,
+        )
+        distance = np.linalg.norm(tip_of(rest, found.rotations, lengths[-1]) - goal)
+        assert distance == pytest.approx(found.distance, abs=1e-9 * total)
+        # Folded to the end of its reach a chain is at a minimum of the fourth order.
+        assert distance <= theirs + (1.1e-6 if method == "dls" else 1e-4) * total
+
+
+def angles_to_quaternions(angles):
+    """What swing_twist_angles() undoes: by scipy, the swing from its quaternion."""
+    x, z = np.sin(angles[:, 0] / 2), np.sin(angles[:, 2] / 2)
+    w = np.sqrt(np.maximum(1 - x * x - z * z, 0.0))
+    swing = Rotation.from_quat(np.column_stack([x, np.zeros_like(x), z, w]))
+    twist = Rotation.from_rotvec(angles * (0.0, 1.0, 0.0))
+    return np.roll((swing * twist).as_quat(), 1, axis=-1)
+
+
+def test_angles_of_swing_and_twist():
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(-1.2, 1.2, (100, 3))
+    np.testing.assert_allclose(ik.swing_twist_angles(angles_to_quaternions(angles)), angles, atol=1e-12)
+    np.testing.assert_allclose(ik.swing_twist_angles(-3 * angles_to_quaternions(angles)), angles, atol=1e-12)
+
+
+def test_chains_with_limits_come_as_near_as_scipy():
+    """Both from one start, both within the same bounds; a local minimum is no fault, more of them are."""
+    rng = np.random.default_rng(4)
+    nearer, as_near, farther = 0, 0, 0
+    for _ in range(CHAINS):
+        count = int(rng.integers(2, 6))
+        lengths = rng.uniform(0.5, 1.5, count)
+        rest, total = rest_of(lengths), lengths.sum()
+        # x is free within its limits, z locked or the other way round: bounds of scipy's have no ellipse.
+        locked = np.zeros((count, 3), bool)
+        locked[np.arange(count), np.where(rng.random(count) < 0.5, 0, 2)] = True
+        limits = np.stack([-rng.uniform(0.2, 2.5, (count, 3)), rng.uniform(0.2, 2.5, (count, 3))], axis=-1)
+        free = ~locked
+        inside = rng.uniform(0.05, 0.95, (count, 3))
+        posed = np.where(free, limits[..., 0] + inside * (limits[..., 1] - limits[..., 0]), 0.0)
+        goal = tip_of(rest, angles_to_quaternions(posed), lengths[-1])
+        start = np.where(free, 0.1 * limits[..., 1], 0.0)
+
+        def error(values, rest=rest, length=lengths[-1], goal=goal, free=free):
+            angles = np.zeros(free.shape)
+            angles[free] = values
+            return tip_of(rest, angles_to_quaternions(angles), length) - goal
+
+        bounds = (limits[..., 0][free], limits[..., 1][free])
+        theirs = np.linalg.norm(least_squares(error, start[free], bounds=bounds, xtol=1e-12).fun)
+        solver = chain(line_of(count), locked=locked, limits=limits)
+        found = solver.solve(
+            rest, [[0, lengths[-1], 0]], [[1, 0, 0, 0, *goal]], rotations=angles_to_quaternions(start)
+        )
+        angles = ik.swing_twist_angles(found.rotations)
+        assert (np.abs(angles[locked]) < 1e-7).all()
+        assert (angles >= limits[..., 0] - 1e-7)[free].all()
+        assert (angles <= limits[..., 1] + 1e-7)[free].all()
+        ours = np.linalg.norm(tip_of(rest, found.rotations, lengths[-1]) - goal)
+        nearer += ours < theirs - 1e-4 * total
+        farther += ours > theirs + 1e-4 * total
+        as_near += abs(ours - theirs) <= 1e-4 * total
+    assert as_near >= 0.9 * CHAINS
+    assert farther <= 0.04 * CHAINS, (nearer, as_near, farther)
+
+
+def test_wanted_rotations_against_scipy():
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        count = int(rng.integers(3, 7))
+        lengths = rng.uniform(0.5, 1.5, count)
+        rest, total = rest_of(lengths), lengths.sum()
+        # Half of them are nowhere: the sum of squares is to be the least.
+        goal = rng.normal(size=3) * 0.5 * total
+        wanted = Rotation.random(random_state=rng)
+        start = rng.uniform(-0.4, 0.4, (count, 3))
+
+        def error(vectors, rest=rest, length=lengths[-1], goal=goal, wanted=wanted, total=total):
+            rotation, head = poses_of(rest, quaternions_of(vectors.reshape(-1, 3)))[-1]
+            tip = head + rotation @ (0.0, length, 0.0)
+            turn = (wanted * Rotation.from_matrix(rotation).inv()).as_rotvec()
+            return np.concatenate([(goal - tip) / total, 0.3 * turn])
+
+        theirs = least_squares(error, start.ravel(), xtol=1e-12, ftol=1e-12).cost
+        solver = ik.Solver(line_of(count), [ik.Effector(count - 1, 1.0, 0.3)])
+        found = solver.solve(
+            rest,
+            [[0, lengths[-1], 0]],
+            [[*np.roll(wanted.as_quat(), 1), *goal]],
+            rotations=quaternions_of(start),
+            iterations=500,
+        )
+        vectors = Rotation.from_quat(np.roll(found.rotations, -1, axis=-1)).as_rotvec()
+        ours = 0.5 * (error(vectors.ravel()) ** 2).sum()
+        assert ours <= theirs + 1e-6
+
+
+def test_layouts_and_frames_broadcast():
+    rng = np.random.default_rng(6)
+    solver = chain(line_of(3))
+    rest, tips = rest_of([1, 1, 1]), [[0, 1, 0]]
+    goals = np.zeros((5, 1, 7))
+    goals[..., 0], goals[..., 4:] = 1.0, rng.uniform(-1.2, 1.2, (5, 1, 3))
+    root = sinew.quat_vec.normalized(rng.normal(size=7))
+    start = quaternions_of(rng.uniform(-0.4, 0.4, (3, 3)))
+    together = solver.solve(rest, tips, goals, rotations=start, root=root)
+    assert together.rotations.shape == (5, 3, 4)
+    assert together.iterations.shape == (5,)
+    assert together.iterations.dtype == np.int32
+    for frame in range(5):
+        for layout in (sinew.quat_vec.to_dual_quat, sinew.quat_vec.to_affine):
+            one = solver.solve(layout(rest), tips, layout(goals[frame]), rotations=start, root=layout(root))
+            np.testing.assert_allclose(one.rotations, together.rotations[frame], atol=1e-9)
+    assert isinstance(one.is_reached, bool | np.bool_)
+    assert one.rotations.dtype == np.float64
+    float32 = solver.solve(rest.astype(np.float32), tips, goals.astype(np.float32), rotations=start)
+    assert float32.rotations.dtype == np.float64
+
+
+def test_poles_bend_to_their_side():
+    solver = ik.Solver([-1, 0], [ik.Effector(1, has_pole=True)])
+    rest = rest_of([1, 1])
+    start = quaternions_of([[0, 0, 0], [0, 0, 0.1]])
+    for side in ([3.0, 1, 0], [-3, 1, 0], [0, 1, 3], [0, 1, -3]):
+        found = solver.solve(rest, [[0, 1, 0]], [[1, 0, 0, 0, 0, 1.5, 0]], [side], rotations=start)
+        assert found.is_reached
+        # The root's axis x points to the pole.
+        axis = poses_of(rest, found.rotations)[0][0][:, 0] * (1, 0, 1)
+        wanted = np.multiply(side, (1, 0, 1))
+        assert axis @ wanted / np.linalg.norm(axis) / np.linalg.norm(wanted) > 1 - 1e-8
+
+
+@pytest.mark.parametrize(
+    ("words", "call"),
+    [
+        ("effectors", lambda: ik.Solver([-1], [])),
+        ("effectors", lambda: ik.Solver([-1], [ik.Effector(1)])),
+        ("weights", lambda: ik.Solver([-1], [ik.Effector(0, -1.0)])),
+        ("parents", lambda: ik.Solver([0], [ik.Effector(0)])),
+        ("limits", lambda: chain([-1, 0], limits=np.zeros((2, 3)))),
+        ("limits", lambda: chain([-1], limits=np.full((1, 3, 2), np.nan))),
+        ("stiffness", lambda: chain([-1], stiffness=[[1, 0, 0]])),
+        ("rest", lambda: chain([-1]).solve(rest_of([1, 1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]])),
+        ("goals", lambda: chain([-1]).solve(rest_of([1]), [[0, 1, 0]], [1, 0, 0, 0, 0, 1, 0])),
+        ("tips", lambda: chain([-1]).solve(rest_of([1]), [[0, np.inf, 0]], [[1, 0, 0, 0, 0, 1, 0]])),
+        (
+            "method",
+            lambda: chain([-1]).solve(rest_of([1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]], method="fabrik"),
+        ),
+        (
+            "iterations",
+            lambda: chain([-1]).solve(rest_of([1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]], iterations=-1),
+        ),
+        (
+            "poles",
+            lambda: ik.Solver([-1], [ik.Effector(0, has_pole=True)]).solve(
+                rest_of([1]), [[0, 1, 0]], [[1, 0, 0, 0, 0, 1, 0]]
+            ),
+        ),
+    ],
+)
+def test_wrong_arguments_are_named(words, call):
+    with pytest.raises(ValueError, match=words):
+        call()
