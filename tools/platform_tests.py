@@ -16,7 +16,6 @@ import subprocess
 import sys
 import threading
 import time
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -81,11 +80,10 @@ def output_of(*words: str | Path) -> Path:
     return Path(done.stdout.splitlines()[-1])
 
 
-def requirements(chosen: Sequence[str]) -> list[str]:
-    """Those of the extension, without Sinew and Blender, and of its tests."""
-    project = tomllib.loads((ROOT / "addon/pyproject.toml").read_text())["project"]
-    needed = [name for name in project["dependencies"] if not name.startswith(("sinew-skinning", "bpy"))]
-    return [*needed, *chosen]
+def requirements() -> list[str]:
+    """Those of the extension and of its tests, without Sinew and Blender."""
+    lines = (ROOT / "requirements/tests.in").read_text().splitlines()
+    return [line for line in lines if line and not line.startswith("#")]
 
 
 class Emulated:
@@ -95,9 +93,8 @@ class Emulated:
     tool     makes the Python, prints its path and installs packages
     """
 
-    def __init__(self, platform: Platform, test_requirements: Sequence[str]) -> None:
+    def __init__(self, platform: Platform) -> None:
         self.platform = platform
-        self.test_requirements = test_requirements
         is_windows = platform.is_windows
         self.tool = ROOT / "tools" / ("windows_python.py" if is_windows else "arm64_python.py")
         self._python: Path | None = None
@@ -122,7 +119,7 @@ class Emulated:
         (wheel,) = build_wheels(
             self.platform, [python_of(Path(sys.executable))], ROOT / "dist/platforms/tested"
         )
-        wanted = requirements([*self.test_requirements, *([NUMPY] if self.platform.is_windows else [])])
+        wanted = [*requirements(), *([NUMPY] if self.platform.is_windows else [])]
         stamp = self.python.parent / "requirements"
         if not stamp.exists() or stamp.read_text() != " ".join(wanted):
             self.install(*wanted)
@@ -172,10 +169,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("platform", choices=("linux-arm64", "windows-x64"))
     parser.add_argument("--part", choices=PARTS, action="append", help="only this (may be said again)")
-    parser.add_argument("--require", action="append", default=[], help="what the tests want of the registry")
     parser.add_argument("options", nargs="*", help="for pytest, behind --, in place of all tests of a part")
     options = parser.parse_args()
-    emulated = Emulated(PLATFORMS[options.platform], options.require)
+    emulated = Emulated(PLATFORMS[options.platform])
     parts = options.part or (PARTS if emulated.platform.is_windows else PARTS[:2])
     results = {}
     for part in parts:

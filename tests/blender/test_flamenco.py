@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""farm/flamenco: the job type compiled by node in a Manager of our own, and its commands run on real files."""
+"""farm/flamenco: the job type compiled by node in a Manager of our own, its commands run on real files."""
 
 from __future__ import annotations
 
@@ -147,15 +147,31 @@ def test_what_is_wrong_is_said():
     (_check, reskin) = compile_job(**job, out="S:\\jobs-copies")["tasks"]
     assert reskin["commands"][0]["parameters"]["exe"] == "{sinew}"
     assert reskin["commands"][0]["parameters"]["args"][:2] == ["reskin", "S:\\jobs\\a.blend"]
-    assert compile_job(action="check", folder="/jobs", files="")["error"] == "There is no .blend file below /jobs."
+    assert (
+        compile_job(action="check", folder="/jobs", files="")["error"]
+        == "There is no .blend file below /jobs."
+    )
 
 
 def test_the_job_type_offers_what_there_is():
     settings = {setting["key"]: setting for setting in job_type()["settings"]}
     assert set(settings["method"]["choices"]) == {method.name for method in sinew.methods()}
-    assert all(setting["default"] in setting["choices"] for setting in settings.values() if "choices" in setting)
+    assert all(
+        setting["default"] in setting["choices"] for setting in settings.values() if "choices" in setting
+    )
     # Those of the schema AvailableJobSetting in Flamenco's API.
-    known = {"key", "label", "type", "subtype", "choices", "propargs", "description", "default", "eval", "visible"}
+    known = {
+        "key",
+        "label",
+        "type",
+        "subtype",
+        "choices",
+        "propargs",
+        "description",
+        "default",
+        "eval",
+        "visible",
+    }
     assert set().union(*settings.values()) <= known | {"required"}
     # A setting that people see has a sentence; the manual names each.
     manual = (ROOT / "docs" / "flamenco.md").read_text(encoding="utf-8")
@@ -205,7 +221,9 @@ def test_a_file_with_a_problem_is_not_reskinned(two_files, tmp_path):
     checks = [task for task in tasks if not task["dependencies"]]
     passed = [task["name"] for task in checks if run_task(task, {"{sinew}": COMMAND}).returncode == 0]
     assert passed == ["check shots/part-001"]
-    assert [task["name"] for task in tasks if task["dependencies"] == ["check part-001"]] == ["re-skin part-001"]
+    assert [task["name"] for task in tasks if task["dependencies"] == ["check part-001"]] == [
+        "re-skin part-001"
+    ]
 
 
 def test_the_extension_in_a_whole_blender_does_it(two_files, tmp_path):
@@ -220,7 +238,11 @@ def test_the_extension_in_a_whole_blender_does_it(two_files, tmp_path):
     shutil.copy(package, tmp_path / "sinew.zip")
     words = [blender, "--command", "extension", "install-file", "-r", "user_default", "-e"]
     subprocess.run([*words, tmp_path / "sinew.zip"], check=True, capture_output=True)
-    job = {"folder": str(two_files), "files": files_of(job_type(), two_files), "out": str(tmp_path / "copies")}
+    job = {
+        "folder": str(two_files),
+        "files": files_of(job_type(), two_files),
+        "out": str(tmp_path / "copies"),
+    }
     for task in compile_job(**job, method="dq", options="--no-pictures --frames none")["tasks"]:
         done = run_task(task, {"{blender}": [str(blender)]})
         assert done.returncode == 0, done.stdout + done.stderr
