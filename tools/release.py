@@ -223,7 +223,7 @@ def bill_beside(package: Path) -> Path:
 
 
 def write_release(folder: Path, packages: list[Path], notes: str) -> None:
-    """The zips, their bills of materials, the wheels in them, the notes, and SHA256SUMS for sha256sum --check."""
+    """The zips, their bills of materials, the wheels in them, the notes; SHA256SUMS for sha256sum --check."""
     unfinished = folder.with_name(f".{folder.name}.{os.getpid()}")
     shutil.rmtree(unfinished, ignore_errors=True)
     try:
