@@ -48,6 +48,11 @@ def pytest_unconfigure():
     if ends_badly or sys.platform == "win32":
         sys.stdout.flush()
         sys.stderr.flush()
+        if sys.platform == "win32":
+            # os._exit() has each library end itself, which is where it crashes.
+            import ctypes
+
+            ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), _exit_status)
         os._exit(_exit_status)
 
 
