@@ -23,12 +23,15 @@ from dataclasses import dataclass
 
 from .core.errors import SinewError
 from .core.scratch import ScratchFolder
+from .core.windows_job import end_with_this_process
 
 # The name of the file in which a Blender reports what it is doing: a JSON object, padded with blanks.
 DOING = "doing"
 # Environment variable: the numbers of the processors to start on, if it is set.
 PROCESSORS = "SINEW_PROCESSORS"
 START_LIMIT = 180.0
+# What start_new_session is on Windows, where it is ignored.
+NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 # Seconds between two checks of a busy process.
 INTERVAL = 0.1
 # The first message of worker.py.
@@ -79,10 +82,12 @@ class BlenderProcess:
                 env={**_environment(limits), "TMPDIR": own, "TEMP": own},
                 # Ctrl-C in a terminal is for the batch, which ends its Blenders itself.
                 start_new_session=True,
+                creationflags=NEW_GROUP,
             )
         except OSError as error:
             self._folder.remove()
             raise SinewError(f"no Blender can be started: {error.strerror or error}") from None
+        end_with_this_process(self._process)
         self._has_started = False
         # The limits of the current task, if there is one; the limit that was exceeded.
         self._limits: Limits | None = None

@@ -85,6 +85,7 @@ def make(version: str, root: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("packages", nargs="*", help="requirements, or wheels for Linux on arm64")
+    parser.add_argument("--no-deps", action="store_true", help="these packages alone")
     options = parser.parse_args()
     if not shutil.which(QEMU):
         raise SystemExit(f"arm64_python: {QEMU} is not here.")
@@ -102,6 +103,7 @@ def main() -> None:
         systems += ["--platform=manylinux2014_aarch64", "--python-version", version]
         target = root / "usr/lib/python3/dist-packages"
         words = ["--upgrade", "--no-compile", "--quiet", "--only-binary=:all:", *systems]
+        words += ["--no-deps"] if options.no_deps else []
         pip("install", "--target", target, *words, *options.packages)
     print(script)
 

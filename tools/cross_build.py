@@ -148,6 +148,7 @@ def import_library(platform: Platform, python: Python, include: Path) -> Path:
     lines = [f"LIBRARY {dll}.dll", "EXPORTS"]
     lines += [name + (" DATA" if is_data else "") for name, is_data in exported_names(include).items()]
     folder = BUILD / platform.name
+    folder.mkdir(parents=True, exist_ok=True)
     definition, library = folder / f"{dll}.def", folder / f"lib{dll}.a"
     definition.write_text("\n".join(lines) + "\n")
     machine = {"AMD64": "i386:x86-64", "ARM64": "arm64"}[platform.processor]
@@ -187,6 +188,7 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         "BUILD_GMOCK": "OFF",
         "INSTALL_GTEST": "OFF",
         "SINEW_STATIC": "ON",
+        "SINEW_STANDARD_LIBRARY_WITHIN": "ON",
         **options,
     }
     words: list[str | Path] = ["cmake", "-G", "Ninja", "-S", ROOT, "-B", build]

@@ -214,16 +214,25 @@ def wheels_in(package: Path) -> dict[str, bytes]:
         ) from None
 
 
+def bill_beside(package: Path) -> Path:
+    """What tools/sbom.py wrote."""
+    path = package.with_suffix(".cdx.json")
+    if not path.exists():
+        raise fail(f"./dev package made no {path.name}; the files have their old text again.")
+    return path
+
+
 def write_release(folder: Path, packages: list[Path], notes: str) -> None:
-    """The zips, the wheels in them, the notes and SHA256SUMS, as sha256sum --check reads it."""
+    """The zips, their bills of materials, the wheels in them, the notes; SHA256SUMS for sha256sum --check."""
     unfinished = folder.with_name(f".{folder.name}.{os.getpid()}")
     shutil.rmtree(unfinished, ignore_errors=True)
     try:
         unfinished.mkdir(parents=True)
         for package in packages:
-            shutil.copyfile(package, unfinished / package.name)
             for name, data in wheels_in(package).items():
                 (unfinished / name).write_bytes(data)
+            for path in (package, bill_beside(package)):
+                shutil.copyfile(path, unfinished / path.name)
         (unfinished / "NOTES.md").write_text(notes, encoding="utf-8", newline="")
         sums = [
             f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"

@@ -89,6 +89,7 @@ def make(version: str, folder: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("packages", nargs="*", help="requirements, or wheels for Windows")
+    parser.add_argument("--no-deps", action="store_true", help="these packages alone")
     options = parser.parse_args()
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     folder = BUILD / f"windows-python{version}"
@@ -106,6 +107,7 @@ def main() -> None:
             "--target",
             target,
             *for_windows(version),
+            *(["--no-deps"] if options.no_deps else []),
             *options.packages,
         )
     print(folder / "python.exe")

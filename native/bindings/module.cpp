@@ -4,6 +4,7 @@
 PYBIND11_MODULE(_native, m) {
     m.doc() = "Sinew's C++ library. Use it through the package `sinew`.";
     m.attr("__version__") = SINEW_VERSION;
+    sinew::bindings::bind_compiled_in(m);
     sinew::bindings::bind_methods(m);
     sinew::bindings::bind_skeleton(m);
     sinew::bindings::bind_transforms(m);

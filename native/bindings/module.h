@@ -5,6 +5,7 @@
 
 namespace sinew::bindings {
 
+void bind_compiled_in(pybind11::module_& m);
 void bind_methods(pybind11::module_& m);
 void bind_skeleton(pybind11::module_& m);
 void bind_threads(pybind11::module_& m);

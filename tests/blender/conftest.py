@@ -44,10 +44,16 @@ def pytest_sessionfinish(exitstatus):
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure():
     # Having exported glTF, Blender as a module can crash (4.2, with Sinew or without) or hang (4.5) in its
-    # own ending.
-    if bpy.app.version < (5, 0) and "io_scene_gltf2.io.exp" in sys.modules:
+    # own ending; Windows' does so under wine, whatever was done.
+    ends_badly = bpy.app.version < (5, 0) and "io_scene_gltf2.io.exp" in sys.modules
+    if ends_badly or sys.platform == "win32":
         sys.stdout.flush()
         sys.stderr.flush()
+        if sys.platform == "win32":
+            # os._exit() has each library end itself, which is where it crashes.
+            import ctypes
+
+            ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), _exit_status)
         os._exit(_exit_status)
 
 

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import time
 from pathlib import Path
 
@@ -235,17 +236,37 @@ def script(path: Path, text: str) -> Path:
     return path
 
 
-@pytest.fixture
-def other_blender(tmp_path):
-    """A Blender that has nothing of Sinew."""
-    import sysconfig
-
-    folder = tmp_path / "other"
+def make_other_blender(folder: Path) -> Path:
+    """The program of a Blender, in a new folder, that has nothing of Sinew."""
     (folder / "site").mkdir(parents=True)
     for entry in Path(sysconfig.get_paths()["purelib"]).iterdir():
         if "sinew" not in entry.name.lower() and entry.suffix != ".pth":
             (folder / "site" / entry.name).symlink_to(entry)
     return script(folder / "blender", PROGRAM.format(python=sys.executable))
+
+
+def install_extension(blender: Path) -> None:
+    """Installs the zip in a Blender of make_other_blender(); skips the test where that can not be."""
+    package = os.environ.get("SINEW_PACKAGE")
+    if not package:
+        pytest.skip("SINEW_PACKAGE is not set: the zip is not tested; ./dev package builds it")
+    if bpy.app.version < (4, 3):
+        pytest.skip("bpy 4.2 as a module crashes when it reads preferences")
+    subprocess.run(
+        [sys.executable, "-S", "-c", INSTALL, package],
+        check=True,
+        capture_output=True,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(blender.with_name("site")),
+            "BLENDER_USER_RESOURCES": str(blender.with_name("user")),
+        },
+    )
+
+
+@pytest.fixture
+def other_blender(tmp_path):
+    return make_other_blender(tmp_path / "other")
 
 
 def test_another_blender_without_sinew(skinned, plain, other_blender):
@@ -259,21 +280,7 @@ def test_another_blender_without_sinew(skinned, plain, other_blender):
 
 
 def test_another_blender_with_sinew(skinned, other_blender):
-    package = os.environ.get("SINEW_PACKAGE")
-    if not package:
-        pytest.skip("SINEW_PACKAGE is not set: the zip is not tested; ./dev package builds it")
-    if bpy.app.version < (4, 3):
-        pytest.skip("bpy 4.2 as a module crashes when it reads preferences")
-    subprocess.run(
-        [sys.executable, "-S", "-c", INSTALL, package],
-        check=True,
-        capture_output=True,
-        env={
-            **os.environ,
-            "PYTHONPATH": str(other_blender.with_name("site")),
-            "BLENDER_USER_RESOURCES": str(other_blender.with_name("user")),
-        },
-    )
+    install_extension(other_blender)
     assert check(skinned, "--blender", other_blender)["skinned.blend"]["problems"] == []
     # Its library goes, or another version comes.
     (manifest,) = other_blender.with_name("user").rglob("sinew/blender_manifest.toml")

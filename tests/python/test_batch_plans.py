@@ -3,7 +3,6 @@
 
 import glob
 import json
-import os
 from dataclasses import fields
 from pathlib import Path
 
@@ -93,12 +92,20 @@ def test_a_folder_with_brackets_is_no_pattern(studio, monkeypatch):
     assert planned(["old/*.blend"]) == {"old/b.blend": "out/b.blend"}
 
 
+def link(path: Path, target: object) -> None:
+    """Skips the test where this user may make no links, as most on Windows."""
+    try:
+        path.symlink_to(target, target_is_directory=True)
+    except OSError:
+        pytest.skip("links can not be made here")
+
+
 def test_linked_folders_and_their_circles(studio):
-    (studio / "chars" / "guests").symlink_to(studio)
+    link(studio / "chars" / "guests", studio)
     elsewhere = studio.parent / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "c.blend").touch()
-    (studio / "chars" / "more").symlink_to(elsewhere)
+    link(studio / "chars" / "more", elsewhere)
     assert set(planned(["chars"])) == {"chars/hero.blend", "chars/old/hero.blend", "chars/more/c.blend"}
 
 
@@ -387,9 +394,10 @@ def test_a_journal_that_can_not_be_written(tmp_path):
     with pytest.raises(SinewError, match="can not be written"):
         Journal(tmp_path / "file" / "out")
     with Journal(tmp_path) as journal:
-        journal.record(tmp_path / os.fsdecode(b"\xff.blend"), {"error": "names need not be text"})
+        # A name of the byte 0xff on Linux, of half a character on Windows.
+        journal.record(tmp_path / "\udcff.blend", {"error": "names need not be text"})
     with Journal(tmp_path) as journal:
-        assert list(journal.latest) == [os.fsdecode(b"\xff.blend")]
+        assert list(journal.latest) == ["\udcff.blend"]
 
 
 @pytest.mark.parametrize(
@@ -447,8 +455,8 @@ def test_patterns_end_where_links_lead_up_again(tmp_path, monkeypatch, pattern, 
     monkeypatch.chdir(tmp_path)
     found = {Path(path) for path in glob.glob(pattern, recursive=True) if Path(path).is_file()}
     assert found == {Path("tree") / name for name in expected}
-    (tmp_path / "tree" / "round").symlink_to(".")
-    (tmp_path / "tree" / "sub" / "up").symlink_to("..")
+    link(tmp_path / "tree" / "round", ".")
+    link(tmp_path / "tree" / "sub" / "up", "..")
     jobs = plan_jobs([pattern], tmp_path / "out")
     assert sorted(job.source.relative_to(tmp_path / "tree").as_posix() for job in jobs) == expected
 

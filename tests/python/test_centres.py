@@ -165,7 +165,7 @@ def test_other_threads_run_meanwhile():
 
 
 BAD = [
-    ("triangles", [0, 1, 2], "int32 [triangles, 3]", "list of int64 [3]"),
+    ("triangles", [0, 1, 2], "int32 [triangles, 3]", f"list of {np.dtype(int)} [3]"),
     ("triangles", np.zeros((2, 3)), "int32 [triangles, 3]", "float64 [2, 3]"),
     ("triangles", np.zeros((2, 4), np.int32), "int32 [triangles, 3]", "int32 [2, 4]"),
     ("triangles", np.int32([[0, 1, 2592]]), "numbers of vertices, below 2592", "2592 at triangle 0"),
@@ -185,7 +185,7 @@ def test_what_is_refused(argument, value, wanted, got):
 
 
 BAD_DATA = [
-    ([1], "None or a dict of arrays by names of methods", "list of int64 [1]"),
+    ([1], "None or a dict of arrays by names of methods", f"list of {np.dtype(int)} [1]"),
     ({"dq": np.zeros((2, 0), np.float32)}, "that of methods that need it", "that of dq"),
     ({"cor": np.zeros((2, 2), np.float32)}, "of cor float32 [vertices, 3]", "float32 [2, 2]"),
     ({"cor": np.zeros((1, 3), np.float32)}, "6 numbers of cor", "3"),

@@ -145,9 +145,11 @@ def test_what_is_compiled_in_has_a_notice():
     declared = re.findall(r"FetchContent_Declare\((\w+)", (ROOT / "cmake/dependencies.cmake").read_text())
     # Of tests and measurements alone, which nobody is given.
     compiled_in = {*declared, "pybind11"} - {"googletest", "benchmark"}
+    # By zig, whose C and C++ libraries they are: tools/cross_build.py links them in.
+    compiled_in |= {"llvm", "mingw-w64"}
     assert len(compiled_in) >= 4
     notices = (ROOT / "NOTICES.md").read_text(encoding="utf-8")
-    listed = {name.lower() for name in re.findall(r"^\| (\w+) \|.*https://", notices, re.MULTILINE)}
+    listed = {name.lower() for name in re.findall(r"^\| ([\w-]+) \|.*https://", notices, re.MULTILINE)}
     assert listed == compiled_in
 
 
@@ -207,8 +209,10 @@ version = re.search('^version = "(.*)"', open("pyproject.toml").read(), re.M)[1]
 with zipfile.ZipFile(f"dist/sinew-{version}.zip", "w") as archive:
     archive.writestr(f"wheels/sinew_skinning-{version}-cp311-cp311-linux_x86_64.whl", b"wheel")
     archive.writestr("__init__.py", b"")
+open(f"dist/sinew-{version}.cdx.json", "w").write("{}")
 print(f"dist/sinew-{version}.zip")
 """
+BILL = "sinew-7.0.0.cdx.json"
 SKINNING = "sinew_skinning-7.0.0-cp311-cp311-linux_x86_64.whl"
 
 
@@ -266,12 +270,14 @@ def test_a_release(checkout):
     done = run(checkout, "7.0.0")
     assert done.returncode == 0, done.stderr
     folder = checkout / "dist" / "release-7.0.0"
-    assert {path.name for path in folder.iterdir()} == {"sinew-7.0.0.zip", SKINNING, "NOTES.md", "SHA256SUMS"}
+    assert {path.name for path in folder.iterdir()} == {
+        *("sinew-7.0.0.zip", BILL, SKINNING, "NOTES.md", "SHA256SUMS")
+    }
     assert (folder / "NOTES.md").read_text() == "### Added\n\n- A thing.\n"
     sums = dict(line.split("  ")[::-1] for line in (folder / "SHA256SUMS").read_text().splitlines())
     assert sums == {
         name: hashlib.sha256((folder / name).read_bytes()).hexdigest()
-        for name in ("sinew-7.0.0.zip", SKINNING, "NOTES.md")
+        for name in ("sinew-7.0.0.zip", BILL, SKINNING, "NOTES.md")
     }
     assert (folder / SKINNING).read_bytes() == b"wheel"
     assert release.version_in(release.read_texts(checkout)) == "7.0.0"
@@ -317,6 +323,11 @@ def obstruct_zip(root):
     commit(root)
 
 
+def obstruct_bill(root):
+    write_dev(root, PACKAGES.replace('.cdx.json", "w"', '.json", "w"'))
+    commit(root)
+
+
 def obstruct_naming(root):
     write_dev(root, "#!/bin/sh\necho nothing\n")
     commit(root)
@@ -333,6 +344,10 @@ def obstruct_naming(root):
         (
             obstruct_zip,
             "release: ./dev package made sinew.zip, which is no zip; the files have their old text again.",
+        ),
+        (
+            obstruct_bill,
+            "release: ./dev package made no sinew-7.0.0.cdx.json; the files have their old text again.",
         ),
         (obstruct_naming, "release: ./dev package named no zip; the files have their old text again."),
     ],

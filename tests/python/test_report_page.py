@@ -169,6 +169,7 @@ def test_a_file_in_the_place_of_the_folder_is_left(tmp_path):
     assert path.read_text() == "mine"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="programs are shell scripts here")
 def test_a_program_that_fails_is_said_to(tmp_path):
     for name in measure.PROGRAMS:
         (tmp_path / name).write_text("#!/bin/sh\necho no such processor >&2\nexit 3\n")

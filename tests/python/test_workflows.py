@@ -135,6 +135,23 @@ def test_it_may_read_and_ends(path):
                 assert step["with"]["persist-credentials"] is False
 
 
+def test_what_is_installed_is_locked():
+    installed = [
+        words
+        for path in WORKFLOWS
+        for step in steps_of(load(path))
+        if "pip install" in step.get("run", "")
+        for words in [shlex.split(step["run"])]
+    ]
+    # The library itself, and the Blender of the day, which nobody has seen before.
+    others = [words for words in installed if "--require-hashes" not in words]
+    assert len(installed) > len(others) == 2
+    assert sorted(words[-1] for words in others) == ["./addon", "bpy"]
+    for words in installed:
+        if words not in others:
+            assert (ROOT / words[words.index("--requirement") + 1]).is_file()
+
+
 @every_workflow
 def test_no_step_pastes_what_others_wrote_into_a_shell(path):
     for step in steps_of(load(path)):
@@ -187,4 +204,6 @@ def test_dependabot_looks_after_actions_and_pip():
     updates = yaml.safe_load((ROOT / ".github" / "dependabot.yml").read_text(encoding="utf-8"))["updates"]
     assert {update["package-ecosystem"] for update in updates} == {"github-actions", "pip"}
     folders = {folder for update in updates for folder in update.get("directories", [])}
-    assert all((ROOT / folder.strip("/") / "pyproject.toml").is_file() for folder in folders)
+    with_locks = folders - {"/requirements"}
+    assert all((ROOT / folder.strip("/") / "pyproject.toml").is_file() for folder in with_locks)
+    assert "/requirements" in folders

@@ -8,6 +8,7 @@ import platform
 import re
 import statistics
 import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,8 @@ import numpy as np
 from ..errors import SinewError
 
 PROGRAMS = ("operation_counts", "timings_optimised", "timings_unoptimised")
+# Of a program's name.
+SUFFIX = ".exe" if sys.platform == "win32" else ""
 # Without optimisation Eigen takes minutes, and says nothing of the report, which used GLM.
 UNOPTIMISED = r"^3\.(4|5|10)/(plain|glm|sinew)|^3\.9/(plain|glm|sinew_(matrix_linear|qv|dlb|sclerp))"
 # What one loop of each table does so many times.
@@ -76,17 +79,17 @@ def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measure
     Raises SinewError where a program is not there or fails.
     """
     # A program called by its bare name would be looked for elsewhere.
-    programs = programs.resolve()
-    for name in PROGRAMS:
-        if not (programs / name).is_file():
+    found = {name: programs.resolve() / f"{name}{SUFFIX}" for name in PROGRAMS}
+    for name, program in found.items():
+        if not program.is_file():
             raise SinewError(f"{programs}: has no program {name}; ./dev report builds it in a checkout")
     step("Counting operations")
-    counts = json.loads(_output([programs / "operation_counts"]))
+    counts = json.loads(_output([found["operation_counts"]]))
     step("Timing the report's loops, optimised")
-    optimised, context = _timings(programs / "timings_optimised", 1 if quick else 15, quick)
+    optimised, context = _timings(found["timings_optimised"], 1 if quick else 15, quick)
     step("Timing them without optimisation")
     only = f"--benchmark_filter={UNOPTIMISED}"
-    unoptimised, plain_context = _timings(programs / "timings_unoptimised", 1 if quick else 5, quick, only)
+    unoptimised, plain_context = _timings(found["timings_unoptimised"], 1 if quick else 5, quick, only)
     build = {
         "compiler": context["compiler"],
         "optimised": context["flags"],

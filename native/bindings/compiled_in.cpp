@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What of other projects is compiled into the library and this module, with versions, as their headers say. It stands
+// in the file as text, so that the bill of materials (tools/sbom.py) is made of the file itself, for any platform.
+#include <glm/glm.hpp>
+
+#include "module.h"
+
+#ifdef SINEW_BINDINGS_WITH_EIGEN
+#include <Eigen/Core>
+#endif
+
+#include <hwy/highway.h>
+
+#define SINEW_AS_TEXT(value) #value
+#define SINEW_VALUE_AS_TEXT(value) SINEW_AS_TEXT(value)
+#define SINEW_VERSION_OF(major, minor, patch) \
+    SINEW_VALUE_AS_TEXT(major) "." SINEW_VALUE_AS_TEXT(minor) "." SINEW_VALUE_AS_TEXT(patch)
+
+namespace {
+
+constexpr const char* kCompiledIn =
+    "sinew-compiled-in{"
+    // "GLM: version 0.9.9.8", the only place where all versions of it have it whole.
+    "GLM=" GLM_VERSION_MESSAGE ";Highway=" SINEW_VERSION_OF(HWY_MAJOR, HWY_MINOR, HWY_PATCH)
+#ifdef SINEW_BINDINGS_WITH_EIGEN
+        ";Eigen=" SINEW_VERSION_OF(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)
+#endif
+            ";pybind11=" SINEW_VERSION_OF(PYBIND11_VERSION_MAJOR, PYBIND11_VERSION_MINOR,
+                                          PYBIND11_VERSION_PATCH)
+#ifdef SINEW_STANDARD_LIBRARY_WITHIN
+// By tools/cross_build.py, which links them statically.
+#ifdef _LIBCPP_VERSION
+                ";LLVM=" SINEW_VALUE_AS_TEXT(_LIBCPP_VERSION)
+#endif
+#ifdef __MINGW64_VERSION_STR
+                    ";mingw-w64=" __MINGW64_VERSION_STR
+#endif
+#endif
+                    "}";
+
+}  // namespace
+
+namespace sinew::bindings {
+
+void bind_compiled_in(pybind11::module_& m) { m.attr("__compiled_in__") = kCompiledIn; }
+
+}  // namespace sinew::bindings

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""farm/flamenco: the job type compiled by node in a Manager of our own, its commands run on real files."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import bpy
+import pytest
+import scenes
+import sinew
+from program import COMMAND, ENVIRONMENT
+from sinew_addon.attach import properties
+from sinew_addon.io import files
+from test_check import install_extension, make_other_blender, script
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("node") is None, reason="node is not installed here, which compiles the job type"
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "farm" / "flamenco" / "sinew_reskin.js"
+MANAGER = Path(__file__).with_name("flamenco_manager.js")
+
+
+def compile_job(**settings: object) -> dict:
+    done = subprocess.run(
+        ["node", MANAGER, SCRIPT],
+        input=json.dumps({"settings": settings}),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+def job_type() -> dict:
+    return compile_job(action="check", folder="/jobs", files="a.blend")["type"]
+
+
+def files_of(job_type: dict, folder: Path) -> str:
+    """The setting `files`, evaluated as Flamenco's add-on for Blender does: names are local variables."""
+
+    class Settings:
+        pass
+
+    settings = Settings()
+    settings.folder = str(folder)
+    (setting,) = (setting for setting in job_type["settings"] if setting["key"] == "files")
+    return eval(setting["eval"], {}, {"settings": settings, "abspath": lambda path: Path(path).absolute()})
+
+
+def save_arm(path: Path) -> Path:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    _obj, armature = scenes.make_arm(sides=6, rings=5)
+    scenes.key_pose(armature, 80.0)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def run_task(task: dict, variables: dict[str, list[str]]) -> subprocess.CompletedProcess:
+    """As a worker of Flamenco: one command after the other, none behind one that fails. A variable may stand
+    for several words here."""
+    done = None
+    for command in task["commands"]:
+        assert command["name"] == "exec"
+        parameters = command["parameters"]
+        words: list[str] = []
+        for word in (parameters["exe"], *parameters["args"]):
+            words += variables.get(word, [word])
+        done = subprocess.run(
+            words, capture_output=True, text=True, timeout=300, check=False, env=ENVIRONMENT
+        )
+        if done.returncode:
+            break
+    assert done is not None
+    return done
+
+
+def method_in(path: Path) -> str:
+    files.open_file(path)
+    (method,) = {properties.of(obj).method for obj in bpy.data.objects if properties.has_sinew(obj)}
+    return method
+
+
+@pytest.fixture
+def two_files(tmp_path):
+    """In two folders, with one name, which is a difficult one."""
+    folder = tmp_path / "jobs"
+    save_arm(folder / "hero [1].blend")
+    save_arm(folder / "shots" / "hero [1].blend")
+    return folder
+
+
+@pytest.fixture
+def farm_blender(tmp_path):
+    """The Blender of the farm, which has nothing of Sinew yet."""
+    return make_other_blender(tmp_path / "farm")
+
+
+def test_tasks_have_names_and_wait_for_their_checks():
+    names = [f"shots/{number}.blend" for number in range(5)]
+    job = {"action": "re-skin", "folder": "/jobs/", "method": "qv", "out": "/copies", "chunk_size": 2}
+    tasks = compile_job(**job, files="\n".join(["hero.blend", *names]), options="--set 'mix=dq'")["tasks"]
+    assert [task["name"] for task in tasks] == [
+        f"{action} {part}"
+        for part in ("part-001", "shots/part-001", "shots/part-002", "shots/part-003")
+        for action in ("check", "re-skin")
+    ]
+    assert {task["type"] for task in tasks} == {"blender"}
+    for check, reskin in zip(tasks[::2], tasks[1::2], strict=True):
+        assert (check["dependencies"], reskin["dependencies"]) == ([], [check["name"]])
+    third = tasks[3]
+    sources, out = ["/jobs/shots/0.blend", "/jobs/shots/1.blend"], "/copies/shots/part-001"
+    assert [command["parameters"] for command in third["commands"]] == [
+        {
+            "exe": "{blender}",
+            "args": [
+                *("--command", "sinew", "reskin", *sources, "--method", "qv"),
+                *("--out", out, "--resume", "--set", "mix=dq"),
+            ],
+        },
+        {"exe": "{blender}", "args": ["--command", "sinew", "check", out, "--blender", "{blender}"]},
+    ]
+    # Every file in one task of each kind.
+    for kind in ("check", "reskin"):
+        words = [
+            word
+            for task in tasks
+            for command in task["commands"][:1]
+            if command["parameters"]["args"][2] == kind
+            for word in command["parameters"]["args"]
+            if word.endswith(".blend")
+        ]
+        assert words == [f"/jobs/{name}" for name in ("hero.blend", *names)]
+
+
+def test_what_is_wrong_is_said():
+    job = {"action": "re-skin", "folder": "S:\\jobs", "files": "a.blend", "program": "package"}
+    assert compile_job(**job)["error"] == "There is no folder for the copies: set Folder of Copies."
+    assert "within the folder of the files" in compile_job(**job, out="S:/jobs/copies/")["error"]
+    (_check, reskin) = compile_job(**job, out="S:\\jobs-copies")["tasks"]
+    assert reskin["commands"][0]["parameters"]["exe"] == "{sinew}"
+    assert reskin["commands"][0]["parameters"]["args"][:2] == ["reskin", "S:\\jobs\\a.blend"]
+    assert (
+        compile_job(action="check", folder="/jobs", files="")["error"]
+        == "There is no .blend file below /jobs."
+    )
+
+
+def test_the_job_type_offers_what_there_is():
+    settings = {setting["key"]: setting for setting in job_type()["settings"]}
+    assert set(settings["method"]["choices"]) == {method.name for method in sinew.methods()}
+    assert all(
+        setting["default"] in setting["choices"] for setting in settings.values() if "choices" in setting
+    )
+    # Those of the schema AvailableJobSetting in Flamenco's API.
+    known = {
+        "key",
+        "label",
+        "type",
+        "subtype",
+        "choices",
+        "propargs",
+        "description",
+        "default",
+        "eval",
+        "visible",
+    }
+    assert set().union(*settings.values()) <= known | {"required"}
+    # A setting that people see has a sentence; the manual names each.
+    manual = (ROOT / "docs" / "flamenco.md").read_text(encoding="utf-8")
+    for key, setting in settings.items():
+        assert setting["description"]
+        assert f"`{key}`" in manual, key
+
+
+def test_two_files_are_checked_and_reskinned(two_files, farm_blender, tmp_path):
+    listed = files_of(job_type(), two_files)
+    assert listed.splitlines() == ["hero [1].blend", "shots/hero [1].blend"]
+    job = {"folder": str(two_files), "files": listed, "out": str(tmp_path / "copies"), "program": "package"}
+    tasks = compile_job(**job, method="qv", options="--no-pictures --frames none")["tasks"]
+    variables = {"{sinew}": COMMAND, "{blender}": [str(farm_blender)]}
+    before = {path: path.read_bytes() for path in two_files.rglob("*.blend")}
+    for task in tasks:
+        done = run_task(task, variables)
+        if task["name"].startswith("check"):
+            assert done.returncode == 0, done.stderr
+            assert "ok: does not need Sinew" in done.stdout
+        else:
+            # The copies are written, and the farm's Blender can not render them.
+            assert done.returncode == 1, done.stderr
+            assert "needs Sinew, which" in done.stdout
+            assert "the extension is not enabled" in done.stdout
+    copies = sorted((tmp_path / "copies").rglob("*.blend"))
+    assert [path.relative_to(tmp_path / "copies").as_posix() for path in copies] == [
+        "part-001/hero [1].blend",
+        "shots/part-001/hero [1].blend",
+    ]
+    assert {method_in(path) for path in copies} == {"qv"}
+    assert {path: path.read_bytes() for path in two_files.rglob("*.blend")} == before
+    # Tried again with the extension installed, only the check is done: the copies are as they were.
+    install_extension(farm_blender)
+    written = {path: path.stat().st_mtime_ns for path in copies}
+    for task in tasks[1::2]:
+        done = run_task(task, variables)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "ok: Sinew deforms 1 mesh by qv" in done.stdout
+    assert {path: path.stat().st_mtime_ns for path in copies} == written
+
+
+def test_a_file_with_a_problem_is_not_reskinned(two_files, tmp_path):
+    (two_files / "hero [1].blend").write_bytes(b"BLENDER and then nothing")
+    job = {"folder": str(two_files), "files": files_of(job_type(), two_files), "program": "package"}
+    tasks = compile_job(**job, out=str(tmp_path / "copies"))["tasks"]
+    checks = [task for task in tasks if not task["dependencies"]]
+    passed = [task["name"] for task in checks if run_task(task, {"{sinew}": COMMAND}).returncode == 0]
+    assert passed == ["check shots/part-001"]
+    assert [task["name"] for task in tasks if task["dependencies"] == ["check part-001"]] == [
+        "re-skin part-001"
+    ]
+
+
+def test_the_extension_in_a_whole_blender_does_it(two_files, tmp_path):
+    program, package = os.environ.get("SINEW_FULL_BLENDER"), os.environ.get("SINEW_PACKAGE")
+    if not program or not package or bpy.app.version < (5, 2):
+        pytest.skip("tested once, beside bpy 5.2, where SINEW_FULL_BLENDER and SINEW_PACKAGE are set")
+    user = tmp_path / "user"
+    blender = script(
+        tmp_path / "whole",
+        f'#!/bin/sh\ncd {tmp_path}\nBLENDER_USER_RESOURCES={user} exec {program} run "$@"\n',
+    )
+    shutil.copy(package, tmp_path / "sinew.zip")
+    words = [blender, "--command", "extension", "install-file", "-r", "user_default", "-e"]
+    subprocess.run([*words, tmp_path / "sinew.zip"], check=True, capture_output=True)
+    job = {
+        "folder": str(two_files),
+        "files": files_of(job_type(), two_files),
+        "out": str(tmp_path / "copies"),
+    }
+    for task in compile_job(**job, method="dq", options="--no-pictures --frames none")["tasks"]:
+        done = run_task(task, {"{blender}": [str(blender)]})
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert {method_in(path) for path in (tmp_path / "copies").rglob("*.blend")} == {"dq"}
