@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from .originals import Find, at_once
+
 
 @dataclass
 class Changes:
@@ -23,6 +25,8 @@ class Changes:
     structure  objects may have come, gone or been hidden
     frame      this is a change of frame
     complete   whatever is not listed is as it was at the last update; else all may have changed
+    lost       something listed is no longer found, as a handler deleted or renamed it: any mesh may have
+               changed
     """
 
     touched: set[int] = field(default_factory=set)
@@ -34,6 +38,7 @@ class Changes:
     structure: bool = False
     frame: bool = False
     complete: bool = False
+    lost: bool = False
 
     @staticmethod
     def are_of_meshes_only(depsgraph: bpy.types.Depsgraph) -> bool:
@@ -48,34 +53,47 @@ class Changes:
         return not depsgraph.id_type_updated("MESH") and Changes.are_of_meshes_only(depsgraph)
 
     @staticmethod
-    def meshes_in(depsgraph: bpy.types.Depsgraph) -> set[int] | None:
-        """As `meshes`, without reading all the rest; None where no mesh was touched in any way."""
+    def meshes_in(depsgraph: bpy.types.Depsgraph, original: Find = at_once) -> set[int] | None:
+        """As `meshes`, without reading all the rest, with GONE where one is no longer found; None where no
+        mesh was touched in any way."""
         if not depsgraph.id_type_updated("MESH"):
             return None
-        return _changed_meshes(depsgraph.updates)
+        return _changed_meshes(depsgraph.updates, _uid_by(original))
 
     @classmethod
-    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool) -> Changes:
+    def read(
+        cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool, original: Find = at_once
+    ) -> Changes:
+        """original: what finds originals."""
         updates = depsgraph.updates
-        changes = cls(frame=frame, complete=complete, meshes=_changed_meshes(updates))
+        changes = cls(
+            frame=frame, complete=complete, meshes=_changed_meshes(updates, _uid_by(original)) - {GONE}
+        )
         for update in updates:
             what = update.id
-            if isinstance(what, bpy.types.Object):
-                uid = what.original.session_uid
-                changes.touched.add(uid)
-                if update.is_updated_geometry:
-                    changes.objects.add(uid)
-                    if not frame:
-                        changes.edited.append(what.original)
-                if update.is_updated_transform:
-                    changes.moved.add(uid)
-            elif isinstance(what, bpy.types.Mesh | bpy.types.Key):
-                changes.touched.add(what.original.session_uid)
-            elif isinstance(what, bpy.types.Armature):
-                changes.armatures.add(what.original.session_uid)
-            elif isinstance(what, bpy.types.Scene | bpy.types.Collection):
+            if isinstance(what, bpy.types.Scene | bpy.types.Collection):
                 changes.structure = True
+            elif isinstance(what, bpy.types.Object | bpy.types.Mesh | bpy.types.Key | bpy.types.Armature):
+                found = original(what)
+                if found is None:
+                    changes.structure, changes.complete, changes.lost = True, False, True
+                else:
+                    changes._add_update(update, found)
         return changes
+
+    def _add_update(self, update: bpy.types.DepsgraphUpdate, original: bpy.types.ID) -> None:
+        uid = original.session_uid
+        if isinstance(original, bpy.types.Armature):
+            self.armatures.add(uid)
+            return
+        self.touched.add(uid)
+        if isinstance(original, bpy.types.Object):
+            if update.is_updated_geometry:
+                self.objects.add(uid)
+                if not self.frame:
+                    self.edited.append(original)
+            if update.is_updated_transform:
+                self.moved.add(uid)
 
     def add(self, other: Changes) -> None:
         """Makes these the changes of both evaluations."""
@@ -87,6 +105,7 @@ class Changes:
         self.edited += other.edited
         self.structure |= other.structure
         self.complete &= other.complete
+        self.lost |= other.lost
 
 
 def names_of_changed_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:
@@ -97,11 +116,19 @@ def names_of_changed_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:
     return _changed_meshes(depsgraph.updates, lambda evaluated: evaluated.name_full)
 
 
-def _uid(evaluated: bpy.types.ID) -> int:
-    return evaluated.original.session_uid
+# In the place of the session_uid of what is gone; Blender's are positive.
+GONE = 0
 
 
-def _changed_meshes(updates: bpy.types.bpy_prop_collection, identity: Callable = _uid) -> set:
+def _uid_by(original: Find) -> Callable[[bpy.types.ID], int]:
+    def uid(evaluated: bpy.types.ID) -> int:
+        found = original(evaluated)
+        return GONE if found is None else found.session_uid
+
+    return uid
+
+
+def _changed_meshes(updates: bpy.types.bpy_prop_collection, identity: Callable) -> set:
     """Shape keys that an animation sets touch the geometry of their mesh, and nothing else of it; so does
     little that an artist does, and then the keys are not listed (seen on 4.2 and 5.2)."""
     keys, meshes = set(), []

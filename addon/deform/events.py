@@ -44,6 +44,16 @@ def others_follow(event: str, function: Callable) -> bool:
     return any(not _is_ours(each) for each in functions[functions.index(function) + 1 :])
 
 
+def others_precede(event: str, function: Callable) -> bool:
+    """Whether Blender calls others than Sinew before one of its functions."""
+    for each in getattr(bpy.app.handlers, event):
+        if each is function:
+            return False
+        if not _is_ours(each):
+            return True
+    return False
+
+
 def _is_ours(function: Callable) -> bool:
     return (getattr(function, "__module__", None) or "").startswith(_OURS)
 

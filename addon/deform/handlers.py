@@ -14,7 +14,7 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_rendering_in_window, reaction
 from ..core.precompute import precomputations
 from ..io.animation_paths import animated_paths
-from . import events, precompute_watch, precomputing, session
+from . import events, originals, precompute_watch, precomputing, session
 from .changes import Changes, names_of_changed_meshes
 from .session import current
 
@@ -34,7 +34,8 @@ def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph)
             if may_react:
                 session.unsubscribe_from_frames()
             return
-        _react(depsgraph, _read_changes(depsgraph, frame=False), may_react)
+        original = originals.finder("depsgraph_update_post", on_depsgraph_update)
+        _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
         if may_react:
             session.unsubscribe_from_frames()
     _end_event()
@@ -80,8 +81,10 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
         return
     with reaction() as may_react:
         current.gate.restore()
-        if not (current.is_idle or session.were_all_deformed(depsgraph)):
-            _react(depsgraph, _read_changes(depsgraph, frame=True), may_react)
+        if not current.is_idle:
+            original = originals.finder("frame_change_post", on_frame_change)
+            if not session.were_all_deformed(depsgraph, original):
+                _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
     _end_event()
     _note_seen("frame_change_post", depsgraph)
 
@@ -103,11 +106,11 @@ def _end_event() -> None:
         state.evaluation.is_event_known = state.evaluation.was_tagged
 
 
-def _read_changes(depsgraph: bpy.types.Depsgraph, frame: bool) -> Changes:
+def _read_changes(depsgraph: bpy.types.Depsgraph, original: originals.Find, frame: bool) -> Changes:
     """What an evaluation lists is all only to who saw the one before: a render has a depsgraph of its own."""
     same = current.depsgraph == depsgraph.as_pointer()
     current.depsgraph = depsgraph.as_pointer()
-    return Changes.read(depsgraph, frame, complete=same)
+    return Changes.read(depsgraph, frame, same, original)
 
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) -> None:

@@ -15,9 +15,10 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
 from . import after_update, apply_plan, events, precomputing
-from .changes import Changes
+from .changes import GONE, Changes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
+from .originals import Find
 from .plan import Plan, State
 from .skinned_object import SkinnedObject
 from .update import update
@@ -279,6 +280,9 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         _adopt_copied_modifiers(changes)
         _note_readers(changes)
         for obj in objects_with_sinew(changes):
+            state = state_of(obj)
+            if state is not None:
+                state.needs_recheck |= changes.lost
             _update_or_switch_off(obj, depsgraph, changes)
             state = state_of(obj)
             if state is not None and obj.data.session_uid in read_later:
@@ -329,7 +333,7 @@ def waiting() -> set[int]:
     return {obj.session_uid for obj, settings in unknown if settings.enabled and settings.replaces_modifiers}
 
 
-def were_all_deformed(depsgraph: bpy.types.Depsgraph) -> bool:
+def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     """Whether the evaluation gave all skinned objects their points, and nothing else has to be looked at."""
     if (
         current.objects is None
@@ -338,7 +342,9 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph) -> bool:
     ):
         return False
     # Objects that use their Armature modifiers do not need to know which they are, and listing takes long.
-    meshes = set() if current.all_use_builtin else Changes.meshes_in(depsgraph)
+    meshes = set() if current.all_use_builtin else Changes.meshes_in(depsgraph, original)
+    if meshes and GONE in meshes:
+        return False
     try:
         if not all(_was_deformed(obj, depsgraph, meshes) for obj in current.objects):
             return False

@@ -16,7 +16,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core.inbetween import BLENDER
-from ...deform import events
+from ...deform import events, originals
 from ...io import actions, pose_io
 from . import inbetween, keyed_poses
 
@@ -258,8 +258,12 @@ def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) 
 
     def work() -> None:
         changed = [update.id for update in depsgraph.updates]
-        acted = {what.original.session_uid for what in changed if isinstance(what, bpy.types.Action)}
-        structure = any(isinstance(what, bpy.types.Scene | bpy.types.Collection) for what in changed)
+        original = originals.finder("depsgraph_update_post", on_depsgraph_update)
+        found = [original(what) for what in changed if isinstance(what, bpy.types.Action)]
+        acted = {action.session_uid for action in found if action is not None}
+        structure = None in found or any(
+            isinstance(what, bpy.types.Scene | bpy.types.Collection) for what in changed
+        )
         if acted or structure or session.outdated:
             _settle()
             _play(scene, acted)

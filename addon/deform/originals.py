@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The originals of what an evaluation lists.
+
+What a handler deletes, Blender frees at once, and goes on listing its evaluated copy: `original` of that
+leads nowhere, and to read on can crash Blender.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from . import events
+
+Find = Callable[[bpy.types.ID], bpy.types.ID | None]
+
+_LISTS = (
+    (bpy.types.Object, "objects"),
+    (bpy.types.Mesh, "meshes"),
+    (bpy.types.Key, "shape_keys"),
+    (bpy.types.Armature, "armatures"),
+    (bpy.types.Action, "actions"),
+)
+
+
+def finder(event: str, function: Callable) -> Find:
+    """What finds the original of an evaluated object, mesh, shape key, armature or action within a function
+    that Blender calls at an event: None where a function of others may have deleted or renamed it."""
+    return _by_name if events.others_precede(event, function) else at_once
+
+
+def at_once(evaluated: bpy.types.ID) -> bpy.types.ID:
+    """Where nobody can have deleted it."""
+    return evaluated.original
+
+
+def _by_name(evaluated: bpy.types.ID) -> bpy.types.ID | None:
+    name = next(name for kind, name in _LISTS if isinstance(evaluated, kind))
+    library = evaluated.library
+    return getattr(bpy.data, name).get((evaluated.name, library.filepath if library is not None else None))

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Handlers of others, called before Sinew's, delete and rename what changed in the same evaluation.
+
+Blender frees it at once and goes on listing it; to read its original then can crash Blender. So each test is
+a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BEGIN = """
+import bpy, numpy as np
+import scenes, sinew_addon
+bpy.ops.wm.read_factory_settings(use_empty=True)
+sinew_addon.register()
+obj, armature = scenes.make_arm()
+scene, events = bpy.context.scene, bpy.app.handlers
+
+def make(count):
+    made = []
+    for number in range(count):
+        mesh = bpy.data.meshes.new(f"gone {number}")
+        mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+        other = bpy.data.objects.new(mesh.name, mesh)
+        other.shape_key_add(name="Basis")
+        other.shape_key_add(name="up").keyframe_insert("value", frame=1)
+        other.keyframe_insert("location", frame=1)
+        other.keyframe_insert("location", frame=9)
+        scene.collection.objects.link(other)
+        made.append(other)
+    bpy.context.view_layer.update()
+    return made
+
+def evaluate(act, change):
+    def once(*_):
+        if not called:
+            called.append(True)
+            act()
+    called = []
+    getattr(events, EVENT).insert(0, once)
+    change()
+    if EVENT == "frame_change_post":
+        scene.frame_set(scene.frame_current % 9 + 1)
+    else:
+        bpy.context.view_layer.update()
+    getattr(events, EVENT).remove(once)
+    assert called
+"""
+DELETE = """
+for turn in range(5):
+    others = make(40)
+    def delete():
+        bpy.data.batch_remove([block for other in others for block in
+                               (other, other.data, other.data.shape_keys, other.animation_data.action)])
+    def change():
+        for other in others:
+            other.data.update_tag()
+            other.data.shape_keys.key_blocks[1].value = 0.5
+            other.animation_data.action.update_tag()
+    evaluate(delete, change)
+    rubbish = [bytes(1000) for _ in range(5000)]
+"""
+RENAME = """
+def rename():
+    obj.data.name, obj.name = "another mesh", "another object"
+def change():
+    obj.vertex_groups[0].add(range(len(obj.data.vertices) // 2), 0.9, "REPLACE")
+    obj.data.update_tag()
+evaluate(rename, change)
+"""
+COMPARE = """
+got = scenes.shapes(obj, [1, 6, 11])
+sinew_addon.unregister()
+wanted = scenes.shapes(obj, [1, 6, 11])
+assert np.abs(got - wanted).max() < 1e-5, np.abs(got - wanted).max()
+"""
+END = """
+print("at its end")
+"""
+
+
+@pytest.mark.parametrize("event", ["depsgraph_update_post", "frame_change_post"])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (DELETE,),
+        ('scenes.add_sinew(obj, "dq")', DELETE, COMPARE),
+        ('armature.sinew_inbetween = "sclerp"', DELETE),
+        ('scenes.add_sinew(obj, "dq")', RENAME, COMPARE),
+    ],
+    ids=["nothing of Sinew", "beside a skinned mesh", "beside in-betweens", "a skinned mesh renamed"],
+)
+def test_others_delete_before_sinew_is_called(parts, event, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(f"EVENT = {event!r}\n" + "\n".join((BEGIN, *parts, END)))
+    ran = subprocess.run(
+        [sys.executable, "-X", "faulthandler", script],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "at its end" in ran.stdout, ran.stdout[-2000:] + ran.stderr[-3000:]
+    assert ran.returncode == 0, ran.stderr
+    assert "Traceback" not in ran.stderr, ran.stderr
