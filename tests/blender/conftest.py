@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from sinew_addon.deform import small_meshes
+from sinew_addon.attach import normals
+from sinew_addon.deform import evaluate, small_meshes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 # The reader of glTF for engines.
@@ -81,6 +82,14 @@ def registered():
 @pytest.fixture(autouse=True)
 def empty_file():
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture(autouse=True)
+def nothing_of_commands(monkeypatch):
+    """What a command sets for its process ends with the test that runs it."""
+    monkeypatch.setattr(normals, "are_used", normals.are_used)
+    yield
+    evaluate.set_parameters({})
 
 
 @pytest.fixture(autouse=True)

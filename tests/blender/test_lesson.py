@@ -26,7 +26,7 @@ OF_BLENDER = {"Online Manual"}
 
 @pytest.fixture
 def opened():
-    bpy.ops.wm.open_mainfile(filepath=str(lesson.FILE))
+    bpy.ops.wm.open_mainfile(filepath=str(lesson.FILE), load_ui=True)
 
 
 def measured(obj):
