@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import argparse
+import errno
+import io
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from functools import partial
 from pathlib import Path
 
+from ..core.bake import is_whole
 from ..core.errors import SinewError, WrongUse
 from ..core.output import file_to_write, write_whole
 from .arguments import add_file, add_set, count
@@ -64,7 +67,11 @@ def run(args: argparse.Namespace, console: Console) -> int:
             raise SinewError(f"{args.file}: {reason}")
         scene.sinew_gltf.skinning = True
         with _known_to_exporters():
-            write_whole(args.out, lambda path: _write(path, args.influences))
+            try:
+                write_whole(args.out, lambda path: _write(path, args.influences))
+            except RuntimeError as error:
+                # The exporter's: all that Blender wrote.
+                raise SinewError(f"{args.out}: can not be written: {files.telling_line(error)}") from None
     left_out += export.left_out()
     for sentence in left_out:
         console.complain(f"{args.file}: {sentence}")
@@ -79,10 +86,11 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _write(path: Path, influences: int) -> None:
     import bpy
 
-    try:
+    # What the exporter fails with Blender prints, and raises.
+    with redirect_stderr(io.StringIO()):
         bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_influence_nb=influences)
-    except RuntimeError as error:
-        raise SinewError(f"{path}: the glTF exporter failed: {error}") from None
+    if not is_whole(path, "gltf"):
+        raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
 
 
 @contextmanager

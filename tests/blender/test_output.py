@@ -35,6 +35,8 @@ WRITERS = {
     "reskin": (("reskin", "FILE", "--method", "dq", "--frames", "none", "--out", OUT), "out"),
     "restore": (("restore", "RESKINNED", "--out", OUT), "out"),
     "inbetween": (("inbetween", "FILE", "--method", "sclerp", "--out", OUT), "out"),
+    "ik": (("ik", "REACHING", "--frames", "1-3", "--out", OUT), "out"),
+    "export": (("export", "FILE", "--method", "cor", "--out", OUT), "arm.glb"),
     "blend": (("blend", "FILE", "--actions", "Bend", "Bend", "--out", OUT), "blended.blend"),
     **{
         f"bake {kind}": (
@@ -58,7 +60,7 @@ WRITERS = {
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory):
-    """An arm with an action of bones, and the same re-skinned."""
+    """An arm with an action of bones, the same re-skinned, and one that reaches for a target."""
     folder = tmp_path_factory.mktemp("inputs")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm()
@@ -67,7 +69,15 @@ def inputs(tmp_path_factory):
     run_sinew(
         "reskin", folder / "arm.blend", "--method", "dq", "--frames", "none", "--out", folder / "skinned"
     )
-    return {"FILE": folder / "arm.blend", "RESKINNED": folder / "skinned" / "arm.blend"}
+    target = bpy.data.objects.new("Target", None)
+    bpy.context.collection.objects.link(target)
+    armature.pose.bones[-1].constraints.new("IK").target = target
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "reaching.blend"))
+    return {
+        "FILE": folder / "arm.blend",
+        "RESKINNED": folder / "skinned" / "arm.blend",
+        "REACHING": folder / "reaching.blend",
+    }
 
 
 def arguments_of(writer: str, inputs: dict, out: Path) -> list[str]:
