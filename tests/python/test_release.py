@@ -94,7 +94,8 @@ def test_nothing_else_names_the_version(texts):
         for path in [*looked_at, *ROOT.glob("*.md")]
         if named.search(path.read_text(encoding="utf-8"))
     }
-    assert found <= {place.file for place in release.PLACES} | {"CHANGELOG.md"}
+    # Measurements stay those of the version that was measured.
+    assert found <= {place.file for place in release.PLACES} | {"CHANGELOG.md", "docs/results.md"}
 
 
 def test_a_new_version_is_set_everywhere_and_changes_nothing_else(texts):
