@@ -102,9 +102,7 @@ def new_curves(
     return strip.channelbag(slot, ensure=True).fcurves, slot
 
 
-def new_curve(
-    curves: bpy.types.bpy_prop_collection, path: str, index: int, group: str
-) -> bpy.types.FCurve:
+def new_curve(curves: bpy.types.bpy_prop_collection, path: str, index: int, group: str) -> bpy.types.FCurve:
     """An F-curve in a group of the Graph Editor; Blender 4.4 and 4.5 make none in an action's slots."""
     known = curves.bl_rna.functions["new"].parameters
     name = next((each for each in ("group_name", "action_group") if each in known), None)

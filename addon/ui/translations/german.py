@@ -712,8 +712,7 @@ TEXTS = {
     "Each bone relative to its parent: chains stay whole": (
         "Jeder Knochen relativ zu seinem Elternknochen: Ketten bleiben ganz"
     ),
-    "Each bone by itself: it keeps its direction, and bones that are not connected leave their "
-    "parents": (
+    "Each bone by itself: it keeps its direction, and bones that are not connected leave their parents": (
         "Jeder Knochen für sich: Er behält seine Richtung, und nicht verbundene Knochen lösen "
         "sich von ihren Eltern"
     ),
@@ -754,8 +753,7 @@ TEXTS = {
     "Add Action": "Aktion hinzufügen",
     "There is no such action in the blend": "Diese Aktion gibt es in der Mischung nicht",
     "Add an action to the blend: the one that plays, or the next that moves these bones": (
-        "Fügt der Mischung eine Aktion hinzu: die abgespielte oder die nächste, die diese "
-        "Knochen bewegt"
+        "Fügt der Mischung eine Aktion hinzu: die abgespielte oder die nächste, die diese Knochen bewegt"
     ),
     "Remove Action": "Aktion entfernen",
     "Take the action out of the blend; the action itself stays in the file": (
