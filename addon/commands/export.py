@@ -86,7 +86,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _write(path: Path, influences: int) -> None:
     import bpy
 
-    # What the exporter fails with Blender prints, and raises.
+    # Where the exporter fails, Blender prints a traceback and raises it as an error.
     with redirect_stderr(io.StringIO()):
         bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_influence_nb=influences)
     if not is_whole(path, "gltf"):

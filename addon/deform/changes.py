@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from .originals import Find, at_once
+from .originals import Find
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Changes:
         return not depsgraph.id_type_updated("MESH") and Changes.are_of_meshes_only(depsgraph)
 
     @staticmethod
-    def meshes_in(depsgraph: bpy.types.Depsgraph, original: Find = at_once) -> set[int] | None:
+    def meshes_in(depsgraph: bpy.types.Depsgraph, original: Find) -> set[int] | None:
         """As `meshes`, without reading all the rest, with GONE where one is no longer found; None where no
         mesh was touched in any way."""
         if not depsgraph.id_type_updated("MESH"):
@@ -61,9 +61,7 @@ class Changes:
         return _changed_meshes(depsgraph.updates, _uid_by(original))
 
     @classmethod
-    def read(
-        cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool, original: Find = at_once
-    ) -> Changes:
+    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool, original: Find) -> Changes:
         """original: what finds originals."""
         updates = depsgraph.updates
         changes = cls(

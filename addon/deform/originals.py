@@ -27,11 +27,10 @@ _LISTS = (
 def finder(event: str, function: Callable) -> Find:
     """What finds the original of an evaluated object, mesh, shape key, armature or action within a function
     that Blender calls at an event: None where a function of others may have deleted or renamed it."""
-    return _by_name if events.others_precede(event, function) else at_once
+    return _by_name if events.others_precede(event, function) else _at_once
 
 
-def at_once(evaluated: bpy.types.ID) -> bpy.types.ID:
-    """Where nobody can have deleted it."""
+def _at_once(evaluated: bpy.types.ID) -> bpy.types.ID:
     return evaluated.original
 
 

@@ -43,6 +43,12 @@ def shortened(name: str, most: int = NAME_LENGTH) -> str:
     return f"{name[:ahead]}…{name[len(name) - (most - ahead - 1) :]}"
 
 
+def draw_armature(layout: bpy.types.UILayout, context: bpy.types.Context, armature: bpy.types.Object) -> None:
+    """The name of an armature object, as long as fits."""
+    name = shortened(armature.name, characters(context) - 4)
+    layout.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
+
+
 def names_text(names: Sequence[str], most: int = 3) -> str:
     """Some names as one text, the others by their number."""
     text = ", ".join(shortened(name) for name in names[:most])

@@ -13,7 +13,7 @@ from ...core.errors import SinewError
 from ...core.motion.blend import METHODS, TRAVEL
 from ...io import clips
 from ...ui import operators, stepped
-from ...ui.sidebar import Sidebar, characters, draw_text, shortened
+from ...ui.sidebar import Sidebar, draw_armature, draw_text
 from ...ui.translations import counted, tr
 from . import blend_actions, blend_settings
 
@@ -163,8 +163,7 @@ class SINEW_PT_blend(Sidebar, bpy.types.Panel):
         layout, armature = self.layout, armature_of(context)
         blend = blend_settings.of(armature)
         clips_of_blend = blend.clips if blend is not None else ()
-        name = shortened(armature.name, characters(context) - 4)
-        layout.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
+        draw_armature(layout, context, armature)
         for index, clip in enumerate(clips_of_blend):
             column = layout.column(align=True)
             row = column.row(align=True)

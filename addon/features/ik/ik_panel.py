@@ -13,7 +13,7 @@ from ...core.errors import SinewError
 from ...deform import evaluate
 from ...io import ik_io
 from ...ui import operators, stepped
-from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
+from ...ui.sidebar import Sidebar, draw_armature, draw_text, names_text
 from ...ui.translations import tr
 from . import ik_bake
 
@@ -105,8 +105,7 @@ class SINEW_PT_ik(Sidebar, bpy.types.Panel):
         layout = self.layout
         armature = operators.armatures(context)[0]
         box = layout.box()
-        name = shortened(armature.name, characters(context) - 4)
-        box.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
+        draw_armature(box, context, armature)
         try:
             trees = ik_io.read_trees(armature, _selected(armature))
         except SinewError as error:

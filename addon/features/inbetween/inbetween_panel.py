@@ -8,7 +8,7 @@ import bpy
 from ...core import inbetween as core_inbetween
 from ...core.errors import SinewError
 from ...ui import operators
-from ...ui.sidebar import Sidebar, characters, draw_text, shortened
+from ...ui.sidebar import Sidebar, draw_armature, draw_text
 from ...ui.translations import tr
 from . import inbetween, inbetween_bake, inbetween_handlers
 
@@ -67,8 +67,7 @@ class SINEW_PT_inbetweens(Sidebar, bpy.types.Panel):
         armatures = operators.armatures(context)
         for armature in armatures:
             box = layout.box()
-            name = shortened(armature.name, characters(context) - 4)
-            box.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
+            draw_armature(box, context, armature)
             box.prop(armature, "sinew_inbetween", text="")
             if inbetween.is_on(armature):
                 box.row().prop(armature, "sinew_inbetween_path", expand=True)
