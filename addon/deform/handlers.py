@@ -314,7 +314,7 @@ def on_render_end(*_args: object) -> None:
 
 def _after_render() -> float | None:
     if is_rendering_in_window():
-        return 0.1
+        return 0.05
     must_refresh = current.must_refresh or any(state.needs_apply for state in current.skinned.values())
     current.must_refresh = False
     if must_refresh:

@@ -113,6 +113,12 @@ def _is_rendering() -> bool:
     return bpy.app.is_job_running("RENDER")
 
 
+def _end_of_render() -> Steps:
+    """Sinew sees it within a twentieth of a second, and then shows the window's frame again."""
+    yield from until(lambda: not _is_rendering(), "the end of the render")
+    yield from wait(5)
+
+
 def _check_rendered(run: Run, frames: int) -> None:
     seen = ComparingEngine.seen
     count = len({frame for frame, _name, _off in seen})
@@ -126,8 +132,7 @@ def render_locked(run: Run) -> Steps:
     bpy.utils.register_class(ComparingEngine)
     bpy.context.preferences.view.render_display_type = "NONE"
     _start_render(run, True, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
-    yield from until(lambda: not _is_rendering(), "the end of the render")
-    yield from wait()
+    yield from _end_of_render()
     _check_rendered(run, 20)
     run.check_shapes("after the render")
     yield from run.check_frames()
@@ -137,8 +142,7 @@ def render_locked(run: Run) -> Steps:
 def render_unlocked(run: Run) -> Steps:
     """Without a hand on the panel."""
     _start_render(run, False, 20, {"Hero": "dq", "Small": "lbs", "Front": "dq", "Late": "dq"})
-    yield from until(lambda: not _is_rendering(), "the end of the render")
-    yield from wait()
+    yield from _end_of_render()
     _check_rendered(run, 20)
     run.check_shapes("after the render")
     yield from run.check_frames()
@@ -150,7 +154,7 @@ def render_unlocked_while_it_plays(run: Run) -> Steps:
         bpy.ops.screen.animation_play()
     yield from wait(5)
     _start_render(run, False, 20, {})
-    yield from until(lambda: not _is_rendering(), "the end of the render")
+    yield from _end_of_render()
     with window.in_view3d():
         bpy.ops.screen.animation_cancel(restore_frame=False)
     yield from wait()
@@ -221,8 +225,7 @@ def stop_a_render(run: Run) -> Steps:
     _start_render(run, False, 200, {})
     yield from wait(10)
     press("ESC")
-    yield from until(lambda: not _is_rendering(), "the end of the render")
-    yield from wait()
+    yield from _end_of_render()
     scene = bpy.context.window_manager.windows[0].scene
     scene.frame_start, scene.frame_end = 1, 20
     run.check_shapes("after Esc")
