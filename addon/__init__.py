@@ -30,9 +30,7 @@ def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
 def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
     """Called after an export."""
     from .deform import exporters
-    from .features.gltf import export
 
-    export.end()
     exporters.after_export(export_settings)
 
 

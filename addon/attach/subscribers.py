@@ -19,6 +19,7 @@ class Subscribers:
     objects_changed  these are the objects that have Sinew now
     deformed         all objects have the shape of this evaluation, as far as handlers are concerned
     frame_shown      what the panel shows of a frame may differ
+    exported         an export has ended, or failed
     precomputation_asked  something is computed on a thread, or will be
     precomputation_shown  how far that is may differ
     """
@@ -31,6 +32,7 @@ class Subscribers:
         default_factory=list
     )
     frame_shown: list[Callable[[], None]] = field(default_factory=list)
+    exported: list[Callable[[], None]] = field(default_factory=list)
     precomputation_asked: list[Callable[[], None]] = field(default_factory=list)
     precomputation_shown: list[Callable[[], None]] = field(default_factory=list)
 

@@ -178,8 +178,20 @@ def test_sinew_deforms_on_after_the_export(tmp_path):
     assert obj.sinew.enabled
 
 
-def test_after_an_export_that_failed(tmp_path):
-    """Nobody says that it has ended: the next one finds meshes that are no longer there, or are."""
+def test_an_export_that_fails_ends_as_one_that_does_not(tmp_path):
+    obj = make_character()
+    use(obj, "cor")
+    before = world_shapes(obj, FRAMES)
+    (tmp_path / "file").touch()
+    with pytest.raises(RuntimeError):
+        write(tmp_path / "file" / "a.glb")
+    assert obj.modifiers["Sinew"].show_viewport
+    assert "_SINEW_CENTRE" not in obj.data.attributes
+    assert np.array_equal(world_shapes(obj, FRAMES), before)
+
+
+def test_after_an_export_that_nobody_ended(tmp_path):
+    """The next one finds meshes that are no longer there, or are."""
     obj = make_character()
     use(obj, "cor")
     found, left_out = export.collect(bpy.context)

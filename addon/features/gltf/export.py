@@ -4,7 +4,7 @@ attributes of its vertices (glTF 2.0, 3.7.2.1: names that begin with an undersco
 of each.
 
 Meshes have these attributes for the time of an export, as the exporter splits vertices at seams and knows
-best which is which. They are made where it calls before an export and removed where it calls after it.
+best which is which. They are made where it calls before an export and removed at its end.
 """
 
 from __future__ import annotations

@@ -8,6 +8,8 @@ from typing import Any
 
 import bpy
 
+from ...attach.subscribers import subscribers
+
 
 class SinewGltf(bpy.types.PropertyGroup):
     """What the glTF exporter writes besides."""
@@ -46,6 +48,9 @@ def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) ->
 
 
 def register() -> None:
+    from . import export
+
+    subscribers.exported.append(export.end)
     bpy.types.Scene.sinew_gltf = bpy.props.PointerProperty(type=SinewGltf)
     _exporters_panels()[_ADDON] = draw
 
@@ -53,6 +58,7 @@ def register() -> None:
 def unregister() -> None:
     from . import export
 
+    subscribers.exported.remove(export.end)
     export.end()
     _exporters_panels().pop(_ADDON, None)
     del bpy.types.Scene.sinew_gltf
