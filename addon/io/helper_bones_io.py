@@ -177,7 +177,7 @@ def write_weights(
 ) -> None:
     """Gives a mesh object these weights of bones in the place of those that it has; groups of no bone stay.
 
-    bones           whose groups' weights go
+    bones           whose groups' weights go, also of a vertex that gets none: it had an option or a mask against them
     names           of all bones
     slots, weights  [vertices, n]: numbers of `names`, -1 for none, and their weights
     """
@@ -191,8 +191,6 @@ def write_weights(
     ends = np.cumsum(before.counts)
     rows = {}
     for vertex, (own, values) in enumerate(zip(slots, weights, strict=True)):
-        if own[0] < 0:
-            continue
         kept = range(ends[vertex] - before.counts[vertex], ends[vertex])
         row = {
             int(before.groups[entry]): float(before.weights[entry])

@@ -309,3 +309,23 @@ def test_envelopes_that_reach_other_vertices_from_frame_to_frame_are_refused(arm
     list(started.sample())
     (report,) = started.reports
     assert report.after.rms < 0.5 * report.before.rms
+
+
+@pytest.mark.parametrize("against", ["option", "mask"])
+def test_what_the_modifier_does_not_deform_stays(arm, tmp_path, against):
+    """Though it has weights, which the modifier would use afterwards."""
+    obj, _path = arm
+    modifier = obj.modifiers["Armature"]
+    if against == "option":
+        modifier.use_vertex_groups = False
+    else:
+        half = list(range(len(obj.data.vertices) // 2))
+        obj.vertex_groups.new(name="Half").add(half, 1.0, "REPLACE")
+        modifier.vertex_group = "Half"
+    scenes.add_sinew(obj, METHOD)
+    expected = scenes.shapes(obj, FRAMES)
+    started = bake.start([obj], "bones", FRAMES, tmp_path / "arm.blend", overwrite=False)
+    list(started.sample())
+    started.place()
+    (report,) = started.reports
+    assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= 1.01 * report.after.worst + 1e-5
