@@ -2,8 +2,8 @@
 """Blender's exporters of skins need Armature modifiers that deform, and bring the mesh itself to rest by
 them: for the time of an export the file is as a saved one.
 
-The glTF exporter calls extensions before an export and after one that did not fail. The FBX exporter, in Python
-too, calls nobody (seen on 4.2 to 5.2). So both operators are wrapped.
+The glTF exporter calls extensions before an export and after one that did not fail. The FBX exporter, in
+Python too, calls nobody (seen on 4.2 to 5.2). So both operators are wrapped.
 """
 
 from __future__ import annotations

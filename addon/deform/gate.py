@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import bpy
 
 from ..attach import node_group, stack
-from ..io.animation_paths import animated_paths, is_visibility_animated
+from ..io.animation_paths import animated_paths, curves_of, is_visibility_animated
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,10 @@ _STAYING = ("location", "rotation_", "scale", "delta_", "sinew.")
 
 
 def _is_animated(mesh: bpy.types.Mesh) -> bool:
-    """Whether animation sets anything of an object that has the mesh. To set one of its modifiers has Blender
-    (4.2 to 5.2) copy all of them anew, with what the originals have: in a render that of another frame."""
+    """Whether animation sets anything of a mesh, its shape keys or an object that has it. To set a modifier
+    of one of these objects has Blender (4.2 to 5.2) copy all of them anew, with what the originals have: in a
+    render that of another frame."""
+    if any(curves_of(owner) for owner in (mesh, mesh.shape_keys) if owner is not None):
+        return True
     users = (obj for obj in bpy.data.objects if obj.data == mesh)
     return any(not path.startswith(_STAYING) for obj in users for path in animated_paths(obj))

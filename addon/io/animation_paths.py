@@ -13,9 +13,9 @@ def animated_paths(obj: bpy.types.Object) -> set[str]:
     return {curve.data_path for curve in curves_of(obj)}
 
 
-def curves_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
-    """Those of the object's actions, in strips too, and its drivers."""
-    animation = obj.animation_data
+def curves_of(owner: bpy.types.Object | bpy.types.Mesh | bpy.types.Key) -> list[bpy.types.FCurve]:
+    """Those of its actions, in strips too, and its drivers."""
+    animation = owner.animation_data
     if animation is None:
         return []
     played = [actions.all_curves(p.action, actions.slot_of(p)) for p in players(animation)]

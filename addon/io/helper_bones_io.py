@@ -177,7 +177,8 @@ def write_weights(
 ) -> None:
     """Gives a mesh object these weights of bones in the place of those that it has; groups of no bone stay.
 
-    bones           whose groups' weights go, also of a vertex that gets none: it had an option or a mask against them
+    bones           whose groups' weights go, also where a vertex gets none: an option or a mask of the
+                    modifier was against them
     names           of all bones
     slots, weights  [vertices, n]: numbers of `names`, -1 for none, and their weights
     """

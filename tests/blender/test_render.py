@@ -11,6 +11,7 @@ import pytest
 import scenes
 from mathutils import Matrix
 from sinew_addon.attach import properties
+from sinew_addon.deform import safe_mode, small_meshes
 
 SIZE = 96
 
@@ -197,6 +198,39 @@ def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered
         flags.keyframe_insert("show_render", frame=frame)
     scene.frame_set(1)
     got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7))
+    assert np.abs(got - expected).mean() < 3e-4
+
+
+@pytest.mark.parametrize("what", ["after the update", "compared"])
+def test_keys_of_shape_keys_are_rendered(tmp_path, monkeypatch, what):
+    """Of a mesh that Sinew deforms after the update, or whose copies it does."""
+    obj, _armature = scenes.make_arm()
+    scene = bpy.context.scene
+    prepare(scene, motion_blur=False)
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Key")
+    for point in key.data[: len(key.data) // 2]:
+        point.co.y += 0.8
+    for frame, value in ((5, 0.0), (9, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    scene.frame_set(11)
+
+    def change() -> None:
+        if what == "compared":
+            bpy.ops.sinew.compare(methods={"qv"})
+            for copy in filter(properties.is_copy, bpy.data.objects):
+                # It is rendered, but not seen.
+                copy.location.z -= 100.0
+        # Two changes of frame: from then on Sinew knows that they reshape it.
+        scene.frame_set(10)
+        scene.frame_set(11)
+
+    monkeypatch.setattr(small_meshes, "is_used", what == "compared")
+    safe_mode.set_forced(what == "after the update" or None)
+    got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7), change)
+    safe_mode.set_forced(None)
+    assert np.abs(expected[0] - expected[2]).mean() > 0.002, "nothing moves: nothing is tested"
     assert np.abs(got - expected).mean() < 3e-4
 
 

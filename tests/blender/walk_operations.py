@@ -539,9 +539,17 @@ def _character(w: Walker, r: random.Random) -> bpy.types.Object | None:
     # As a window does between two clicks: Sinew knows by then which armature a modifier has.
     w.before_evaluation()
     bpy.context.view_layer.update()
+    if not all(_has_its_armatures(obj) for obj in w.objects("MESH") if w.side.has_sinew(obj)):
+        return None
     rigs = [rig for rig in w.armatures() if rig.visible_get()]
     meshes = {rig: w.side.character(rig) for rig in rigs}
     return w.one(r, [rig for rig in rigs if meshes[rig] and all(map(is_free, meshes[rig]))])
+
+
+def _has_its_armatures(obj: bpy.types.Object) -> bool:
+    """Sinew remembers the armature of a mesh that lost it, as one of its character."""
+    modifiers = armature_modifiers(obj)
+    return bool(modifiers) and all(modifier.object is not None for modifier in modifiers)
 
 
 @operation(1.5)
