@@ -217,6 +217,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="shorter runs, no picture")
     parser.add_argument("--name", default="ik", help="of the file in bench/results")
     arguments = parser.parse_args()
+    plt.rcParams["svg.hashsalt"] = "sinew"
     sinew_addon.register()
     facts = common.machine() | {"blender": bpy.app.version_string}
     common.heading("inverse kinematics", facts)

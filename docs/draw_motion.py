@@ -250,6 +250,7 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder for the pictures")
     arguments = parser.parse_args()
+    plt.rcParams["svg.hashsalt"] = "sinew"
     draw_arms(arguments.out / "motion-arms.png")
     draw_sliding(arguments.out / "motion-sliding.svg")
     draw_strips(arguments.out / "motion-legs.svg")
