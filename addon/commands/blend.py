@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..core.motion.blend import Settings
     from ..core.motion.clip import Clip
+    from ..core.motion.timing import Weights
     from ..features.blend.blend_actions import Made
 
 HELP = """\
@@ -30,9 +31,10 @@ Blends two or more actions of an armature, bone by bone, into a new action of pl
 the file in which the armature plays it. FILE is never written to; the actions stay in the copy.
 
 --clips adds the animations of BVH, glTF or FBX files whose bones have the same names and rest. Each action
-has a weight; with --weights-from they go from those in the first frame to --weights in the last. Aligned, the
-default, actions are brought to the same moment of their motion by the distance of their poses, and cycles to
-the weighted mean of their lengths. The root's steps over the ground are blended and added up.
+has a weight; with --weights-from they go from those in the first frame to --weights in the last, and with
+--weights-at from one share of the motion to the next. Aligned, the default, actions are brought to the same
+moment of their motion by the distance of their poses, and cycles to the weighted mean of their lengths. The
+root's steps over the ground are blended and added up.
 
 --measure prints, for each action and the blend, how far feet slide while they are on the ground, how far the
 root goes, and the angular acceleration of bones; and how much bones shrink under matrix_linear."""
@@ -69,7 +71,26 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         metavar="W",
         help="one for each action, then for each clip (default: equal)",
     )
-    parser.add_argument("--weights-from", nargs="+", type=float, metavar="W", help="those of the first frame")
+    parser.add_argument(
+        "--weights-from",
+        nargs="+",
+        type=float,
+        metavar="W",
+        help="those of the first frame, if --weights are of the last",
+    )
+    parser.add_argument(
+        "--weights-at",
+        nargs="+",
+        type=float,
+        action="append",
+        metavar="SHARE W",
+        help="a share of the motion, from 0 to 1, and the weights there; several times, without --weights",
+    )
+    parser.add_argument(
+        "--smooth",
+        action="store_true",
+        help="each change of weights begins and ends slowly (default: even)",
+    )
     parser.add_argument("--method", default="dlb", help=f"one of {', '.join(METHODS)} (default: dlb)")
     parser.add_argument(
         "--space",
@@ -121,7 +142,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     files.open_file(args.file, importers=clips.IMPORTERS)
     armature = _armature(args)
     chosen = _actions(args, armature)
-    weights = args.weights or [1.0] * len(chosen)
+    weights = _weights(args, len(chosen))
     made = _make(args, armature, chosen, weights, console)
     for note in made.notes():
         console.note(f"{args.file}: {note}")
@@ -208,15 +229,29 @@ def _make(
     args: argparse.Namespace,
     armature: bpy.types.Object,
     chosen: list[bpy.types.Action],
-    weights: list[float],
+    weights: Weights,
     console: Console,
 ) -> Made:
     from ..features.blend import blend_actions
 
     settings = _settings(args)
-    steps = blend_actions.make(armature, chosen, weights, settings, args.weights_from, args.name or "")
+    steps = blend_actions.make(armature, chosen, weights, settings, args.name or "")
     with console.bar(f"Blending {len(chosen)} actions", len(chosen)) as show, closing(steps):
         return _shown(steps, show)
+
+
+def _weights(args: argparse.Namespace, count: int) -> Weights:
+    from ..core.motion.timing import Weights
+
+    if args.weights_at is not None:
+        if args.weights is not None or args.weights_from is not None:
+            raise WrongUse("sinew blend: expected --weights-at or --weights, not both")
+        keys = sorted(args.weights_at)
+        return Weights.of([key[1:] for key in keys], count, [key[0] for key in keys], args.smooth)
+    last = args.weights or [1.0] * count
+    if args.weights_from is None:
+        return Weights.of(last, count)
+    return Weights.of((args.weights_from, last), count, smooth=args.smooth)
 
 
 def _settings(args: argparse.Namespace) -> Settings:

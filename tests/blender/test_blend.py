@@ -282,6 +282,24 @@ def test_weights_change_from_first_to_last():
     assert np.abs(film(armature, [1])[0] - first).max() < CLOSE
 
 
+def test_weights_change_between_two_shares_of_the_motion():
+    armature, chosen, _pair = make_walks()
+    for action, start, end in zip(chosen, (1.0, 0.0), (0.0, 1.0), strict=True):
+        clip = armature.sinew_blend.clips.add()
+        clip.action, clip.weight_from, clip.weight = action, start, end
+    blend = armature.sinew_blend
+    blend.changes, blend.cycles, blend.smooth = True, 4, True
+    blend.change_start, blend.change_end = 50.0, 75.0
+    first = played(armature, chosen[0], [1, 10, 20])
+    assert bpy.ops.sinew.blend_actions() == {"FINISHED"}
+    got = film(armature, [1, 10, 20])
+    # The walk goes on alone at first, at its pace but for what the blend's whole frames need.
+    assert np.abs(got - first).max() < 1e-3
+    blend.change_start = 80.0
+    with pytest.raises(RuntimeError, match="shares of the motion from 0 to 1, one after the other"):
+        bpy.ops.sinew.blend_actions()
+
+
 @pytest.mark.parametrize("steps", [1, 40, 90])
 def test_stopped_nothing_has_changed(steps):
     armature, chosen, _pair = make_walks()
@@ -475,6 +493,10 @@ def test_the_command_writes_a_copy(walking, tmp_path):
     run_sinew("blend", walking, *options, "--overwrite", "--weights-from", 1, 0, "--name", "To a Run")
     files.open_file(out)
     assert bpy.data.objects["Legs"].animation_data.action.name == "To a Run"
+    keys = ["--weights-at", 0.75, 1, 0, "--weights-at", 0.5, 0, 1, "--weights-at", 0.25, 1, 0]
+    options = ["--actions", "WALK", "RUN", "--cycles", 8, "--smooth", *keys, "--out", out, "--overwrite"]
+    # Two walks, a run and a walk in half their motion, and two walks again: 20 and 30 frames a cycle.
+    assert "Blend WALK RUN: 181 frames, no cycle, carried by hips" in run_sinew("blend", walking, *options).stdout
 
 
 def test_the_command_measures(walking):
@@ -506,6 +528,8 @@ def test_the_command_says_what_is_wrong(walking, tmp_path):
         ([walking, "--actions", "WALK", "JUMP", *out], "no action 'JUMP'; Legs can play: RUN, WALK", 1),
         ([walking, "--actions", "WALK", *out], "expected two actions or more", 2),
         ([walking, *both, "--weights", 1, *out], "expected one for each of 2 clips, got 1", 2),
+        ([walking, *both, "--weights-at", 2, 1, 1, *out], "shares of the motion from 0 to 1", 2),
+        ([walking, *both, "--weights", 1, 1, "--weights-at", 0, 1, 1, *out], "not both", 2),
         ([walking, *both, "--method", "best", *out], "method: expected one of dlb", 2),
         ([walking, *both, "--armature", "Arms", *out], "no armature 'Arms'; there are: Legs", 1),
         ([walking, *both, "--root", "tail", *out], "no bone 'tail'", 1),

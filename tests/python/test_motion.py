@@ -18,6 +18,7 @@ from sinew_addon.core.motion.align import PHASES, align
 from sinew_addon.core.motion.blend import ARMATURE, IN_PLACE, KEYED, METHODS, TRAVEL, Settings, blend
 from sinew_addon.core.motion.clip import Clip
 from sinew_addon.core.motion.root import grounded, main_root
+from sinew_addon.core.motion.timing import Weights
 
 UP = walks.UP
 ROOT_MOTIONS = (TRAVEL, IN_PLACE, KEYED)
@@ -365,7 +366,7 @@ def test_clips_that_do_not_move_and_single_poses_blend():
 def test_weights_change_over_the_blend():
     """A change from a walk to a run begins as the one and ends as the other, at its pace there."""
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
-    made = blend([walk, run], (0, 1), Settings(cycles=3), weights_from=(1, 0))
+    made = blend([walk, run], ((1, 0), (0, 1)), Settings(cycles=3))
     timing = made.timing
     assert np.array_equal(timing.weights[0], (1.0, 0.0))
     assert np.array_equal(timing.weights[-1], (0.0, 1.0))
@@ -427,12 +428,49 @@ def test_three_walks_move_at_the_mean_of_their_speeds(method):
 def test_a_change_of_weights_has_no_jumps(method):
     """No bone moves faster in the blend than in the clips, but for what the blend itself changes."""
     walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
-    made = blend([walk, run], (0, 1), Settings(method=method, cycles=4), weights_from=(1, 0))
+    made = blend([walk, run], ((1, 0), (0, 1)), Settings(method=method, cycles=4))
     steps = {}
     for name, clip in (("walk", walk), ("run", run), ("blend", made.clip("blend"))):
         ends = clip.rig.points(clip.rig.to_armature(clip.poses.rigid))
         steps[name] = np.linalg.norm(np.diff(ends, axis=0), axis=-1).max()
     assert steps["blend"] < 1.1 * max(steps["walk"], steps["run"])
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_weights_have_keys_over_the_motion(smooth):
+    """A run in the middle of a walk, which is alone before and behind."""
+    walk, run = walks.walk(), walks.walk("run", 30, 1.1, 0.2, start=0.3)
+    weights = Weights.of(((1, 0), (0, 2), (3, 0)), 2, (0.25, 0.5, 0.75), smooth)
+    made = blend([walk, run], weights, Settings(cycles=8))
+    shares = np.array([0.0, 0.25, 0.3125, 0.375, 0.4375, 0.5, 0.625, 0.75, 1.0])
+    quarter = 0.15625 if smooth else 0.25
+    values = [0, 0, quarter, 0.5, 1 - quarter, 1, 0.5, 0, 0]
+    assert np.abs(weights.over(shares)[:, 1] - values).max() < 1e-12
+    assert np.abs(weights.over(shares).sum(axis=1) - 1.0).max() < 1e-12
+    ran = made.timing.weights[:, 1]
+    assert ran.max() > 0.95
+    # Two of eight cycles at each end are the walk's own, in its time.
+    assert (ran[:40] == 0.0).all()
+    assert (ran[-40:] == 0.0).all()
+    paces = np.diff(made.timing.times[:, 0])
+    assert np.abs(paces[:39] - 1.0).max() < 0.01
+    assert not made.is_cyclic
+
+
+@pytest.mark.parametrize(
+    ("given", "at"),
+    [
+        (((1, 0), (0, 1)), (0.5,)),
+        (((1, 0), (0, 1)), (0.5, 0.5)),
+        (((1, 0), (0, 1)), (0.6, 0.5)),
+        (((1, 0), (0, 1)), (-0.1, 0.5)),
+        (((1, 0), (0, 1)), (0.1, 1.5)),
+        (((1, 0), (0, 1)), (0.1, float("nan"))),
+    ],
+)
+def test_keys_of_weights_that_are_none(given, at):
+    with pytest.raises(SinewError, match="shares of the motion from 0 to 1"):
+        Weights.of(given, 2, at)
 
 
 @pytest.mark.parametrize("method", ["dlb", "sclerp", "qv_slerp", "matrix_polar"])

@@ -90,12 +90,11 @@ class Blend:
 
 def blend(
     clips: Sequence[Clip],
-    weights: Sequence[float],
+    weights: Sequence[float] | timing.Weights,
     settings: Settings | None = None,
-    weights_from: Sequence[float] | None = None,
     up: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Blend:
-    """The clips blended by `weights`, brought to sum 1; from `weights_from` at the first frame, if given.
+    """The clips blended by weights, brought to sum 1, or by such that change.
 
     Whether a clip is a cycle is found from its poses, or as `Clip.is_cyclic` says. Where not all are, all are
     aligned from their first pose to their last. The heaviest clip at the beginning is the reference: the
@@ -106,19 +105,19 @@ def blend(
     """
     settings = Settings() if settings is None else settings
     rig = common_rig(clips)
-    last = timing.checked_weights(weights, len(clips))
-    first = last if weights_from is None else timing.checked_weights(weights_from, len(clips))
+    if not isinstance(weights, timing.Weights):
+        weights = timing.Weights.of(weights, len(clips))
     _check(settings)
-    reference = int(np.argmax(first))
+    reference = int(np.argmax(weights.values[0]))
     root = rig.index(settings.root) if settings.root is not None else main_root(rig, list(clips))
     travels = _in_place(clips, root, np.asarray(up), settings)
     placed = [travel.clip for travel in travels]
     warps = _warps(placed, reference, rig, root, settings)
     cycles = settings.cycles if all(clip.is_cyclic for clip in placed) or not settings.align else 1
     schedule = (
-        timing.aligned(placed, warps, first, last, cycles)
+        timing.aligned(placed, warps, weights, cycles)
         if settings.align
-        else timing.own_pace(placed, first, last, cycles)
+        else timing.own_pace(placed, weights, cycles)
     )
     sampled = [clip.at(times) for clip, times in zip(placed, schedule.times.T, strict=True)]
     result = _blended(rig, sampled, schedule.weights, settings)
@@ -135,7 +134,7 @@ def blend(
         schedule,
         warps,
         rig.names[root] if settings.root_motion != KEYED else None,
-        all(clip.is_cyclic for clip in placed) and weights_from is None and settings.align,
+        all(clip.is_cyclic for clip in placed) and not weights.change and settings.align,
     )
 
 

@@ -26,14 +26,53 @@ class Timing:
     weights: np.ndarray
 
 
-def checked_weights(weights: Sequence[float], count: int) -> np.ndarray:
-    """[count] of sum 1. Raises SinewError where they are not such."""
-    given = np.array(weights, dtype=np.float64)
-    if given.shape != (count,):
-        raise WrongUse(f"Weights: expected one for each of {count} clips, got {given.size}")
-    if not np.isfinite(given).all() or (given < 0.0).any() or given.sum() <= 0.0:
-        raise WrongUse("Weights: expected numbers of 0 or more, and not all of them 0")
-    return given / given.sum()
+@dataclass(frozen=True)
+class Weights:
+    """Those of a blend's clips over its motion: between two keys in a straight line, or smoothly.
+
+    at      [keys], rising: shares of the motion, from 0 to 1; before the first and behind the last key
+            nothing changes
+    values  [keys, clips], of sum 1
+    """
+
+    at: np.ndarray
+    values: np.ndarray
+    smooth: bool = False
+
+    @classmethod
+    def of(
+        cls, given: Sequence, count: int, at: Sequence[float] | None = None, smooth: bool = False
+    ) -> Weights:
+        """given: the weights of `count` clips, or such at each key; without `at`, keys are even.
+
+        Raises SinewError where they are not such.
+        """
+        are_keys = len(given) > 0 and np.ndim(given[0]) > 0
+        values = [np.array(each, dtype=np.float64) for each in (given if are_keys else [given])]
+        for each in values:
+            if each.shape != (count,):
+                raise WrongUse(f"Weights: expected one for each of {count} clips, got {each.size}")
+            if not np.isfinite(each).all() or (each < 0.0).any() or each.sum() <= 0.0:
+                raise WrongUse("Weights: expected numbers of 0 or more, and not all of them 0")
+        keys = np.linspace(0.0, 1.0, len(values)) if at is None else np.array(at, dtype=np.float64)
+        is_within = keys.shape == (len(values),) and ((keys >= 0.0) & (keys <= 1.0)).all()
+        if not is_within or not (np.diff(keys) > 0.0).all():
+            raise WrongUse("Weights: expected them at shares of the motion from 0 to 1, one after the other")
+        return cls(keys, np.array([each / each.sum() for each in values]), smooth)
+
+    @property
+    def change(self) -> bool:
+        return bool((self.values != self.values[0]).any())
+
+    def over(self, shares: np.ndarray) -> np.ndarray:
+        """[n, clips] at n shares of the motion."""
+        last = len(self.at) - 1
+        place = np.interp(shares, self.at, np.arange(last + 1.0))
+        key = np.minimum(place.astype(int), max(last - 1, 0))
+        behind = (place - key)[:, None]
+        if self.smooth:
+            behind = behind * behind * (3.0 - 2.0 * behind)
+        return (1.0 - behind) * self.values[key] + behind * self.values[np.minimum(key + 1, last)]
 
 
 def lengths_of(clips: Sequence[Clip]) -> np.ndarray:
@@ -43,32 +82,30 @@ def lengths_of(clips: Sequence[Clip]) -> np.ndarray:
     return np.where(lengths > 0.0, lengths, others.mean() if len(others) else 0.0)
 
 
-def own_pace(clips: Sequence[Clip], first: np.ndarray, last: np.ndarray, cycles: int) -> Timing:
+def own_pace(clips: Sequence[Clip], weights: Weights, cycles: int) -> Timing:
     """Every clip from its first frame at its own pace, for the longest that has a weight."""
-    used = (first > 0.0) | (last > 0.0)
+    used = (weights.values > 0.0).any(axis=0)
     lengths = lengths_of(clips)
     frames = _whole(cycles * lengths[used].max())
     times = np.repeat(np.arange(frames + 1.0)[:, None], len(clips), axis=1)
-    return Timing(times, _weights(np.linspace(0.0, 1.0, frames + 1), first, last))
+    return Timing(times, weights.over(np.linspace(0.0, 1.0, frames + 1)))
 
 
-def aligned(
-    clips: Sequence[Clip], warps: Sequence[Warp], first: np.ndarray, last: np.ndarray, cycles: int
-) -> Timing:
+def aligned(clips: Sequence[Clip], warps: Sequence[Warp], weights: Weights, cycles: int) -> Timing:
     """Clips at the same moment of their motion. A moment takes the weighted mean of the times that it takes
     in each: so a blend is as long as the weighted mean of its clips, to whole frames, and one of a single
-    clip plays that as it is. Weights go from `first` to `last` in step with the motion."""
+    clip plays that as it is. Weights change in step with the motion."""
     lengths = lengths_of(clips)
-    _whole(cycles * float(np.minimum(first @ lengths, last @ lengths)))
+    _whole(cycles * float((weights.values @ lengths).min()))
     phases = np.linspace(0.0, cycles, STEPS * cycles + 1)
     own = np.column_stack([warp.at(phases) * length for warp, length in zip(warps, lengths, strict=True)])
-    weights = _weights(phases / cycles, first, last)
-    taken = (0.5 * (weights[1:] + weights[:-1]) * np.diff(own, axis=0)).sum(axis=1)
+    in_steps = weights.over(phases / cycles)
+    taken = (0.5 * (in_steps[1:] + in_steps[:-1]) * np.diff(own, axis=0)).sum(axis=1)
     when = np.concatenate([[0.0], np.cumsum(taken)])
     frames = _whole(when[-1])
     at = np.interp(np.linspace(0.0, when[-1], frames + 1), when, phases)
     times = np.column_stack([np.interp(at, phases, each) for each in own.T])
-    return Timing(times, _weights(at / cycles, first, last))
+    return Timing(times, weights.over(at / cycles))
 
 
 def _whole(frames: float) -> int:
@@ -77,7 +114,3 @@ def _whole(frames: float) -> int:
             f"The blend would have {frames:,.0f} frames, more than {MOST_FRAMES:,}: choose fewer cycles"
         )
     return max(1, round(frames)) if frames > 0.0 else 0
-
-
-def _weights(shares: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    return (1.0 - shares[:, None]) * first + shares[:, None] * last

@@ -13,6 +13,7 @@ from ...core.errors import SinewError
 from ...core.motion import blend as core
 from ...core.motion import measure
 from ...core.motion.clip import Clip
+from ...core.motion.timing import Weights
 from ...io import actions, clips
 
 Result = TypeVar("Result")
@@ -63,9 +64,8 @@ class Made:
 def make(
     armature: bpy.types.Object,
     chosen: Sequence[bpy.types.Action],
-    weights: Sequence[float],
+    weights: Sequence[float] | Weights,
     settings: core.Settings,
-    weights_from: Sequence[float] | None = None,
     name: str = "",
 ) -> Generator[float, None, Made]:
     """Yields the share that is done. The new action begins at the scene's first frame; closed before its
@@ -79,7 +79,7 @@ def make(
         steps = clips.read(armature, action, rig)
         clip = yield from _part(steps, READING * number / len(chosen), READING / len(chosen))
         sources.append(clip)
-    blend = core.blend(sources, weights, settings, weights_from, up)
+    blend = core.blend(sources, weights, settings, up)
     keyed = set().union(*(clips.keyed_properties(armature, action) for action in chosen))
     name = name or f"Blend {' '.join(action.name for action in chosen)}"
     first = float(bpy.context.scene.frame_start)

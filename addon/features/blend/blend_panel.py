@@ -125,9 +125,8 @@ class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
         self._made = yield from blend_actions.make(
             armature,
             [clip.action for clip in chosen],
-            [clip.weight for clip in chosen],
+            blend.weights(chosen),
             blend.settings(),
-            [clip.weight_from for clip in chosen] if blend.changes else None,
         )
 
     def finish(self, context: bpy.types.Context) -> set[str]:
@@ -182,8 +181,14 @@ class SINEW_PT_blend(Sidebar, bpy.types.Panel):
         column = layout.column()
         column.use_property_split = True
         column.use_property_decorate = False
-        for name in ("method", "space", "changes", "align"):
+        for name in ("method", "space", "changes"):
             column.prop(blend, name)
+        if blend.changes:
+            row = column.row(align=True)
+            row.prop(blend, "change_start", text="")
+            row.prop(blend, "change_end", text="")
+            column.prop(blend, "smooth")
+        column.prop(blend, "align")
         if blend.align:
             column.prop_search(blend, "align_bone", armature.data, "bones")
         column.prop(blend, "cycles")

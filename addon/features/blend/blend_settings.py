@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ...core.motion import blend as core
+from ...core.motion.timing import Weights
 
 
 class SinewBlendClip(bpy.types.PropertyGroup):
@@ -24,7 +27,7 @@ class SinewBlendClip(bpy.types.PropertyGroup):
     )
     weight_from: bpy.props.FloatProperty(
         name="At First",
-        description="How much of the action is in the first frame, from where it goes to its weight",
+        description="How much of the action is in the blend before its weights change",
         default=1.0,
         min=0.0,
         soft_max=1.0,
@@ -73,7 +76,33 @@ class SinewBlend(bpy.types.PropertyGroup):
     )
     changes: bpy.props.BoolProperty(
         name="Change Weights",
-        description="Let the weights change from the first frame of the blend to its last",
+        description="Let the weights change in the course of the blend",
+        default=False,
+        options=set(),
+    )
+    change_start: bpy.props.FloatProperty(
+        name="Begins At",
+        description="The share of the motion after which weights change",
+        subtype="PERCENTAGE",
+        default=0.0,
+        min=0.0,
+        max=100.0,
+        precision=0,
+        options=set(),
+    )
+    change_end: bpy.props.FloatProperty(
+        name="Ends At",
+        description="The share of the motion after which they have changed",
+        subtype="PERCENTAGE",
+        default=100.0,
+        min=0.0,
+        max=100.0,
+        precision=0,
+        options=set(),
+    )
+    smooth: bpy.props.BoolProperty(
+        name="Slow In and Out",
+        description="Let the change of weights begin and end slowly; else it is even",
         default=False,
         options=set(),
     )
@@ -101,6 +130,15 @@ class SinewBlend(bpy.types.PropertyGroup):
         description="The bone that carries the others; empty: the uppermost that moves",
         options=set(),
     )
+
+    def weights(self, clips: Sequence[SinewBlendClip]) -> Weights:
+        """Of some of its clips. Raises SinewError for those that can not be."""
+        last = [clip.weight for clip in clips]
+        if not self.changes:
+            return Weights.of(last, len(last))
+        first = [clip.weight_from for clip in clips]
+        at = (0.01 * self.change_start, 0.01 * self.change_end)
+        return Weights.of((first, last), len(last), at, self.smooth)
 
     def settings(self) -> core.Settings:
         return core.Settings(

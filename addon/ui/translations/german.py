@@ -674,8 +674,8 @@ TEXTS = {
         "Wie viel von der Aktion in der Mischung ist; Gewichte werden auf die Summe 1 gebracht"
     ),
     "At First": "Anfangs",
-    "How much of the action is in the first frame, from where it goes to its weight": (
-        "Wie viel von der Aktion im ersten Einzelbild ist; von da geht es zu ihrem Gewicht"
+    "How much of the action is in the blend before its weights change": (
+        "Wie viel von der Aktion in der Mischung ist, bevor ihre Gewichte sich ändern"
     ),
     "The actions to blend": "Die Aktionen, die gemischt werden",
     "How poses of a bone are blended": "Wie Posen eines Knochens gemischt werden",
@@ -727,8 +727,20 @@ TEXTS = {
         "Der Knochen, der sagt, welcher Moment es ist, etwa ein Fuß; leer: alle Knochen"
     ),
     "Change Weights": "Gewichte ändern",
-    "Let the weights change from the first frame of the blend to its last": (
-        "Lässt die Gewichte sich vom ersten bis zum letzten Einzelbild der Mischung ändern"
+    "Let the weights change in the course of the blend": (
+        "Lässt die Gewichte sich im Lauf der Mischung ändern"
+    ),
+    "Begins At": "Beginnt bei",
+    "The share of the motion after which weights change": (
+        "Der Anteil der Bewegung, nach dem sich Gewichte ändern"
+    ),
+    "Ends At": "Endet bei",
+    "The share of the motion after which they have changed": (
+        "Der Anteil der Bewegung, nach dem sie sich geändert haben"
+    ),
+    "Slow In and Out": "Langsam hinein und heraus",
+    "Let the change of weights begin and end slowly; else it is even": (
+        "Lässt die Änderung der Gewichte langsam beginnen und enden; sonst ist sie gleichmäßig"
     ),
     "Cycles": "Zyklen",
     "How often actions that repeat go round in the blend": (
