@@ -34,6 +34,14 @@ def is_rendering_in_window() -> bool:
     return not bpy.app.background and bpy.app.is_job_running("RENDER")
 
 
+def is_playing_in_window() -> bool:
+    """Whether a change of frame is that of a window that plays. Exporters that run beside it have a thread of
+    their own."""
+    if bpy.app.background or not is_main_thread():
+        return False
+    return any(window.screen.is_animation_playing for window in bpy.context.window_manager.windows)
+
+
 def is_main_thread() -> bool:
     return threading.get_ident() == threading.main_thread().ident
 

@@ -41,9 +41,10 @@ class Gate:
     def __init__(self) -> None:
         self._suspended: list[_Suspended] = []
 
-    def suspend(self, obj: bpy.types.Object, is_render: bool) -> None:
-        """is_render: not for a view, whose animation Blender writes to the originals, too."""
-        if is_render and _is_animated(obj.data):
+    def suspend(self, obj: bpy.types.Object, is_playing: bool) -> None:
+        """is_playing: for a window that plays, whose animation Blender writes to the originals, too. Of others
+        nothing says whether they are a view, a render or an exporter."""
+        if not is_playing and _is_animated(obj.data):
             return
         for modifier in obj.modifiers:
             if (
@@ -71,7 +72,7 @@ _STAYING = ("location", "rotation_", "scale", "delta_", "sinew.")
 def _is_animated(mesh: bpy.types.Mesh) -> bool:
     """Whether animation sets anything of a mesh, its shape keys or an object that has it. To set a modifier
     of one of these objects has Blender (4.2 to 5.2) copy all of them anew, with what the originals have: in a
-    render that of another frame."""
+    render or an exporter that of another frame."""
     if any(curves_of(owner) for owner in (mesh, mesh.shape_keys) if owner is not None):
         return True
     users = (obj for obj in bpy.data.objects if obj.data == mesh)

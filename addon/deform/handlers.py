@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 
 from ..attach import note, overrides, properties
 from ..attach.subscribers import notify, subscribers
-from ..attach.updates import is_main_thread, is_rendering_in_window, reaction
+from ..attach.updates import is_main_thread, is_playing_in_window, is_rendering_in_window, reaction
 from ..core.precompute import precomputations
 from ..io.animation_paths import animated_paths
 from . import events, originals, precompute_watch, precomputing, session
@@ -60,12 +60,13 @@ def close_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None
     """Called last, and open_gate() first, so that other add-ons meet no modifier that Sinew suspends."""
     if is_rendering_in_window():
         return
+    is_playing = is_playing_in_window() and not current.is_rendering
     with reaction() as may_react, contextlib.suppress(ReferenceError):
         for obj in current.objects or () if may_react and not current.is_saving else ():
             state = session.state_of(obj)
             # What its Armature modifiers deform is not evaluated again for Sinew.
             if state is not None and state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
-                current.gate.suspend(obj, current.is_rendering)
+                current.gate.suspend(obj, is_playing)
 
 
 @persistent

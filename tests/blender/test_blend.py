@@ -496,7 +496,10 @@ def test_the_command_writes_a_copy(walking, tmp_path):
     keys = ["--weights-at", 0.75, 1, 0, "--weights-at", 0.5, 0, 1, "--weights-at", 0.25, 1, 0]
     options = ["--actions", "WALK", "RUN", "--cycles", 8, "--smooth", *keys, "--out", out, "--overwrite"]
     # Two walks, a run and a walk in half their motion, and two walks again: 20 and 30 frames a cycle.
-    assert "Blend WALK RUN: 181 frames, no cycle, carried by hips" in run_sinew("blend", walking, *options).stdout
+    assert (
+        "Blend WALK RUN: 181 frames, no cycle, carried by hips"
+        in run_sinew("blend", walking, *options).stdout
+    )
 
 
 def test_the_command_measures(walking):

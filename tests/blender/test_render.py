@@ -201,12 +201,10 @@ def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered
     assert np.abs(got - expected).mean() < 3e-4
 
 
-@pytest.mark.parametrize("what", ["after the update", "compared"])
-def test_keys_of_shape_keys_are_rendered(tmp_path, monkeypatch, what):
-    """Of a mesh that Sinew deforms after the update, or whose copies it does."""
+@pytest.fixture(params=["after the update", "compared"])
+def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
+    """An arm with a keyed shape key, and what puts Sinew on it, deforming it or its copies after the update."""
     obj, _armature = scenes.make_arm()
-    scene = bpy.context.scene
-    prepare(scene, motion_blur=False)
     obj.shape_key_add(name="Basis")
     key = obj.shape_key_add(name="Key")
     for point in key.data[: len(key.data) // 2]:
@@ -214,24 +212,44 @@ def test_keys_of_shape_keys_are_rendered(tmp_path, monkeypatch, what):
     for frame, value in ((5, 0.0), (9, 1.0)):
         key.value = value
         key.keyframe_insert("value", frame=frame)
-    scene.frame_set(11)
+    monkeypatch.setattr(small_meshes, "is_used", request.param == "compared")
 
-    def change() -> None:
-        if what == "compared":
+    def add() -> None:
+        if not properties.has_sinew(obj):
+            scenes.add_sinew(obj, "lbs")
+        if request.param == "compared":
             bpy.ops.sinew.compare(methods={"qv"})
             for copy in filter(properties.is_copy, bpy.data.objects):
                 # It is rendered, but not seen.
                 copy.location.z -= 100.0
-        # Two changes of frame: from then on Sinew knows that they reshape it.
-        scene.frame_set(10)
-        scene.frame_set(11)
+        # From the second change of frame on Sinew knows that they reshape it.
+        for frame in (9, 10, 11):
+            bpy.context.scene.frame_set(frame)
 
-    monkeypatch.setattr(small_meshes, "is_used", what == "compared")
-    safe_mode.set_forced(what == "after the update" or None)
-    got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7), change)
+    safe_mode.set_forced(request.param == "after the update" or None)
+    yield obj, add
     safe_mode.set_forced(None)
+
+
+def test_keys_of_shape_keys_are_rendered(tmp_path, keyed):
+    obj, add = keyed
+    prepare(bpy.context.scene, motion_blur=False)
+    got, expected = with_and_without(tmp_path, obj, "lbs", (5, 7), add)
     assert np.abs(expected[0] - expected[2]).mean() > 0.002, "nothing moves: nothing is tested"
     assert np.abs(got - expected).mean() < 3e-4
+
+
+def test_keys_of_shape_keys_are_exported(tmp_path, keyed):
+    """An exporter has an evaluation of its own, as a render has, and says nothing of it."""
+    obj, add = keyed
+    add()
+    name, path, frames = obj.name, tmp_path / "arm.abc", [5, 7, 9]
+    bpy.ops.wm.alembic_export(filepath=str(path), start=5, end=9)
+    expected = scenes.shapes(obj, frames)
+    assert scenes.worst(expected[0], expected[1]) > 0.1
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.alembic_import(filepath=str(path))
+    assert scenes.worst(scenes.shapes(bpy.data.objects[name], frames), expected) <= 1e-6
 
 
 def test_keys_of_settings_and_of_modifiers_behind_are_rendered(tmp_path):
