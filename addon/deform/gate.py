@@ -42,8 +42,8 @@ class Gate:
         self._suspended: list[_Suspended] = []
 
     def suspend(self, obj: bpy.types.Object, is_playing: bool) -> None:
-        """is_playing: for a window that plays, whose animation Blender writes to the originals, too. Of others
-        nothing says whether they are a view, a render or an exporter."""
+        """is_playing: for a window that plays, whose animation Blender writes to the originals, too. Nothing
+        says whether another change of frame is a view's, a render's or an exporter's."""
         if not is_playing and _is_animated(obj.data):
             return
         for modifier in obj.modifiers:
@@ -70,10 +70,10 @@ _STAYING = ("location", "rotation_", "scale", "delta_", "sinew.")
 
 
 def _is_animated(mesh: bpy.types.Mesh) -> bool:
-    """Whether animation sets anything of a mesh, its shape keys or an object that has it. To set a modifier
-    of one of these objects has Blender (4.2 to 5.2) copy all of them anew, with what the originals have: in a
-    render or an exporter that of another frame."""
-    if any(curves_of(owner) for owner in (mesh, mesh.shape_keys) if owner is not None):
+    """Whether animation sets anything of an object that has the mesh, or shape keys that several have. To set
+    a modifier of one of these objects has Blender (4.2 to 5.2) copy all of them anew, with what the originals
+    have: in a render or an exporter that of another frame."""
+    users = [obj for obj in bpy.data.objects if obj.data == mesh]
+    if len(users) > 1 and any(curves_of(owner) for owner in (mesh, mesh.shape_keys) if owner is not None):
         return True
-    users = (obj for obj in bpy.data.objects if obj.data == mesh)
     return any(not path.startswith(_STAYING) for obj in users for path in animated_paths(obj))

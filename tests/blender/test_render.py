@@ -201,9 +201,9 @@ def test_animation_of_what_is_behind_and_of_those_who_share_the_mesh_is_rendered
     assert np.abs(got - expected).mean() < 3e-4
 
 
-@pytest.fixture(params=["after the update", "compared"])
+@pytest.fixture(params=["after the update", "with a modifier", "compared"])
 def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
-    """An arm with a keyed shape key, and what puts Sinew on it, deforming it or its copies after the update."""
+    """An arm with a keyed shape key, and what puts Sinew on it, deforming it or copies after the update."""
     obj, _armature = scenes.make_arm()
     obj.shape_key_add(name="Basis")
     key = obj.shape_key_add(name="Key")
@@ -212,6 +212,11 @@ def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
     for frame, value in ((5, 0.0), (9, 1.0)):
         key.value = value
         key.keyframe_insert("value", frame=frame)
+    if request.param == "with a modifier":
+        behind = obj.modifiers.new("Cast", "CAST")
+        for frame, value in ((5, 0.0), (9, 1.0)):
+            behind.factor = value
+            behind.keyframe_insert("factor", frame=frame)
     monkeypatch.setattr(small_meshes, "is_used", request.param == "compared")
 
     def add() -> None:
@@ -226,7 +231,7 @@ def keyed(request, monkeypatch) -> tuple[bpy.types.Object, Callable[[], None]]:
         for frame in (9, 10, 11):
             bpy.context.scene.frame_set(frame)
 
-    safe_mode.set_forced(request.param == "after the update" or None)
+    safe_mode.set_forced(request.param != "compared" or None)
     yield obj, add
     safe_mode.set_forced(None)
 
