@@ -384,6 +384,9 @@ def parameters(w: Walker, r: random.Random) -> str | None:
     obj, value = w.mesh(r, w.side.has_sinew), r.choice(("nlerp", "slerp"))
     if obj is None:
         return None
+    # Sinew evaluates at once, and others what was changed before along with it.
+    w.before_evaluation()
+    bpy.context.view_layer.update()
     if w.side.is_sinew:
         obj.sinew.sdef.interpolation = value
     else:
