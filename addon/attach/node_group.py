@@ -29,6 +29,9 @@ MISSING = (
     "Armature modifier shows the nearest shape that Blender has."
 )
 
+# These name an object, or an attribute.
+_HELPER_INPUTS = ("Points", "Front")
+
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
 IN_RENDERS_SOCKET = (
     "NodeSocketBool",
@@ -89,6 +92,12 @@ def get_input(modifier: bpy.types.Modifier, name: str) -> object:
     if hasattr(modifier, "properties"):
         return getattr(modifier.properties.inputs, identifier).value
     return modifier.get(identifier)
+
+
+def forget_helpers(modifier: bpy.types.Modifier) -> None:
+    """Its inputs name no object."""
+    named = [n for n in _HELPER_INPUTS if isinstance(get_input(modifier, n), bpy.types.Object)]
+    set_inputs(modifier, dict.fromkeys(named))
 
 
 def input_path(modifier: bpy.types.Modifier, name: str) -> str:

@@ -13,12 +13,13 @@ import bpy
 import numpy as np
 
 from ..io import mesh_io
-from . import properties
+from . import properties, references
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object:
     settings = properties.of(obj)
     if settings.point_buffer is None or settings.point_buffer.library is not None:
+        references.note(obj)
         name = f"{obj.name} Sinew points"
         settings.point_buffer = bpy.data.objects.new(name, bpy.data.meshes.new(name))
         properties.of(settings.point_buffer).helper = True

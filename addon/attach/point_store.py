@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ..io import mesh_io
-from . import node_group, point_buffer, pose_driver, properties, stack, upstream_proxy
+from . import node_group, point_buffer, pose_driver, properties, references, stack, upstream_proxy
 from .subscribers import subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = "sinew_points", "sinew_normals"
@@ -50,6 +50,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
     if nodes.node_group != group:
         # It can be on an input that another group does not have.
         pose_driver.remove(obj)
+        references.note(obj)
         nodes.node_group = group
         node_group.remove_unused()
     node_group.set_inputs(nodes, {**inputs, node_group.PRESENT: True})
@@ -160,6 +161,18 @@ def remove(obj: bpy.types.Object) -> None:
     upstream_proxy.remove(obj)
     point_buffer.remove(obj)
     remove_point_attributes(obj)
+
+
+def let_go(obj: bpy.types.Object) -> None:
+    """The object refers to nothing that Sinew made (references.py); ensure() gives it all of that again."""
+    settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
+    pose_driver.remove(obj)
+    settings.point_buffer = settings.upstream_proxy = None
+    settings.upstream_signature = ""
+    if nodes is not None and nodes.node_group is not None:
+        node_group.forget_helpers(nodes)
+        settings.modifier_name = nodes.name
+        nodes.node_group = None
 
 
 def unshare(objects: list[bpy.types.Object]) -> None:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import node_group, properties, stack
+from . import node_group, properties, references, stack
 
 PATH = "sinew.pose"
 # What the last two variables read.
@@ -76,6 +76,7 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         if curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)
+    references.note(obj)
     curve = obj.driver_add(path)
     # Whatever the variables are, the value is 0: so no frame changes the input. By an assignment Blender
     # would also evaluate the object's keys, and take back what was moved without a key.

@@ -269,6 +269,10 @@ class SinewSettings(bpy.types.PropertyGroup):
         description="Read by pose_driver's driver, to ask for points",
     )
     error: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    modifier_name: bpy.props.StringProperty(
+        description="How Sinew's modifier was called when it had to let go of its node group",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
     # Files have had the names above since the first version: code has these.
 

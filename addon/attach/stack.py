@@ -24,8 +24,14 @@ def can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     """Sinew's own modifier; one that has lost its node group is known by its name."""
     nodes = [m for m in obj.modifiers if m.type == "NODES"]
-    lost = (m for m in nodes if m.node_group is None and m.name.startswith("Sinew"))
+    lost = (m for m in nodes if m.node_group is None and _is_name_of_ours(obj, m.name))
     return next((m for m in nodes if node_group.is_sinew(m)), None) or next(lost, None)
+
+
+def _is_name_of_ours(obj: bpy.types.Object, name: str) -> bool:
+    return name.startswith("Sinew") or (
+        properties.has_sinew(obj) and properties.of(obj).modifier_name == name
+    )
 
 
 def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:

@@ -11,7 +11,7 @@ import bpy
 
 from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
-from . import properties, stack
+from . import properties, references, stack
 
 # A copy would run a simulation of its own, with a cache of its own.
 SIMULATIONS = {
@@ -85,6 +85,7 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         or settings.upstream_signature != wanted
     ):
         # Before the old one goes: at its address, Blender would take the new one for evaluated already.
+        references.note(obj)
         made = _make(obj)
         remove(obj)
         settings.upstream_proxy, settings.upstream_signature = made, wanted

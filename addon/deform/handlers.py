@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import note, overrides, properties
+from ..attach import note, overrides, point_store, properties, references
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_playing_in_window, is_rendering_in_window, reaction
 from ..core.precompute import precomputations
@@ -126,12 +126,18 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
         else:
             current.missed.add(changes)
         return
-    session.update_all(depsgraph, changes)
+    with references.between_steps():
+        session.update_all(depsgraph, changes)
     before, current.waiting = current.waiting, session.waiting()
     # What handlers change Blender evaluates without telling of it. Once for each: what is in another scene
     # goes on waiting.
     if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph:
         _keep_evaluated_shapes(changes)
+        _refresh()
+
+
+def _refresh() -> None:
+    with references.between_steps():
         session.refresh(bpy.context)
 
 
@@ -206,12 +212,12 @@ def check_unannounced() -> float:
     """What Blender evaluates without telling anybody, in a window is seen to a moment later: what another
     add-on's handler changed behind Sinew's, and a view layer that is shown for the first time."""
     if any(state.evaluation.changed_unannounced for _obj, state in current.pairs):
-        session.refresh(bpy.context)
+        _refresh()
     if session.needs_first_evaluations():
         for window in bpy.context.window_manager.windows:
             if session.identity_of_layer(window.scene, window.view_layer) not in current.view_layers:
                 with bpy.context.temp_override(window=window):
-                    session.refresh(bpy.context)
+                    _refresh()
     return 0.25
 
 
@@ -222,6 +228,15 @@ def check_unannounced() -> float:
 def before_loading(*_args: object) -> None:
     precomputing.end()
     on_data_replaced()
+
+
+@persistent
+def before_undo(*_args: object) -> None:
+    on_data_replaced()
+    with reaction():
+        for obj in filter(properties.has_sinew, references.noted()):
+            point_store.let_go(obj)
+        references.forget()
 
 
 @persistent
@@ -236,6 +251,8 @@ def on_data_replaced(*_args: object) -> None:
 def on_loaded(*_args: object) -> None:
     with reaction():
         session.forget()
+        # Its first step of undo comes after this.
+        references.forget()
         overrides.take_back()
         note.remove()
         if not session.objects_with_sinew(Changes()):
@@ -273,7 +290,8 @@ def on_saved(*_args: object) -> None:
     with reaction() as may_react:
         if may_react and current.is_saving:
             current.is_saving = False
-            session.resume_after_save(bpy.context)
+            with references.between_steps():
+                session.resume_after_save(bpy.context)
 
 
 def begin_export() -> None:
@@ -319,7 +337,7 @@ def _after_render() -> float | None:
     must_refresh = current.must_refresh or any(state.needs_apply for state in current.skinned.values())
     current.must_refresh = False
     if must_refresh:
-        session.refresh(bpy.context)
+        _refresh()
     return None
 
 
@@ -331,9 +349,9 @@ events.GATE_HANDLERS.update(frame_change_pre=close_gate, frame_change_post=open_
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_depsgraph_update,
-    "undo_pre": on_data_replaced,
+    "undo_pre": before_undo,
     "undo_post": on_data_replaced,
-    "redo_pre": on_data_replaced,
+    "redo_pre": before_undo,
     "redo_post": on_data_replaced,
     "load_pre": before_loading,
     "load_post": on_loaded,

@@ -224,9 +224,8 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
     settings.attribute = ""
     # Blender 5.2 goes on counting them as used by a modifier that is removed.
     nodes = stack.sinew_modifier(copy)
-    for name in ("Points", "Front") if nodes is not None else ():
-        if isinstance(node_group.get_input(nodes, name), bpy.types.Object):
-            node_group.set_inputs(nodes, {name: None})
+    if nodes is not None:
+        node_group.forget_helpers(nodes)
     attach.take_off(copy)
 
 

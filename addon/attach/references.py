@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which objects Sinew had refer to something between two of Blender's steps of undo.
+
+Where an object is the same in two steps, undo keeps it as it is in memory. What Sinew made for it since the
+last step (a helper, a node group) is in neither of them and gone afterwards: Blender would read freed memory
+(seen on 4.2 to 5.2). So point_store.let_go() comes before undo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+
+# The session_uid of each.
+_noted: set[int] = set()
+_is_between_steps = False
+
+
+@contextmanager
+def between_steps() -> Iterator[None]:
+    """For what handlers and timers do. Of what operators and the panel do Blender makes a step."""
+    global _is_between_steps
+    _is_between_steps = True
+    try:
+        yield
+    finally:
+        _is_between_steps = False
+
+
+def note(obj: bpy.types.Object) -> None:
+    """The object is about to refer to something else."""
+    if _is_between_steps:
+        _noted.add(obj.session_uid)
+
+
+def noted() -> list[bpy.types.Object]:
+    return [obj for obj in bpy.data.objects if obj.session_uid in _noted] if _noted else []
+
+
+def forget() -> None:
+    _noted.clear()

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Undo and redo of what Sinew reacted to after Blender had made its step: Blender keeps an object that is the
+same in both steps, and with it what the object refers to. A test that fails here mostly ends the process."""
+
+import bpy
+import pytest
+import routes
+import scenes
+from sinew_addon.attach import properties, stack
+
+
+@pytest.fixture(autouse=True)
+def released():
+    yield
+    routes.release()
+
+
+def _two_characters():
+    """An arm with Sinew and shape keys, and a cube beside it; both selected, the cube active."""
+    obj, _armature = scenes.make_arm()
+    obj.shape_key_add()
+    obj.shape_key_add()
+    obj.data.shape_keys.eval_time = 0.0
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(7)
+    bpy.ops.mesh.primitive_cube_add()
+    obj.select_set(True)
+    # Two steps in which the arm is the same.
+    for name in ("first", "second"):
+        bpy.ops.ed.undo_push(message=name)
+    return obj
+
+
+def _link_data():
+    """The cube gets the arm's mesh, so that Sinew has to keep the arm's points elsewhere."""
+    arm, cube = bpy.data.objects["Arm"], bpy.data.objects["Cube"]
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.ed.undo_push(message="active")
+    bpy.ops.ed.undo_push(message="active")
+    with bpy.context.temp_override(active_object=arm, object=arm, selected_editable_objects=[cube, arm]):
+        bpy.ops.object.make_links_data("EXEC_DEFAULT", True, type="OBDATA")
+    assert cube.data == arm.data
+    assert properties.of(arm).point_buffer is not None
+
+
+def _make_keys_absolute():
+    """Blender's keys are then no longer what Sinew deforms by itself: it has a proxy in front."""
+    path = 'scene.objects["Arm"].data.shape_keys.use_relative'
+    bpy.ops.wm.context_toggle("EXEC_DEFAULT", True, data_path=path)
+    arm = bpy.data.objects["Arm"]
+    assert not arm.data.shape_keys.use_relative
+    assert properties.of(arm).upstream_proxy is not None
+
+
+def _helpers():
+    return [obj for obj in bpy.data.objects if properties.is_helper(obj)]
+
+
+@pytest.mark.parametrize("name", ["Sinew", "Skin"])
+@pytest.mark.parametrize("change", [_link_data, _make_keys_absolute])
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_undo_of_what_sinew_reacted_to_after_the_step(route, change, name):
+    routes.force(route)
+    arm = _two_characters()
+    stack.sinew_modifier(arm).name = name
+    bpy.ops.ed.undo_push(message="named")
+    expected = scenes.final_points(arm)
+    change()
+    changed = scenes.final_points(arm)
+    for _time in range(3):
+        bpy.ops.ed.undo()
+        arm = bpy.data.objects["Arm"]
+        assert scenes.worst(scenes.final_points(arm), expected) < 1e-6
+        assert properties.has_sinew(arm)
+        assert stack.sinew_modifier(arm).name == name
+        bpy.ops.ed.redo()
+        arm = bpy.data.objects["Arm"]
+        assert scenes.worst(scenes.final_points(arm), changed) < 1e-6
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    assert scenes.worst(scenes.final_points(bpy.data.objects["Arm"]), expected) < 1e-6
