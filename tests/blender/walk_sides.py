@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import logging
 import time
+import zlib
 from pathlib import Path
 
 import bpy
@@ -643,8 +644,10 @@ class SinewSide:
         character = bpy.context.scene.sinew_character
         # As Blender writes presets.
         lines = [f"{path} = {eval(path, {'character': character})!r}" for path in presets.PATHS]
-        path = folder / "preset.py"
-        path.write_text("\n".join(["import bpy", *presets.DEFINES, *lines]))
+        text = "\n".join(["import bpy", *presets.DEFINES, *lines])
+        # Another file for each text: Blender keeps one compiled, by its size and second.
+        path = folder / f"preset {zlib.crc32(text.encode())}.py"
+        path.write_text(text)
         bpy.ops.sinew.method_preset(filepath=str(path))
         for obj in followers[1:]:
             self.set_stages(obj, stages)
