@@ -11,6 +11,7 @@ import bpy
 from ..attach.subscribers import notify, subscribers
 from ..core.precompute import precomputations
 from . import precomputing, session
+from .plan import State
 from .session import current
 from .skinned_object import SkinnedObject
 
@@ -48,7 +49,8 @@ def look() -> float | None:
 
 def _see_to_outdated(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
     depsgraph = bpy.context.view_layer.depsgraph
-    if depsgraph is None:
+    # While an object is off, nothing of it is read that its data could be made from.
+    if depsgraph is None or skinned.plan.state is State.OFF:
         return False
     before = 0.0 if _is_painting() else time.monotonic() - PAUSE
     return precomputing.request_outdated(obj, skinned, depsgraph, before)

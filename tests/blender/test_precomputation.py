@@ -320,6 +320,26 @@ def test_outdated_centres_of_a_mesh_whose_triangles_are_no_longer_read_are_not_a
     assert after.is_ready("cor")
 
 
+def test_an_object_that_is_off_has_nothing_to_wait_for(gate):
+    """Its triangles are not read, so that its centres can not be made anew."""
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "cor")
+    obj.sinew.method = "qv"
+    move_weights(obj)
+    obj.sinew.enabled = False
+    obj.sinew.method = "cor"
+    bpy.context.view_layer.update()
+    precomputations.waits = False
+    time.sleep(precompute_watch.PAUSE)
+    look_until_done()
+    assert gate.count == 1
+    obj.sinew.enabled = True
+    time.sleep(precompute_watch.PAUSE)
+    look_until_done()
+    assert gate.count == 2
+
+
 def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():
     obj, _armature = scenes.make_arm(bones=3)
     edited = bmesh.new()
