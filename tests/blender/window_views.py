@@ -7,7 +7,22 @@ from collections.abc import Callable
 
 import bpy
 import window
-from window_hand import FOLDER, SCENE, SECOND, Run, Steps, choose, click, hero, press, push, rig, step, wait
+from window_hand import (
+    FOLDER,
+    SCENE,
+    SECOND,
+    Run,
+    Steps,
+    choose,
+    click,
+    execute,
+    hero,
+    press,
+    push,
+    rig,
+    step,
+    wait,
+)
 from window_scene import pose
 
 
@@ -120,6 +135,30 @@ def undo_while_it_plays(run: Run) -> Steps:
     yield from wait()
     run.check_shapes("undone while it played")
     yield from run.check_frames()
+
+
+@step("undo")
+def mesh_that_another_object_gets(run: Run) -> Steps:
+    """From then on Sinew keeps Hero's points elsewhere, which it does after the step of undo."""
+    with window.in_view3d("WINDOW"):
+        bpy.ops.mesh.primitive_cube_add("EXEC_DEFAULT", True, size=0.1, location=(0.0, 0.0, 1.0))
+    choose("Hero", bpy.context.window_manager.windows[0].view_layer.objects.active.name)
+    push("Selected")
+    push("The same again")
+    execute("object.make_links_data", type="OBDATA")
+    yield from wait()
+    run.check_shapes("its mesh is another's too")
+    for turn in range(2):
+        press("Z", ctrl=True)
+        yield from wait(4)
+        run.check_shapes(f"undone, turn {turn}")
+        press("Z", ctrl=True, shift=True)
+        yield from wait(4)
+        run.check_shapes(f"redone, turn {turn}")
+    for _time in range(4):
+        press("Z", ctrl=True)
+        yield from wait(4)
+        run.check_shapes("undone to the beginning")
 
 
 @step("undo")
