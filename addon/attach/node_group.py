@@ -29,7 +29,7 @@ MISSING = (
     "Armature modifier shows the nearest shape that Blender has."
 )
 
-# These name an object, or an attribute.
+# The inputs that name a helper, or where there is none, an attribute.
 _HELPER_INPUTS = ("Points", "Front")
 
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")

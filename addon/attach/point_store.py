@@ -167,12 +167,16 @@ def let_go(obj: bpy.types.Object) -> None:
     """The object refers to nothing that Sinew made (references.py); ensure() gives it all of that again."""
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
     pose_driver.remove(obj)
-    settings.point_buffer = settings.upstream_proxy = None
-    settings.upstream_signature = ""
+    _forget_helpers(settings)
     if nodes is not None and nodes.node_group is not None:
         node_group.forget_helpers(nodes)
         settings.modifier_name = nodes.name
         nodes.node_group = None
+
+
+def _forget_helpers(settings: properties.SinewSettings) -> None:
+    settings.point_buffer = settings.upstream_proxy = None
+    settings.upstream_signature = ""
 
 
 def unshare(objects: list[bpy.types.Object]) -> None:
@@ -187,8 +191,7 @@ def unshare(objects: list[bpy.types.Object]) -> None:
             if helper is not None
         }
         if used & taken and obj.is_editable:
-            settings.point_buffer = settings.upstream_proxy = None
-            settings.upstream_signature = ""
+            _forget_helpers(settings)
         taken |= used
 
 

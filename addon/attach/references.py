@@ -22,11 +22,11 @@ _is_between_steps = False
 def between_steps() -> Iterator[None]:
     """For what handlers and timers do. Of what operators and the panel do Blender makes a step."""
     global _is_between_steps
-    _is_between_steps = True
+    before, _is_between_steps = _is_between_steps, True
     try:
         yield
     finally:
-        _is_between_steps = False
+        _is_between_steps = before
 
 
 def note(obj: bpy.types.Object) -> None:

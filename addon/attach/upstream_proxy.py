@@ -84,8 +84,8 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         or settings.upstream_proxy.data != obj.data
         or settings.upstream_signature != wanted
     ):
-        # Before the old one goes: at its address, Blender would take the new one for evaluated already.
         references.note(obj)
+        # Before the old one goes: at its address, Blender would take the new one for evaluated already.
         made = _make(obj)
         remove(obj)
         settings.upstream_proxy, settings.upstream_signature = made, wanted

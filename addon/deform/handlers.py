@@ -133,12 +133,7 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     # goes on waiting.
     if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph:
         _keep_evaluated_shapes(changes)
-        _refresh()
-
-
-def _refresh() -> None:
-    with references.between_steps():
-        session.refresh(bpy.context)
+        session.refresh_between_steps(bpy.context)
 
 
 def _keep_evaluated_shapes(changes: Changes) -> None:
@@ -212,12 +207,12 @@ def check_unannounced() -> float:
     """What Blender evaluates without telling anybody, in a window is seen to a moment later: what another
     add-on's handler changed behind Sinew's, and a view layer that is shown for the first time."""
     if any(state.evaluation.changed_unannounced for _obj, state in current.pairs):
-        _refresh()
+        session.refresh_between_steps(bpy.context)
     if session.needs_first_evaluations():
         for window in bpy.context.window_manager.windows:
             if session.identity_of_layer(window.scene, window.view_layer) not in current.view_layers:
                 with bpy.context.temp_override(window=window):
-                    _refresh()
+                    session.refresh_between_steps(bpy.context)
     return 0.25
 
 
@@ -337,7 +332,7 @@ def _after_render() -> float | None:
     must_refresh = current.must_refresh or any(state.needs_apply for state in current.skinned.values())
     current.must_refresh = False
     if must_refresh:
-        _refresh()
+        session.refresh_between_steps(bpy.context)
     return None
 
 

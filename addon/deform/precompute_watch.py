@@ -42,7 +42,7 @@ def look() -> float | None:
             # Deleted since the objects were listed.
             continue
     if has_ended:
-        session.refresh(bpy.context)
+        session.refresh_between_steps(bpy.context)
     notify(subscribers.precomputation_shown)
     return SECONDS if is_outdated or precomputations.running else None
 

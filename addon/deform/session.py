@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ..attach import attach, normals, note, orphans, overrides, point_store, properties, stack
+from ..attach import attach, normals, note, orphans, overrides, point_store, properties, references, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
@@ -166,6 +166,12 @@ def refresh(context: bpy.types.Context) -> None:
             # Where nothing waits, only what was just changed is new: that needs no other reaction now.
             with contextlib.nullcontext() if waiting() else updates_suspended():
                 context.view_layer.update()
+
+
+def refresh_between_steps(context: bpy.types.Context) -> None:
+    """refresh() for handlers and timers: Blender makes no step of undo of what they do."""
+    with references.between_steps():
+        refresh(context)
 
 
 @contextlib.contextmanager

@@ -15,12 +15,11 @@ def released():
     routes.release()
 
 
-def _two_characters():
+def _arm_beside_cube():
     """An arm with Sinew and shape keys, and a cube beside it; both selected, the cube active."""
     obj, _armature = scenes.make_arm()
     obj.shape_key_add()
     obj.shape_key_add()
-    obj.data.shape_keys.eval_time = 0.0
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(7)
     bpy.ops.mesh.primitive_cube_add()
@@ -52,16 +51,12 @@ def _make_keys_absolute():
     assert properties.of(arm).upstream_proxy is not None
 
 
-def _helpers():
-    return [obj for obj in bpy.data.objects if properties.is_helper(obj)]
-
-
 @pytest.mark.parametrize("name", ["Sinew", "Skin"])
 @pytest.mark.parametrize("change", [_link_data, _make_keys_absolute])
 @pytest.mark.parametrize("route", routes.ROUTES)
 def test_undo_of_what_sinew_reacted_to_after_the_step(route, change, name):
     routes.force(route)
-    arm = _two_characters()
+    arm = _arm_beside_cube()
     stack.sinew_modifier(arm).name = name
     bpy.ops.ed.undo_push(message="named")
     expected = scenes.final_points(arm)

@@ -137,6 +137,16 @@ def undo_while_it_plays(run: Run) -> Steps:
     yield from run.check_frames()
 
 
+def _undo_and_redo_twice(run: Run, ticks_after_redo: int = 4) -> Steps:
+    for turn in range(2):
+        press("Z", ctrl=True)
+        yield from wait(4)
+        run.check_shapes(f"undone, turn {turn}")
+        press("Z", ctrl=True, shift=True)
+        yield from wait(ticks_after_redo)
+        run.check_shapes(f"redone, turn {turn}")
+
+
 @step("undo")
 def mesh_that_another_object_gets(run: Run) -> Steps:
     """From then on Sinew keeps Hero's points elsewhere, which it does after the step of undo."""
@@ -148,13 +158,7 @@ def mesh_that_another_object_gets(run: Run) -> Steps:
     execute("object.make_links_data", type="OBDATA")
     yield from wait()
     run.check_shapes("its mesh is another's too")
-    for turn in range(2):
-        press("Z", ctrl=True)
-        yield from wait(4)
-        run.check_shapes(f"undone, turn {turn}")
-        press("Z", ctrl=True, shift=True)
-        yield from wait(4)
-        run.check_shapes(f"redone, turn {turn}")
+    yield from _undo_and_redo_twice(run)
     for _time in range(4):
         press("Z", ctrl=True)
         yield from wait(4)
@@ -167,14 +171,8 @@ def scene_that_redo_brings_back(run: Run) -> Steps:
     click("scene.new", type="LINK_COPY")
     yield from wait()
     run.check_shapes("in a copy of the scene")
-    for turn in range(2):
-        press("Z", ctrl=True)
-        yield from wait(4)
-        run.check_shapes(f"undone, turn {turn}")
-        press("Z", ctrl=True, shift=True)
-        # Sinew looks four times a second.
-        yield from wait(20)
-        run.check_shapes(f"redone, turn {turn}")
+    # Sinew looks four times a second.
+    yield from _undo_and_redo_twice(run, ticks_after_redo=20)
     press("Z", ctrl=True)
     yield from wait(4)
 
