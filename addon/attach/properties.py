@@ -247,6 +247,7 @@ class SinewSettings(bpy.types.PropertyGroup):
     helper: bpy.props.BoolProperty(
         description="Made by Sinew for another object", options={"HIDDEN"}, override=OVERRIDABLE
     )
+    token: bpy.props.StringProperty(description="Tells an upstream proxy from all others", options={"HIDDEN"})
     copied: bpy.props.PointerProperty(
         description="The object that this one is a comparison's copy of",
         type=bpy.types.Object,

@@ -7,6 +7,8 @@ so Blender evaluates it along with the object, and its evaluated mesh is what Si
 
 from __future__ import annotations
 
+import uuid
+
 import bpy
 
 from ..core.errors import SinewError
@@ -85,11 +87,8 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         or settings.upstream_signature != wanted
     ):
         references.note(obj)
-        # Before the old one goes: at its address, Blender would take the new one for evaluated already.
-        made = _make(obj)
         remove(obj)
-        settings.upstream_proxy, settings.upstream_signature = made, wanted
-        made.name = f"{obj.name} Sinew front"
+        settings.upstream_proxy, settings.upstream_signature = _make(obj), wanted
     return settings.upstream_proxy
 
 
@@ -107,8 +106,11 @@ def is_proxy(helper: bpy.types.Object) -> bool:
 
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
     """The mesh that comes to the Armature modifier; None as long as Blender has not evaluated it."""
-    evaluated = properties.of(obj).upstream_proxy.evaluated_get(depsgraph)
-    if not evaluated.is_evaluated:
+    proxy = properties.of(obj).upstream_proxy
+    evaluated = proxy.evaluated_get(depsgraph)
+    # Just made at the address of an object that was deleted, it has Blender give out what that was.
+    is_other = not isinstance(evaluated, bpy.types.Object) or evaluated.sinew.token != proxy.sinew.token
+    if is_other or not evaluated.is_evaluated:
         return None
     # Of what is hidden Blender may need the position alone, as a constraint's target: then the modifiers in
     # front are not evaluated, and the mesh is the one that they would have been given.
@@ -127,8 +129,9 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
+    copy.name = f"{obj.name} Sinew front"
     properties.clear(copy)
-    properties.of(copy).helper = True
+    properties.of(copy).helper, properties.of(copy).token = True, uuid.uuid4().hex
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)

@@ -117,7 +117,17 @@ def test_all_that_a_mesh_is_set_to_is_set_for_a_character():
         *("enabled", "heat", "error", "is_own"),
         *("stand_ins", "standing_in", "is_saved", "replaced_smooth", "parent_type", "attribute"),
         *("normals_attribute", "carrier", "modifier_name"),
-        *("front", "front_signature", "helper", "copied", "copied_for", "had_animation", "pose", "asked"),
+        *(
+            "front",
+            "front_signature",
+            "helper",
+            "token",
+            "copied",
+            "copied_for",
+            "had_animation",
+            "pose",
+            "asked",
+        ),
     }
     names = set(properties.SinewSettings.bl_rna.properties.keys()) - ours - {"rna_type", "name"}
     assert names == set(character.SinewCharacter.bl_rna.properties.keys()) - {

@@ -300,6 +300,40 @@ def test_other_meshes_keep_their_shape_while_one_waits(at_a_frame, route):
         routes.release()
 
 
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_what_is_made_at_the_address_of_a_deleted_object(route):
+    """Blender finds evaluated objects by the addresses of their originals: it would give out the other's."""
+    routes.force(route)
+    try:
+        obj, _armature = scenes.make_arm()
+        scenes.add_sinew(obj)
+        bpy.context.scene.frame_set(8)
+        mesh = bpy.data.meshes.new_from_object(obj)
+        others = [bpy.data.objects.new("Other", mesh) for _each in range(50)]
+        for other in others:
+            bpy.context.scene.collection.objects.link(other)
+        bpy.context.view_layer.update()
+        addresses = {other.as_pointer() for other in others}
+
+        def delete(_scene, _depsgraph):
+            while others:
+                bpy.data.objects.remove(others.pop())
+
+        # As another add-on's, ahead of Sinew's.
+        bpy.app.handlers.depsgraph_update_post.insert(0, delete)
+        subdivided(obj)
+        bpy.context.view_layer.update()
+        bpy.app.handlers.depsgraph_update_post.remove(delete)
+        assert properties.of(obj).upstream_proxy.as_pointer() in addresses, "nothing is tested"
+        shown = scenes.final_points(obj)
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        assert shown.shape == expected.shape
+        assert scenes.worst(shown, expected) <= 1e-5
+    finally:
+        routes.release()
+
+
 def test_removing_leaves_the_file_as_it_was():
     obj = arm_with("SUBSURF")
     bpy.context.view_layer.update()
