@@ -156,6 +156,8 @@ class BlenderSide:
 
     def __init__(self) -> None:
         self.log: list[str] = []
+        # Which modifiers Sinew replaces, as it says, by the name of each object.
+        self.runs: dict[str, list[str]] = {}
 
     def prepare(self, safe: bool) -> None:
         pass
@@ -256,7 +258,10 @@ class BlenderSide:
 
     def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
         def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
-            return next((m.object for m in armature_modifiers(obj) if m.object is not None), None)
+            modifiers, run = armature_modifiers(obj), self.runs.get(obj.name_full, [])
+            # One that is renamed may not be known by its name yet.
+            chosen = [modifier for modifier in modifiers if modifier.name in run] or modifiers
+            return next((modifier.object for modifier in chosen if modifier.object is not None), None)
 
         return [
             obj
@@ -409,13 +414,14 @@ class BlenderSide:
         claims  by the name of each object that Sinew drives
         """
         wrong = []
+        self.runs = {name: claim["run"] for name, claim in claims.items()}
         for obj in bpy.data.objects:
             if obj.type != "MESH":
                 continue
             claim = claims.get(obj.name_full)
             if obj.library is None:
                 wrong += self._adopt(obj, claim)
-            run = claim["run"] if claim is not None else []
+            run = self.runs.get(obj.name_full, [])
             if self.is_on(obj) and self.is_method_keyed(obj):
                 continue
             on = self.has_sinew(obj) and self.is_on(obj) and not shows_own_shape_in_its_mode(obj)
