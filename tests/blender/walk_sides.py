@@ -155,7 +155,6 @@ class BlenderSide:
     is_sinew = False
 
     def __init__(self) -> None:
-        self.log: list[str] = []
         # Which modifiers Sinew replaces, as it says, by the name of each object.
         self.runs: dict[str, list[str]] = {}
 
