@@ -11,7 +11,7 @@ import scenes
 import snapshot
 from sinew_addon.attach import attach, properties
 from sinew_addon.core.errors import SinewError
-from sinew_addon.deform import safe_mode
+from sinew_addon.deform import safe_mode, session
 from test_against_armature_modifier import assert_equal_to_modifier
 
 FRAMES = [1, 4, 8, 11]
@@ -180,6 +180,39 @@ def test_weights_are_painted_where_visibility_is_animated(set_up):
         got = scenes.shapes(obj, FRAMES)
         assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     assert scenes.states_of(obj)
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+@pytest.mark.parametrize("mode", ["WEIGHT_PAINT", "VERTEX_PAINT"])
+@pytest.mark.parametrize("kinds", [("DECIMATE",), ("SUBSURF", "BEVEL")])
+def test_what_blender_leaves_out_while_painting(kinds, mode, route):
+    obj, _armature = scenes.make_arm(bones=3)
+    for kind in kinds:
+        modifier = obj.modifiers.new(kind, kind)
+        if kind == "DECIMATE":
+            modifier.ratio = 0.5
+        obj.modifiers.move(len(obj.modifiers) - 1, len(obj.modifiers) - 2)
+    bpy.ops.object.mode_set(mode=mode)
+    expected = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    expected_after = scenes.modifier_shapes(obj, FRAMES, preserve_volume=True)
+    assert expected.shape != expected_after.shape, "nothing is tested"
+    routes.force(route)
+    try:
+        scenes.add_sinew(obj, "dq")
+        bpy.ops.object.mode_set(mode=mode)
+        before = session.state_of(obj).shown.number
+        got = scenes.shapes(obj, FRAMES)
+        assert not properties.of(obj).error
+        # While weights are painted the Armature modifier is on, too, in front of Sinew's.
+        assert mode == "WEIGHT_PAINT" or routes.taken(obj, before) == route
+        assert session.state_of(obj).shown.number > before
+        assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        got = scenes.shapes(obj, FRAMES)
+        assert scenes.worst(got, expected_after) <= scenes.TOLERANCE * scenes.diagonal(obj)
+    finally:
+        routes.release()
 
 
 def test_parent_that_deforms_is_a_modifier_while_sinew_is_on():
