@@ -29,6 +29,11 @@ def between_steps() -> Iterator[None]:
         _is_between_steps = before
 
 
+def are_between_steps() -> bool:
+    """Whether what is made now is in no step of undo."""
+    return _is_between_steps
+
+
 def note(obj: bpy.types.Object) -> None:
     """The object is about to refer to something else."""
     if _is_between_steps:

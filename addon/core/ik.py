@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from sinew import affine, ik, quat, quat_vec
 
+from .errors import SinewError
+
 # What commands and the panel solve with: Blender's own limit, which dls never comes near.
 ITERATIONS = 500
 
@@ -84,7 +86,12 @@ def stack(frames: list[Posed]) -> Posed:
 
 def problem_of(tree: Tree, posed: Posed) -> Problem:
     """Of frames. As Blender's solver has it: bones rotate and keep their lengths as they are scaled; a goal
-    of less influence lies between the tip and the target, but for one with a pole, where the result does."""
+    of less influence lies between the tip and the target, but for one with a pole, where the result does.
+    Raises SinewError for mirrored bones."""
+    mirrored = (np.linalg.det(posed.bones[..., :3, :3]) < 0.0).any(axis=0)
+    if mirrored.any():
+        names = ", ".join(name for name, is_it in zip(tree.bones, mirrored, strict=True) if is_it)
+        raise SinewError(f"{names}: mirrored by a scale below 0, which no rotation undoes; make it positive")
     scales = np.linalg.norm(posed.bones[..., :3, :3], axis=-2)
     axes = _axes_of(posed.bones)
     heads = posed.bones[..., :3, 3].astype(np.float64)
@@ -192,9 +199,18 @@ def _between(a: np.ndarray, b: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def _axes_of(matrices: np.ndarray) -> np.ndarray:
-    """Columns at length 1; one of length 0 stays."""
+    """Rotations: y as it is at length 1, x square to it where it is sheared; nothing of what has no axes."""
     axes = np.asarray(matrices, dtype=np.float64)[..., :3, :3]
-    return axes / np.maximum(np.linalg.norm(axes, axis=-2, keepdims=True), 1e-30)
+    y = _unit(axes[..., 1])
+    x = _unit(axes[..., 0])
+    x = _unit(x - (x * y).sum(axis=-1, keepdims=True) * y)
+    result = np.stack([x, y, np.cross(x, y)], axis=-1)
+    has_axes = np.abs(np.linalg.det(result) - 1.0) < 1e-6
+    return np.where(has_axes[..., None, None], result, np.eye(3))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
 
 
 def _with_axes(axes: np.ndarray) -> np.ndarray:

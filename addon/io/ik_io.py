@@ -3,28 +3,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from sinew.ik import Effector
 
 from ..core.errors import SinewError
 from ..core.ik import Posed, Tree
 
+# The constraints by which bones have the pose that Sinew solved live.
+FOLLOWS = "Sinew IK"
 
-def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[Tree]:
+
+def read_trees(
+    armature: bpy.types.Object,
+    only: Collection[str] | None = None,
+    live: Mapping[str, str] = MappingProxyType({}),
+) -> list[Tree]:
     """The trees of bones that the IK constraints of an armature object pull, those nearest to the root first.
 
     Constraints whose chains begin at one bone pull one tree, as in Blender.
 
     only  trees that have one of these bones; None: all
+    live  by bone, the constraint that counts although it is muted
     Raises SinewError where a constraint asks for what Sinew does not do, and where there is no tree.
     """
     chains: dict[str, list[tuple[bpy.types.PoseBone, bpy.types.Constraint]]] = {}
     for bone in armature.pose.bones:
-        constraint = _active(bone)
+        constraint = bone.constraints.get(live[bone.name]) if bone.name in live else None
+        if constraint is None:
+            constraint = _active(bone)
         if constraint is not None:
             chains.setdefault(_chain(bone, constraint)[0].name, []).append((bone, constraint))
     trees = [_tree(armature, pairs) for pairs in chains.values()]
@@ -39,6 +51,45 @@ def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) 
     for tree in trees:
         _check(armature, tree)
     return sorted(trees, key=lambda tree: len(armature.pose.bones[tree.bones[0]].parent_recursive))
+
+
+def follows(constraint: bpy.types.Constraint) -> bool:
+    """Whether it is one by which a bone has the pose that Sinew solved live."""
+    return constraint.type == "COPY_TRANSFORMS" and constraint.name == FOLLOWS
+
+
+def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
+    """All that read_trees() reads of a tree's bones and constraints, to be compared; empty where something of
+    it is gone."""
+    found: list[object] = []
+    bones = armature.pose.bones
+    for name in tree.bones:
+        bone = bones.get(name)
+        if bone is None:
+            return ()
+        rest = bone.bone
+        found += (rest.matrix.copy(), rest.length, bone.parent.name if bone.parent else "")
+        found += [getattr(bone, setting) for setting in _BONE_SETTINGS]
+    for name, constraint_name in tree.constraints:
+        constraint = bones[name].constraints.get(constraint_name) if name in bones else None
+        if constraint is None:
+            return ()
+        for target in (constraint.target, constraint.pole_target):
+            found.append(target.name if target is not None else "")
+        found += [getattr(constraint, setting) for setting in _CONSTRAINT_SETTINGS]
+    return tuple(found)
+
+
+_BONE_SETTINGS = (
+    "ik_stretch",
+    *(f"lock_ik_{axis}" for axis in "xyz"),
+    *(f"use_ik_limit_{axis}" for axis in "xyz"),
+    *(f"ik_{bound}_{axis}" for bound in ("min", "max", "stiffness") for axis in "xyz"),
+)
+_CONSTRAINT_SETTINGS = (
+    *("type", "subtarget", "pole_subtarget", "pole_angle", "chain_count"),
+    *("use_tail", "use_location", "use_rotation", "use_stretch", "weight", "orient_weight"),
+)
 
 
 def constraints_of(armature: bpy.types.Object, tree: Tree) -> list[bpy.types.Constraint]:
@@ -70,21 +121,62 @@ def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
     not be read."""
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = armature.evaluated_get(graph)
-    bones = [evaluated.pose.bones[name] for name in tree.bones]
+    matrices = [evaluated.pose.bones[name].matrix for name in tree.bones]
+    return _posed(evaluated, tree, matrices, lambda target: target.evaluated_get(graph))
+
+
+def read_unsolved(evaluated: bpy.types.Object, tree: Tree) -> Posed:
+    """The same of an evaluated armature within Blender's evaluation, before the tree's bones are posed: from
+    their channels, as they are without constraints. What is above the tree, and targets, are evaluated."""
+    matrices: list[Matrix] = []
+    for name, parent in zip(tree.bones, tree.parents.tolist(), strict=True):
+        bone = evaluated.pose.bones[name]
+        above = {}
+        if bone.parent is not None:
+            above = {
+                "parent_matrix": matrices[parent] if parent >= 0 else bone.parent.matrix,
+                "parent_matrix_local": bone.parent.bone.matrix_local,
+            }
+        matrices.append(bone.bone.convert_local_to_pose(bone.matrix_basis, bone.bone.matrix_local, **above))
+    return _posed(evaluated, tree, matrices, lambda target: target)
+
+
+def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """float64 [frames, 4]: the quaternion that each armature-space matrix asks for, whatever the bone
+    inherits."""
+    rest = bone.bone
+    result = np.empty((len(matrices), 4))
+    for number, (matrix, parent) in enumerate(zip(matrices, parents, strict=True)):
+        above = {}
+        if bone.parent is not None:
+            above = {"parent_matrix": Matrix(parent), "parent_matrix_local": bone.parent.bone.matrix_local}
+        basis = rest.convert_local_to_pose(Matrix(matrix), rest.matrix_local, invert=True, **above)
+        result[number] = basis.to_quaternion()
+    return result
+
+
+def _posed(
+    evaluated: bpy.types.Object,
+    tree: Tree,
+    matrices: list[Matrix],
+    evaluated_of: Callable[[bpy.types.Object], bpy.types.Object],
+) -> Posed:
+    """matrices: of the tree's bones."""
     to_armature = np.array(evaluated.matrix_world.inverted_safe())
     goals, poles, influences = [], [], []
     for bone, name in tree.constraints:
         constraint = evaluated.pose.bones[bone].constraints[name]
-        goals.append(to_armature @ _target(armature, constraint.target, constraint.subtarget, graph))
+        target = evaluated_of(constraint.target)
+        goals.append(to_armature @ _target(evaluated.name, target, constraint.subtarget))
         pole = np.zeros(3)
         if constraint.pole_target is not None:
-            at = _target(armature, constraint.pole_target, constraint.pole_subtarget, graph)
-            pole = (to_armature @ at)[:3, 3]
+            target = evaluated_of(constraint.pole_target)
+            pole = (to_armature @ _target(evaluated.name, target, constraint.pole_subtarget))[:3, 3]
         poles.append(pole)
         influences.append(constraint.influence)
-    parent = bones[0].parent
+    parent = evaluated.pose.bones[tree.bones[0]].parent
     return Posed(
-        np.array([bone.matrix for bone in bones]),
+        np.array(matrices),
         np.array(parent.matrix) if parent is not None else np.eye(4),
         np.array(goals),
         np.array(poles),
@@ -174,7 +266,7 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
     own = set(tree.constraints)
     for name in tree.bones:
         for constraint in armature.pose.bones[name].constraints:
-            acts = not constraint.mute and constraint.influence > 0.0
+            acts = not constraint.mute and constraint.influence > 0.0 and not follows(constraint)
             if acts and (name, constraint.name) not in own and constraint.type != "IK":
                 raise SinewError(
                     f"{armature.name}: {name} has the constraint {constraint.name} besides, which keys can "
@@ -182,17 +274,17 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
                 )
 
 
-def _target(
-    armature: bpy.types.Object, target: bpy.types.Object, part: str, graph: bpy.types.Depsgraph
-) -> np.ndarray:
-    """float64 [4, 4], in the world."""
-    evaluated = target.evaluated_get(graph)
+def _target(armature: str, evaluated: bpy.types.Object, part: str) -> np.ndarray:
+    """float64 [4, 4], in the world.
+
+    armature  the name of the object whose bones it pulls
+    """
     matrix = np.array(evaluated.matrix_world, dtype=np.float64)
-    if target.type != "ARMATURE" or not part:
+    if evaluated.type != "ARMATURE" or not part:
         return matrix
     bone = evaluated.pose.bones.get(part)
     if bone is None:
         raise SinewError(
-            f"{armature.name}: {target.name} has no bone {part!r}, an IK target; choose another one"
+            f"{armature}: {evaluated.name} has no bone {part!r}, an IK target; choose another one"
         )
     return matrix @ np.array(bone.matrix, dtype=np.float64)

@@ -34,6 +34,8 @@ _SECTIONS = {
     "bpy.types.object.sinew_inbetween*": "in-betweens",
     "bpy.types.object.sinew_blend*": "blend-actions",
     "bpy.types.sinewblend*": "blend-actions",
+    "bpy.types.sinewik*": "inverse-kinematics",
+    "bpy.types.object.sinew_ik*": "inverse-kinematics",
     "bpy.types.scene.sinew_most_influences*": "diagnostics",
     "bpy.types.sinewmeasures*": "heat-map",
     "bpy.types.sinewcomparison*": "compare",

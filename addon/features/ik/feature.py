@@ -1,16 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of inverse kinematics: classes, and what a bake remembers."""
+"""What Blender gets of inverse kinematics: classes, what a bake and live trees remember, and events."""
 
 from __future__ import annotations
 
-from . import ik_bake, ik_panel
+from . import ik_bake, ik_handlers, ik_in_depsgraph, ik_panel, ik_records
 
-CLASSES = ik_panel.CLASSES
+CLASSES = (*ik_records.CLASSES, *ik_panel.CLASSES)
 
 
 def register() -> None:
     ik_bake.register()
+    ik_records.register()
+    ik_in_depsgraph.register()
+    ik_handlers.register()
+    ik_handlers.adopt_open_file()
 
 
 def unregister() -> None:
+    ik_handlers.unregister()
+    ik_in_depsgraph.unregister()
+    ik_records.unregister()
     ik_bake.unregister()

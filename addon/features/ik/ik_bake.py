@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ...attach import properties
 from ...core import ik as core
@@ -18,6 +17,7 @@ from ...core.errors import SinewError
 from ...core.inbetween import BLENDER
 from ...deform import evaluate
 from ...io import actions, ik_io, pose_io
+from .ik_checks import check_not_switched
 
 
 class SinewIkBake(bpy.types.PropertyGroup):
@@ -65,7 +65,8 @@ def steps(
     copy of its action with keys of the bones' rotations at every frame, straight between them, and the
     constraints are muted; what has keys at other frames keeps them. Closed before the end, all is as it was.
 
-    The caller keeps the scene's frame. Raises SinewError where the armature can not be keyed.
+    The caller keeps the scene's frame, and suspends what is live (ik_live): baked, it no longer is. Raises
+    SinewError where the armature can not be keyed.
     """
     _check(armature, trees)
     record = armature.sinew_ik_bake
@@ -102,6 +103,8 @@ def steps(
             {bone.name: row for bone, row in zip(armature.pose.bones, channels.tolist(), strict=True)}
         )
     record.muted = json.dumps([*json.loads(record.muted or "[]"), *muted])
+    for bone, _name in muted:
+        armature.pose.bones[bone].property_unset("sinew_ik_live")
     earlier = record.baked
     record.is_on, record.baked = True, armature.animation_data.action
     if earlier is not None and not earlier.users:
@@ -143,19 +146,7 @@ def _check(armature: bpy.types.Object, trees: Sequence[core.Tree]) -> None:
         )
     if animation.use_tweak_mode:
         raise SinewError(f"{armature.name} is tweaking an NLA strip: leave tweak mode first (Tab)")
-    muting = set()
-    for tree in trees:
-        for bone, name in tree.constraints:
-            owner, constraint = map(bpy.utils.escape_identifier, (bone, name))
-            path = f'pose.bones["{owner}"].constraints["{constraint}"]'
-            muting |= {f"{path}.mute", f"{path}.enabled"}
-    curves = [*actions.all_curves(animation.action, actions.slot_of(animation)), *animation.drivers]
-    for curve in curves:
-        if curve.data_path in muting:
-            raise SinewError(
-                f"{armature.name}: keys or a driver switch a constraint on and off ({curve.data_path}); key "
-                "its influence instead"
-            )
+    check_not_switched(armature, trees)
 
 
 def _own_action(
@@ -197,22 +188,8 @@ def _bake(
         bone = armature.pose.bones[name]
         parent = tree.parents[number]
         before = posed.parent if parent < 0 else matrices[:, parent]
-        _write_keys(armature, name, _rotations(bone, matrices[:, number], before), frames)
+        _write_keys(armature, name, ik_io.local_rotations(bone, matrices[:, number], before), frames)
     return Baked(tree, solution, core.tip_errors(tree, problem, matrices))
-
-
-def _rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """float64 [frames, 4]: the quaternion that each armature-space matrix asks for, whatever the bone
-    inherits."""
-    rest = bone.bone
-    result = np.empty((len(matrices), 4))
-    for number, (matrix, parent) in enumerate(zip(matrices, parents, strict=True)):
-        above = {}
-        if bone.parent is not None:
-            above = {"parent_matrix": Matrix(parent), "parent_matrix_local": bone.parent.bone.matrix_local}
-        basis = rest.convert_local_to_pose(Matrix(matrix), rest.matrix_local, invert=True, **above)
-        result[number] = basis.to_quaternion()
-    return result
 
 
 def _write_keys(

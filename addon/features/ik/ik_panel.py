@@ -15,7 +15,8 @@ from ...io import ik_io
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, draw_armature, draw_text, names_text
 from ...ui.translations import tr
-from . import ik_bake
+from . import ik_bake, ik_live
+from .ik_records import live_constraints
 
 
 def _selected(armature: bpy.types.Object) -> list[str] | None:
@@ -53,10 +54,10 @@ class SINEW_OT_bake_ik(stepped.Stepped, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         armature = operators.armatures(context)[0]
-        trees = ik_io.read_trees(armature, _selected(armature))
         frames = stepped.frames_over(context.scene, [armature], self.over)
         self._found: list[ik_bake.Baked] = []
-        with stepped.kept_frame(context.scene, [armature]):
+        with ik_live.suspended(armature), stepped.kept_frame(context.scene, [armature]):
+            trees = ik_io.read_trees(armature, _selected(armature))
             yield from ik_bake.steps(armature, trees, frames, self.method, self._found)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
@@ -73,22 +74,60 @@ class SINEW_OT_bake_ik(stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SINEW_OT_remove_ik(bpy.types.Operator):
-    bl_idname = "sinew.remove_ik"
-    bl_label = "Remove Sinew IK"
-    bl_description = "Give back the action and the IK constraints that were there before the bake"
+class SINEW_OT_live_ik(bpy.types.Operator):
+    bl_idname = "sinew.live_ik"
+    bl_label = "Live"
+    bl_description = (
+        "Have Sinew solve the IK constraints of the selected bones' chains, or of all, in each evaluation, "
+        "without keys; again: have Blender solve them. The constraints are muted meanwhile, and their "
+        "settings go on counting"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(ik_bake.is_baked(armature) for armature in operators.armatures(context)):
+        if operators.armatures(context):
             return operators.can_change(cls)
-        cls.poll_message_set(tr("Nothing is baked by Sinew IK here"))
+        cls.poll_message_set(tr("Select an armature"))
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for armature in filter(ik_bake.is_baked, operators.armatures(context)):
-            ik_bake.restore(armature)
+        armature = operators.armatures(context)[0]
+        meant = _selected(armature)
+        try:
+            live = live_constraints(armature)
+            trees = ik_io.read_trees(armature, meant, live)
+            if all(_is_live(tree, live) for tree in trees):
+                ik_live.switch_off(armature, meant)
+            else:
+                ik_live.switch_on(armature, meant)
+        except SinewError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        problem = ik_live.problem_of(armature)
+        if problem:
+            self.report({"WARNING"}, tr(problem))
+        return {"FINISHED"}
+
+
+class SINEW_OT_remove_ik(bpy.types.Operator):
+    bl_idname = "sinew.remove_ik"
+    bl_label = "Remove Sinew IK"
+    bl_description = "Give back the action and the IK constraints that were there before Live and the bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if any(map(_has_sinew_ik, operators.armatures(context))):
+            return operators.can_change(cls)
+        cls.poll_message_set(tr("Nothing is live or baked by Sinew IK here"))
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for armature in filter(_has_sinew_ik, operators.armatures(context)):
+            ik_live.switch_off(armature)
+            if ik_bake.is_baked(armature):
+                ik_bake.restore(armature)
         evaluate.set_frame(context.scene, context.scene.frame_float)
         return {"FINISHED"}
 
@@ -106,18 +145,34 @@ class SINEW_PT_ik(Sidebar, bpy.types.Panel):
         armature = operators.armatures(context)[0]
         box = layout.box()
         draw_armature(box, context, armature)
+        live, problem = live_constraints(armature), ik_live.problem_of(armature)
         try:
-            trees = ik_io.read_trees(armature, _selected(armature))
+            trees = ik_io.read_trees(armature, _selected(armature), live)
         except SinewError as error:
-            draw_text(box, context, str(error), icon="INFO")
+            if not problem:
+                draw_text(box, context, str(error), icon="INFO")
             trees = []
         for tree in trees:
             text = tr("{count} bones to {names}", count=len(tree.bones), names=names_text(_tips(tree)))
+            if _is_live(tree, live) and not problem:
+                text = tr("{chain}: live", chain=text)
             draw_text(box, context, text, icon="CON_KINEMATIC")
+        if problem:
+            draw_text(box, context, problem, icon="ERROR", alert=True)
+        if trees:
+            are_live = all(_is_live(tree, live) for tree in trees)
+            layout.operator("sinew.live_ik", icon="RECORD_ON" if are_live else "RECORD_OFF", depress=are_live)
+        if live:
+            column = layout.column()
+            column.use_property_split = True
+            column.use_property_decorate = False
+            column.prop(armature.sinew_ik, "method")
+            column.prop(armature.sinew_ik, "iterations")
         if trees:
             layout.operator_menu_enum("sinew.bake_ik", "method", icon="KEYTYPE_BREAKDOWN_VEC")
         if ik_bake.is_baked(armature):
             draw_text(box, context, "Keys of Sinew IK play; its constraints are muted", icon="CHECKMARK")
+        if _has_sinew_ik(armature):
             layout.operator("sinew.remove_ik", icon="X")
 
 
@@ -125,4 +180,12 @@ def _tips(tree: core.Tree) -> list[str]:
     return [tree.bones[effector.bone] for effector in tree.effectors]
 
 
-CLASSES = (ik_bake.SinewIkBake, SINEW_OT_bake_ik, SINEW_OT_remove_ik, SINEW_PT_ik)
+def _is_live(tree: core.Tree, live: dict[str, str]) -> bool:
+    return any(bone in live for bone, _name in tree.constraints)
+
+
+def _has_sinew_ik(armature: bpy.types.Object) -> bool:
+    return ik_live.is_live(armature) or ik_bake.is_baked(armature)
+
+
+CLASSES = (ik_bake.SinewIkBake, SINEW_OT_bake_ik, SINEW_OT_live_ik, SINEW_OT_remove_ik, SINEW_PT_ik)

@@ -568,15 +568,30 @@ TEXTS = {
         "{count} Knochen mit Schlüsselbildern; die Spitzen liegen höchstens {share} einer Kettenlänge daneben"
     ),
     "Remove Sinew IK": "Sinew-IK entfernen",
-    "Give back the action and the IK constraints that were there before the bake": (
-        "Die Aktion und die IK-Zwänge zurückgeben, die vor dem Backen da waren"
+    "Give back the action and the IK constraints that were there before Live and the bake": (
+        "Die Aktion und die IK-Zwänge zurückgeben, die vor Live und dem Backen da waren"
     ),
+    "Live": "Live",
+    "Have Sinew solve the IK constraints of the selected bones' chains, or of all, in each evaluation, "
+    "without keys; again: have Blender solve them. The constraints are muted meanwhile, and their settings "
+    "go on counting": (
+        "Sinew die IK-Zwänge der Ketten der ausgewählten Knochen, oder alle, bei jeder Auswertung ohne "
+        "Schlüsselbilder lösen lassen; noch einmal: Blender sie lösen lassen. Die Zwänge sind derweil stumm, "
+        "und ihre Einstellungen zählen weiter"
+    ),
+    "{chain}: live": "{chain}: live",
+    "The most steps or sweeps of a frame; a target in reach takes a few": (
+        "Höchstens so viele Schritte oder Durchgänge je Einzelbild; ein Ziel in Reichweite braucht wenige"
+    ),
+    "The bone's IK constraint that Sinew solves live": "Der IK-Zwang des Knochens, den Sinew live löst",
+    "Whether Sinew made it for bones that follow": "Ob Sinew es für Knochen gemacht hat, die folgen",
+    "Safe mode: Blender's own constraints play": "Sicherer Modus: Blenders eigene Zwänge wirken",
     "Whether keys of Sinew IK play": "Ob Schlüsselbilder von Sinew-IK laufen",
     "The action before the bake": "Die Aktion vor dem Backen",
     "The action with the baked keys": "Die Aktion mit den gebackenen Schlüsselbildern",
     "The IK constraints that the bake muted": "Die IK-Zwänge, die das Backen stummgeschaltet hat",
     "The pose before the bake": "Die Pose vor dem Backen",
-    "Nothing is baked by Sinew IK here": "Hier ist nichts durch Sinew-IK gebacken",
+    "Nothing is live or baked by Sinew IK here": "Hier ist nichts durch Sinew-IK live oder gebacken",
     "{count} bones to {names}": "{count} Knochen bis {names}",
     "Keys of Sinew IK play; its constraints are muted": (
         "Schlüsselbilder von Sinew-IK laufen; ihre Zwänge sind stumm"

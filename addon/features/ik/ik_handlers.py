@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When what is solved live is put on and taken off: changed settings, undo, loading and saving. Nothing here
+acts at a change of frame but to say that something failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...attach import references
+from ...attach.updates import is_main_thread, is_rendering_in_window
+from ...deform import events
+from . import ik_in_depsgraph, ik_live
+
+
+def _armatures() -> Iterator[bpy.types.Object]:
+    return filter(ik_live.is_live, bpy.data.objects)
+
+
+def sync_all() -> None:
+    with references.between_steps():
+        for armature in list(_armatures()):
+            ik_live.sync(armature)
+
+
+@persistent
+def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if not depsgraph.id_type_updated("OBJECT") or not _may_change():
+        return
+    # By name: another add-on's handler may have deleted an original.
+    names = [update.id.name for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
+    with references.between_steps():
+        for name in names:
+            armature = bpy.data.objects.get(name)
+            if armature is not None and ik_live.is_live(armature):
+                ik_live.sync(armature)
+        _note_problems()
+
+
+@persistent
+def on_frame_change(*_args: object) -> None:
+    if ik_in_depsgraph.problems and _may_change():
+        with references.between_steps():
+            _note_problems()
+
+
+def _note_problems() -> None:
+    while ik_in_depsgraph.problems:
+        name, text = ik_in_depsgraph.problems.popitem()
+        armature = bpy.data.objects.get(name)
+        if armature is not None and ik_live.is_live(armature):
+            ik_live.fail(armature, text)
+
+
+def _may_change() -> bool:
+    """The thread of a render in a window reads what the main one would change."""
+    return is_main_thread() and not is_rendering_in_window() and not _State.is_saving
+
+
+class _State:
+    is_saving = False
+    # Ends what a save began.
+    out_of_the_file = ExitStack()
+
+
+@persistent
+def before_undo(*_args: object) -> None:
+    ik_live.let_go()
+
+
+@persistent
+def on_data_new(*_args: object) -> None:
+    _State.is_saving = False
+    ik_live.forget()
+    sync_all()
+
+
+@persistent
+def on_loaded(*_args: object) -> None:
+    on_data_new()
+    # Blender makes the file's first step of undo after this.
+    ik_live.note_step()
+
+
+@persistent
+def on_save(*_args: object) -> None:
+    _State.is_saving = True
+    _State.out_of_the_file.enter_context(ik_live.out_of_the_file())
+
+
+@persistent
+def on_saved(*_args: object) -> None:
+    _State.out_of_the_file.close()
+    _State.is_saving = False
+    sync_all()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": on_depsgraph_update,
+    "frame_change_post": on_frame_change,
+    "undo_pre": before_undo,
+    "redo_pre": before_undo,
+    "undo_post": on_data_new,
+    "redo_post": on_data_new,
+    "load_post": on_loaded,
+    "save_pre": on_save,
+    "save_post": on_saved,
+    "save_post_fail": on_saved,
+}
+
+
+def register() -> None:
+    events.subscribe_all(_HANDLERS)
+
+
+def adopt_open_file() -> None:
+    if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
+        on_data_new()
+
+
+def unregister() -> None:
+    events.unsubscribe_all(_HANDLERS)
+    for armature in list(_armatures()):
+        ik_live.detach(armature)
+        ik_live.remove_follower(armature)
+    ik_live.forget()

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trees of bones solved within Blender's own evaluation: a follower's driver asks for it, after all that a
+tree depends on and before the bones that follow.
+
+Blender evaluates on many threads, and for a render beside the window: only evaluated data is read and
+written. Each dependency graph has its own follower, and nothing is kept from one evaluation to the next but
+the solver of a tree, which holds no pose.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+import sinew
+
+from ...core import ik as core
+from ...core.errors import SinewError
+from ...io import ik_io
+from .ik_records import Listener, SinewIkTree, live_constraints
+
+log = logging.getLogger(__name__)
+
+# By the name of an armature object, why its trees could not be solved. Threads add to it; handlers empty it.
+problems: dict[str, str] = {}
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A tree as it was read, and all settings that it was read from."""
+
+    settings: tuple
+    tree: core.Tree
+
+
+class _Thread(threading.local):
+    """Keeps Python's state of each of Blender's threads, which takes long to make anew each time."""
+
+    def __init__(self) -> None:
+        sinew.keep_thread_state()
+        # By the names of follower and root: one of each thread, as a solver has one user at a time.
+        self.known: dict[tuple[str, str], _Known] = {}
+
+
+_thread = _Thread()
+
+
+def requested(record: SinewIkTree) -> None:
+    """Solves a tree of an evaluated follower."""
+    follower = record.id_data
+    if not follower.is_evaluated:
+        # Somebody else reads the property.
+        return
+    # Evaluated, as the follower is.
+    armature = follower.animation_data.drivers[0].driver.variables[0].targets[0].id
+    if armature is None or armature.pose is None:
+        return
+    try:
+        tree = _tree_of(follower, armature, record.name)
+    except SinewError:
+        # Changed since it was put on, which the handler of this update sees, too.
+        return
+    try:
+        _write(follower, armature, tree.bones, _solve(armature, tree))
+    except Exception as error:
+        text = str(error) if isinstance(error, SinewError) else f"{type(error).__name__}: {error}"
+        if armature.name not in problems:
+            log.error("%s: inverse kinematics is not solved live: %s", armature.name, text)
+        problems[armature.name] = text
+        _write(follower, armature, tree.bones, None)
+
+
+def _tree_of(follower: bpy.types.Object, armature: bpy.types.Object, root: str) -> core.Tree:
+    key = follower.name, root
+    known = _thread.known.get(key)
+    if known is None or known.settings != ik_io.settings_of(armature, known.tree):
+        trees = ik_io.read_trees(armature, [root], live_constraints(armature))
+        tree = next((tree for tree in trees if tree.bones[0] == root), None)
+        if tree is None:
+            raise SinewError(f"{armature.name}: no constraint pulls a chain from {root}")
+        known = _thread.known[key] = _Known(ik_io.settings_of(armature, tree), tree)
+    return known.tree
+
+
+def _solve(armature: bpy.types.Object, tree: core.Tree) -> list[np.ndarray]:
+    """Of each bone, its rotation as its channels have it."""
+    settings = armature.sinew_ik
+    posed = core.stack([ik_io.read_unsolved(armature, tree)])
+    problem = core.problem_of(tree, posed)
+    solution = core.solve(tree, problem, settings.method, settings.iterations)
+    rotations = core.blended(tree, problem, solution.rotations, posed.influences)
+    matrices = core.matrices_of(tree, problem, rotations)
+    found = []
+    for number, (name, parent) in enumerate(zip(tree.bones, tree.parents.tolist(), strict=True)):
+        before = posed.parent if parent < 0 else matrices[:, parent]
+        bone = armature.pose.bones[name]
+        found.append(ik_io.local_rotations(bone, matrices[:, number], before)[0])
+    return found
+
+
+def _write(
+    follower: bpy.types.Object,
+    armature: bpy.types.Object,
+    bones: tuple[str, ...],
+    rotations: list[np.ndarray] | None,
+) -> None:
+    """Into the follower's channels; without rotations, the bones' own. By foreach_set(), as an assignment
+    would tell Blender that a file has changed."""
+    for number, name in enumerate(bones):
+        own, channels = armature.pose.bones.get(name), follower.pose.bones.get(name)
+        if own is None or channels is None:
+            continue
+        rotation = own.matrix_basis.to_quaternion() if rotations is None else rotations[number]
+        for path, value in (
+            ("location", own.location),
+            ("rotation_quaternion", rotation),
+            ("scale", own.scale),
+        ):
+            channels.path_resolve(path, False).foreach_set(tuple(value))
+
+
+def register() -> None:
+    Listener.requested = requested
+
+
+def unregister() -> None:
+    Listener.requested = None
+    problems.clear()

@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trees of bones that Sinew solves live, in the place of Blender's IK constraints.
+
+Of an armature with such trees there is a follower: an armature object with the same bones, in no scene, as
+bones wait for other objects' bones but not for what is computed of their own channels. For each tree
+
+- a driver of the follower depends on all that the tree's pose does: its bones' own channels, what is above
+  them, targets and poles. Its last variable reads a property whose getter solves the tree (ik_in_depsgraph)
+  and writes the follower's channels;
+- each bone copies its pose from the follower's by a constraint, so children, meshes and renders see it in the
+  same evaluation;
+- Blender's constraints are muted. Their settings stay what decides.
+
+That is all of Blender's own graph: no handler acts at a change of frame. A saved file has none of it, and
+Blender's constraints play; which of them are Sinew's stays at the bones (ik_records).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+
+import bpy
+
+from ...attach import references
+from ...core import ik as core
+from ...core.errors import SinewError
+from ...deform import safe_mode
+from ...io import ik_io
+from .ik_checks import check_not_switched
+from .ik_records import live_constraints
+
+SAFE_MODE = "Safe mode: Blender's own constraints play"
+
+
+class _Session:
+    """What is known of armatures, by their session_uid."""
+
+    def __init__(self) -> None:
+        self.attached: dict[int, tuple] = {}
+        # Why constraints that are Sinew's are not solved live; until the settings change, or for good.
+        self.problems: dict[int, str] = {}
+        self.failed: set[int] = set()
+        self.suspended: set[int] = set()
+        # Whose follower was made since Blender's last step of undo, and is in none.
+        self.in_no_step: set[int] = set()
+
+
+_session = _Session()
+
+
+def is_live(armature: bpy.types.Object) -> bool:
+    """Whether it is switched on for any tree, at work or not."""
+    return armature.type == "ARMATURE" and bool(live_constraints(armature))
+
+
+def problem_of(armature: bpy.types.Object) -> str:
+    """Why Blender's constraints play where Sinew is switched on, in one sentence; else empty."""
+    if not is_live(armature):
+        return ""
+    return SAFE_MODE if safe_mode.is_on() else _session.problems.get(armature.session_uid, "")
+
+
+def switch_on(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[core.Tree]:
+    """Solves the trees of these bones live from now on, or all. Raises SinewError where that can not be."""
+    trees = ik_io.read_trees(armature, only, live_constraints(armature))
+    check(armature, trees)
+    for tree in trees:
+        for bone, name in tree.constraints:
+            armature.pose.bones[bone].sinew_ik_live = name
+    _session.failed.discard(armature.session_uid)
+    _session.attached.pop(armature.session_uid, None)
+    sync(armature)
+    return trees
+
+
+def switch_off(armature: bpy.types.Object, only: Collection[str] | None = None) -> None:
+    """Blender's constraints play again, of the trees of these bones or of all; with the last tree goes all
+    that was made for it."""
+    live = live_constraints(armature)
+    detach(armature)
+    try:
+        trees = ik_io.read_trees(armature, only)
+        meant = {bone for tree in trees for bone, _name in tree.constraints}
+    except SinewError:
+        meant = set(live)
+    for bone in live if only is None else meant.intersection(live):
+        armature.pose.bones[bone].sinew_ik_live = ""
+    if not is_live(armature):
+        remove_follower(armature)
+        armature.property_unset("sinew_ik")
+        for bone in armature.pose.bones:
+            bone.property_unset("sinew_ik_live")
+    sync(armature)
+
+
+@contextmanager
+def suspended(armature: bpy.types.Object) -> Iterator[None]:
+    """Inside, Blender's constraints play, as if nothing were live."""
+    uid = armature.session_uid
+    _session.suspended.add(uid)
+    detach(armature)
+    try:
+        yield
+    finally:
+        _session.suspended.discard(uid)
+        sync(armature)
+
+
+def forget() -> None:
+    """What was known of the file's objects."""
+    _session.attached.clear()
+    _session.problems.clear()
+    _session.failed.clear()
+
+
+def let_go() -> None:
+    """Before undo: what is in no step of it must not be referred to (references)."""
+    for armature in [obj for obj in bpy.data.objects if obj.session_uid in _session.in_no_step]:
+        detach(armature)
+        remove_follower(armature)
+    note_step()
+
+
+def note_step() -> None:
+    """All that there is will be in the next step of undo."""
+    _session.in_no_step.clear()
+
+
+def fail(armature: bpy.types.Object, text: str) -> None:
+    """It could not be solved: Blender's constraints play until it is switched on anew."""
+    _session.failed.add(armature.session_uid)
+    _session.problems[armature.session_uid] = text
+    detach(armature)
+
+
+def check(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
+    """Raises SinewError for what can not be solved live."""
+    if not armature.is_editable:
+        raise SinewError(f"{armature.name} is linked: only in its own file is inverse kinematics live")
+    if armature.override_library is not None:
+        raise SinewError(
+            f"{armature.name} is a library override, whose bones can not follow what Sinew solves; bake it "
+            "instead, or make it local (Object > Relations > Make Local)"
+        )
+    check_not_switched(armature, trees)
+    for tree in trees:
+        for constraint, (bone, _name) in zip(
+            ik_io.constraints_of(armature, tree), tree.constraints, strict=True
+        ):
+            for target, part in (
+                (constraint.target, constraint.subtarget),
+                (constraint.pole_target, constraint.pole_subtarget),
+            ):
+                wanted = armature.pose.bones.get(part) if target == armature and part else None
+                above = () if wanted is None else (wanted, *wanted.parent_recursive)
+                if any(each.name in tree.bones for each in above):
+                    raise SinewError(
+                        f"{armature.name}: {bone}'s target {part} hangs on the chain that it pulls; choose "
+                        "another one"
+                    )
+
+
+def sync(armature: bpy.types.Object) -> None:
+    """Makes an armature's constraints and its follower agree with what is switched on."""
+    uid = armature.session_uid
+    _drop_what_the_artist_switched_off(armature)
+    live = live_constraints(armature)
+    may_run = not (safe_mode.is_on() or uid in _session.failed or uid in _session.suspended)
+    if not (live and may_run and armature.is_editable):
+        detach(armature)
+        if not live:
+            _session.problems.pop(uid, None)
+        return
+    try:
+        trees = ik_io.read_trees(armature, list(live), live)
+        if _session.attached.get(uid) == _state(armature, trees):
+            return
+        check(armature, trees)
+        _attach(armature, trees)
+    except SinewError as error:
+        detach(armature)
+        _session.problems[uid] = str(error)
+        return
+    _session.problems.pop(uid, None)
+    _session.attached[uid] = _state(armature, trees)
+
+
+def detach(armature: bpy.types.Object) -> None:
+    """Blender's constraints play; the follower stays, without users."""
+    _session.attached.pop(armature.session_uid, None)
+    if armature.pose is None or not armature.is_editable:
+        return
+    followed = False
+    for bone in armature.pose.bones:
+        for constraint in [each for each in bone.constraints if ik_io.follows(each)]:
+            bone.constraints.remove(constraint)
+            followed = True
+    if followed:
+        ik_io.set_muted(armature, list(live_constraints(armature).items()), False)
+
+
+def remove_follower(armature: bpy.types.Object | None) -> None:
+    """None: those whose armature is gone."""
+    for follower in [each for each in _followers() if _followed_by(each) == armature]:
+        data = follower.data
+        bpy.data.objects.remove(follower)
+        if data is not None and not data.users:
+            bpy.data.armatures.remove(data)
+
+
+@contextmanager
+def out_of_the_file() -> Iterator[None]:
+    """Inside, Blender can save: nothing of followers is written, as neither they nor their bones have a
+    user."""
+    remove_follower(None)
+    bones = [(follower, follower.data, _followed_by(follower)) for follower in _followers()]
+    for follower, _data, armature in bones:
+        detach(armature)
+        follower.data = armature.data
+    try:
+        yield
+    finally:
+        for follower, data, _armature in bones:
+            follower.data = data
+
+
+def _drop_what_the_artist_switched_off(armature: bpy.types.Object) -> None:
+    """A constraint that is deleted, or on while Sinew solves it, or off while Sinew does not, is Blender's
+    again. One that was renamed is still meant."""
+    for bone, name in live_constraints(armature).items():
+        owner = armature.pose.bones[bone]
+        constraint = owner.constraints.get(name)
+        if constraint is None:
+            renamed = [each for each in owner.constraints if each.type == "IK" and each.mute]
+            constraint = renamed[0] if len(renamed) == 1 else None
+            owner.sinew_ik_live = constraint.name if constraint is not None else ""
+        if constraint is None:
+            continue
+        tip = owner if constraint.use_tail or owner.parent is None else owner.parent
+        if constraint.mute != any(map(ik_io.follows, tip.constraints)):
+            owner.sinew_ik_live = ""
+
+
+def _state(armature: bpy.types.Object, trees: list[core.Tree]) -> tuple:
+    """Changes with what _attach() depends on and with what it makes."""
+    state = []
+    for tree in trees:
+        bones = [armature.pose.bones[name] for name in tree.bones]
+        above = bones[0].parent
+        state.append((tree.bones, tree.constraints, above.name if above is not None else ""))
+        state += [
+            (constraint.mute, *_parts_of(constraint)) for constraint in ik_io.constraints_of(armature, tree)
+        ]
+        state += [
+            (constraint.target, constraint.subtarget, constraint.mute)
+            for bone in bones
+            for constraint in bone.constraints
+            if ik_io.follows(constraint)
+        ]
+    return tuple(state)
+
+
+def _parts_of(constraint: bpy.types.Constraint) -> tuple:
+    return (
+        constraint.target,
+        constraint.subtarget,
+        constraint.pole_target,
+        constraint.pole_subtarget,
+    )
+
+
+def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
+    detach(armature)
+    names = {name for tree in trees for name in tree.bones}
+    follower = _follower_of(armature, names)
+    follower.animation_data_clear()
+    follower.sinew_ik.trees.clear()
+    for number, tree in enumerate(trees):
+        for bone, name in tree.constraints:
+            armature.pose.bones[bone].sinew_ik_live = name
+        follower.sinew_ik.trees.add().name = tree.bones[0]
+        _add_driver(follower, armature, tree, f"sinew_ik.trees[{number}].request")
+        for name in tree.bones:
+            constraint = armature.pose.bones[name].constraints.new("COPY_TRANSFORMS")
+            constraint.name = ik_io.FOLLOWS
+            constraint.target, constraint.subtarget = follower, name
+            # By the channels, so that each bone inherits from its own parent as it always does.
+            constraint.owner_space = constraint.target_space = "LOCAL"
+        ik_io.set_muted(armature, tree.constraints, True)
+
+
+def _add_driver(
+    follower: bpy.types.Object, armature: bpy.types.Object, tree: core.Tree, request: str
+) -> None:
+    """Of a property of the follower's root bone that means nothing: so all below is posed after it."""
+    curve = follower.driver_add(f"{_path(tree.bones[0])}.ik_stretch")
+    # Its value is 0, whatever the variables are.
+    curve.modifiers.new("GENERATOR").coefficients.foreach_set((0.0, 0.0))
+    curve.driver.type = "SUM"
+    curve.driver.expression = ""
+    reads = [(armature, "matrix_world[0][0]")]
+    owners = [bone for bone, _name in tree.constraints if bone not in tree.bones]
+    # What is read of a bone's channels waits for keys and drivers of the bone and of its constraints.
+    reads += [(armature, f"{_path(name)}.location[0]") for name in (*tree.bones, *owners)]
+    above = armature.pose.bones[tree.bones[0]].parent
+    if above is not None:
+        reads.append((armature, f"{_path(above.name)}.matrix[0][0]"))
+    for constraint in ik_io.constraints_of(armature, tree):
+        for target, part in (
+            (constraint.target, constraint.subtarget),
+            (constraint.pole_target, constraint.pole_subtarget),
+        ):
+            if target is not None:
+                reads.append((target, "matrix_world[0][0]"))
+                if target.type == "ARMATURE" and part in target.pose.bones:
+                    reads.append((target, f"{_path(part)}.matrix[0][0]"))
+    # Whatever has Blender pose the follower anew has it solved anew.
+    reads += [(follower, f"{_path(name)}.location[0]") for name in tree.bones[1:]]
+    reads.append((follower, request))
+    for number, (obj, path) in enumerate(dict.fromkeys(reads)):
+        variable = curve.driver.variables.new()
+        variable.name = f"sinew_{number}"
+        variable.targets[0].id = obj
+        variable.targets[0].data_path = path
+
+
+def _path(bone: str) -> str:
+    return f'pose.bones["{bpy.utils.escape_identifier(bone)}"]'
+
+
+def _follower_of(armature: bpy.types.Object, names: Collection[str]) -> bpy.types.Object:
+    """The one that there is, where it has these bones; else a new one."""
+    for follower in _followers():
+        if _followed_by(follower) == armature and set(names) <= set(follower.pose.bones.keys()):
+            return follower
+    remove_follower(armature)
+    if references.are_between_steps():
+        _session.in_no_step.add(armature.session_uid)
+    follower = bpy.data.objects.new(f"{armature.name} {ik_io.FOLLOWS}", armature.data)
+    # By an assignment, which makes bones to be posed; a copy, so that the artist's has no other user.
+    follower.data = armature.data.copy()
+    follower.data.animation_data_clear()
+    follower.sinew_ik_is_follower = True
+    return follower
+
+
+def _followers() -> list[bpy.types.Object]:
+    return [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.sinew_ik_is_follower]
+
+
+def _followed_by(follower: bpy.types.Object) -> bpy.types.Object | None:
+    animation = follower.animation_data
+    if animation is None or not animation.drivers or not animation.drivers[0].driver.variables:
+        return None
+    return animation.drivers[0].driver.variables[0].targets[0].id

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a file keeps of live inverse kinematics: which constraints Sinew solves, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from ...attach import properties
+from ...core import ik as core
+
+
+class Listener:
+    """Who solves; set by ik_in_depsgraph, as records know nothing of it."""
+
+    requested: Callable[[SinewIkTree], None] | None = None
+
+
+def _requested(record: SinewIkTree) -> float:
+    if Listener.requested is not None:
+        Listener.requested(record)
+    return 0.0
+
+
+def _setting_changed(settings: SinewIkLive, _context: bpy.types.Context) -> None:
+    # Blender evaluates nothing for a property without keys.
+    settings.id_data.update_tag()
+
+
+class SinewIkTree(bpy.types.PropertyGroup):
+    """Of a follower: a tree that is solved, by the name of its root bone."""
+
+    # What the last variable of the tree's driver reads.
+    request: bpy.props.FloatProperty(get=_requested, options={"HIDDEN"})
+
+
+class SinewIkLive(bpy.types.PropertyGroup):
+    """Of an armature object: how its live trees are solved; of a follower, which."""
+
+    method: bpy.props.EnumProperty(
+        name="Method",
+        description="How the rotations are found",
+        items=[(name, label, text) for name, (label, text) in core.LABELS.items()],
+        options=set(),
+        update=_setting_changed,
+        override=properties.OVERRIDABLE,
+    )
+    iterations: bpy.props.IntProperty(
+        name="Iterations",
+        description="The most steps or sweeps of a frame; a target in reach takes a few",
+        default=core.ITERATIONS,
+        min=1,
+        soft_max=core.ITERATIONS,
+        max=10000,
+        options=set(),
+        update=_setting_changed,
+        override=properties.OVERRIDABLE,
+    )
+    trees: bpy.props.CollectionProperty(type=SinewIkTree, options={"HIDDEN"})
+
+
+CLASSES = (SinewIkTree, SinewIkLive)
+
+
+def live_constraints(armature: bpy.types.Object) -> dict[str, str]:
+    """By bone, the name of the IK constraint that Sinew is to solve live."""
+    bones = armature.pose.bones if armature.pose is not None else ()
+    return {bone.name: bone.sinew_ik_live for bone in bones if bone.sinew_ik_live}
+
+
+def register() -> None:
+    # Not in the group below, which each object would get that is asked.
+    bpy.types.Object.sinew_ik_is_follower = bpy.props.BoolProperty(
+        description="Whether Sinew made it for bones that follow", options={"HIDDEN"}
+    )
+    bpy.types.Object.sinew_ik = bpy.props.PointerProperty(type=SinewIkLive, override=properties.OVERRIDABLE)
+    # At the bone, so that it stays where bones are renamed.
+    bpy.types.PoseBone.sinew_ik_live = bpy.props.StringProperty(
+        name="Live",
+        description="The bone's IK constraint that Sinew solves live",
+        options={"HIDDEN"},
+        override=properties.OVERRIDABLE,
+    )
+
+
+def unregister() -> None:
+    del bpy.types.PoseBone.sinew_ik_live
+    del bpy.types.Object.sinew_ik
+    del bpy.types.Object.sinew_ik_is_follower
