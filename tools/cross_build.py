@@ -13,6 +13,7 @@ import argparse
 import base64
 import contextlib
 import hashlib
+import importlib.metadata
 import io
 import os
 import re
@@ -68,7 +69,9 @@ def zig_program() -> Path:
 
 
 def compilers(platform: Platform) -> dict[str, str]:
-    """CMake's names of the tools, each a script: it takes programs, and zig wants a word behind."""
+    """CMake's names of the tools, each a script: it takes programs, and zig wants a word behind.
+
+    In a script is zig's version, too, so that ccache compiles anew by another one."""
     folder = BUILD / platform.name / "bin"
     folder.mkdir(parents=True, exist_ok=True)
     words = {
@@ -78,10 +81,11 @@ def compilers(platform: Platform) -> dict[str, str]:
         "CMAKE_RANLIB": "ranlib",
         "CMAKE_RC_COMPILER": "rc",
     }
+    version = importlib.metadata.version("ziglang")
     paths = {}
     for name, word in words.items():
         path = folder / word.split()[0]
-        text = f'#!/bin/sh\nexec "{zig_program()}" {word} "$@"\n'
+        text = f'#!/bin/sh\n# zig {version}\nexec "{zig_program()}" {word} "$@"\n'
         if not path.exists() or path.read_text() != text:
             path.write_text(text)
             path.chmod(0o755)
@@ -90,11 +94,16 @@ def compilers(platform: Platform) -> dict[str, str]:
 
 
 def environment() -> dict[str, str]:
-    # zig keeps what it makes of the C and C++ libraries in a folder of its own.
+    # zig keeps what it makes of the C and C++ libraries in a folder of its own. ccache knows compilers by their
+    # bytes: by their dates it would not know a script that was written again.
     kept = {
         key: value for key, value in os.environ.items() if key not in ("CXX", "CC", "CXXFLAGS", "LDFLAGS")
     }
-    return kept | {"ZIG_GLOBAL_CACHE_DIR": str(BUILD / "zig"), "SOURCE_DATE_EPOCH": "315532800"}
+    return kept | {
+        "ZIG_GLOBAL_CACHE_DIR": str(BUILD / "zig"),
+        "SOURCE_DATE_EPOCH": "315532800",
+        "CCACHE_COMPILERCHECK": "content",
+    }
 
 
 def run(words: list[str | Path], log: Path) -> None:
