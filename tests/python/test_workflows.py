@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+import workflow_rules
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,6 +72,100 @@ def test_every_command_of_dev_exists(path):
 def test_an_unknown_command_is_seen():
     steps = {"jobs": {"a": {"steps": [{"run": "mkdir x\n./dev tests --quick"}, {"run": "./dev test"}]}}}
     assert unknown_commands(lines_of(steps), {"test"}) == ["tests --quick"]
+
+
+@every_workflow
+def test_it_is_as_github_reads_it(path):
+    assert workflow_rules.faults(load(path)) == []
+
+
+MATRIX = {"include": [{"os": "macos-15", "archs": "arm64"}, {"os": "windows-2022", "archs": "AMD64"}]}
+WORKFLOW = {
+    "name": "an example",
+    "on": {"push": None, "schedule": [{"cron": "17 4 * * 1"}], "workflow_call": {"inputs": {"fast": {}}}},
+    "permissions": {"contents": "read"},
+    "jobs": {
+        "first": {"runs-on": "ubuntu-24.04", "steps": [{"run": "true"}]},
+        "second": {
+            "needs": "first",
+            "if": "always() && needs.first.result != 'failure'",
+            "strategy": {"matrix": MATRIX},
+            "runs-on": "${{ matrix.os }}",
+            "steps": [
+                {"id": "a", "run": "true", "env": {"SYSTEM": "${{ matrix.archs }}"}},
+                {"if": "steps.a.outcome == 'success'", "run": "true"},
+                {"if": "${{ !cancelled() && inputs.fast }}", "uses": "a/b@c"},
+                {"run": "true", "env": {"NAME": "${{ format('{0}-{1}', github.ref, fromJSON('[1]')[0]) }}"}},
+            ],
+        },
+    },
+}
+SECOND = ("jobs", "second")
+FIRST_STEP = (*SECOND, "steps", 0)
+# What is put where, and a part of what is then said.
+WRONG = [
+    (("job",), {}, "a workflow has no key 'job'"),
+    (("on", "pushes"), None, "no event 'pushes'"),
+    (("on", "schedule"), [{"cron": "17 24 * * 1"}], "no time of cron"),
+    (("on", "schedule"), [{"cron": "17 4 * *"}], "no time of cron"),
+    (("permissions", "content"), "read", "no permission content"),
+    (("jobs", "first", "permissions"), {"contents": "all"}, "no permission contents: all"),
+    (("jobs", "first", "run-on"), "ubuntu-24.04", "no key 'run-on'"),
+    (("jobs", "first", "runs-on"), "ubuntu-24", "no runner 'ubuntu-24'"),
+    (("jobs", "first", "steps"), [], "'steps' is missing"),
+    (("jobs", "first", "needs"), ["second"], "in a circle"),
+    (("jobs", "2"), {"runs-on": "ubuntu-24.04", "steps": [{"run": "true"}]}, "no name of a job"),
+    ((*SECOND, "needs"), ["frist"], "no job 'frist'"),
+    ((*SECOND, "needs"), [], "needs has no 'first'"),
+    ((*SECOND, "if"), "matrix.os == 'macos-15'", "no 'matrix'"),
+    ((*SECOND, "timeout-minutes"), "${{ steps.a.outcome }}", "no 'steps'"),
+    ((*SECOND, "strategy"), {"matrix": {"include": [{"os": "macos-15"}]}}, "matrix has no 'archs'"),
+    (
+        (*SECOND, "strategy"),
+        {"matrix": {"include": [*MATRIX["include"], {"os": "macos-14"}]}},
+        "a run of the matrix has no 'archs'",
+    ),
+    ((*SECOND, "strategy"), {"matrix": {"include": [{"os": "mac", "archs": "x"}]}}, "no runner 'mac'"),
+    ((*FIRST_STEP, "uses"), "a/b@c", "either uses an action or runs"),
+    ((*FIRST_STEP, "shel"), "bash", "a step has no key 'shel'"),
+    ((*FIRST_STEP, "id"), "b", "steps has no 'a'"),
+    ((*SECOND, "steps", 1, "id"), "a", "two steps are 'a'"),
+    ((*SECOND, "steps", 2, "if"), "${{ inputs.quick }}", "inputs has no 'quick'"),
+    ((*FIRST_STEP, "if"), "github.ref = 'x'", "is not understood"),
+    ((*FIRST_STEP, "if"), "(github.ref", "')' is missing"),
+    ((*FIRST_STEP, "if"), "github.ref ==", "a name is missing"),
+    ((*FIRST_STEP, "if"), "github.ref 'x'", "is not expected"),
+    ((*FIRST_STEP, "if"), "startWith(github.ref, 'x')", "no startWith"),
+    ((*FIRST_STEP, "if"), "startsWith(github.ref)", "no startsWith of 1"),
+    ((*FIRST_STEP, "env"), {"A": "${{ secret.A }}"}, "no 'secret'"),
+    ((*FIRST_STEP, "env"), {"A": "${{ github.ref }"}, "has no end"),
+    ((*FIRST_STEP, "env"), {"A": "${{ success() }}"}, "outside of a condition"),
+]
+
+
+def test_a_workflow_without_faults_has_none():
+    assert workflow_rules.faults(WORKFLOW) == []
+
+
+@pytest.mark.parametrize(("place", "value", "said"), WRONG, ids=[said for _, _, said in WRONG])
+def test_a_fault_is_named(place, value, said):
+    workflow = copy.deepcopy(WORKFLOW)
+    target = workflow
+    for key in place[:-1]:
+        target = target[key]
+    target[place[-1]] = value
+    found = workflow_rules.faults(workflow)
+    assert any(said in fault for fault in found), found
+
+
+@pytest.mark.skipif(not shutil.which("shellcheck"), reason="shellcheck is not installed")
+@every_workflow
+def test_shellcheck_finds_nothing_in_a_step(path):
+    for step in steps_of(load(path)):
+        if "run" in step:
+            words = ["shellcheck", "--shell=bash", "-"]
+            done = subprocess.run(words, input=step["run"], capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stdout
 
 
 @every_workflow
