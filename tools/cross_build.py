@@ -176,9 +176,10 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         "CMAKE_BUILD_TYPE": "Release",
         "CMAKE_SYSTEM_NAME": platform.system,
         "CMAKE_SYSTEM_PROCESSOR": platform.processor,
-        # Optimised as what CMake tries before the build, too: zig makes its libraries for each of both.
-        "CMAKE_C_FLAGS": "-O2",
-        "CMAKE_CXX_FLAGS": f"-O2 -ffile-prefix-map={ROOT}=.",
+        # Optimised as what CMake tries before the build, too: zig makes its libraries for each of both. Without
+        # what a debugger wants, which zig adds unless told: a seventh of the time, and nine tenths of an object.
+        "CMAKE_C_FLAGS": "-O2 -g0",
+        "CMAKE_CXX_FLAGS": f"-O2 -g0 -ffile-prefix-map={ROOT}=.",
         # No symbols; for Windows no time, either.
         "CMAKE_EXE_LINKER_FLAGS": "-s",
         "CMAKE_MODULE_LINKER_FLAGS": "-s",

@@ -4,8 +4,9 @@
 
 python3xx.dll and the compiled part of the standard library come from a wheel of panda3d, which takes them
 along for the programs that it packs; the rest of the standard library is the same on all systems, and so a
-copy of this Python's; python.exe is a program of one line. Packages are installed beside it, as wheels for
-Windows. Prints python.exe.
+copy of this Python's; python.exe is a program of one line, and python3.dll, which modules for any Python such
+as psutil's are linked with, says where its names are. Packages are installed beside it, as wheels for Windows.
+Prints python.exe.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from cross_build import BUILD, compilers, environment, import_library, python_of
+from cross_build import BUILD, compilers, environment, exported_names, import_library, python_of
 from cross_build import collect_python_headers as collect_headers
 from platforms import PLATFORMS
 
@@ -77,6 +78,20 @@ def compile_program(folder: Path) -> None:
     subprocess.run([*words, folder / "python.exe"], env=environment(), check=True)
 
 
+def link_forwarder(folder: Path) -> None:
+    """python3.dll: each name of the stable ABI, and those beside it, is one of python3xx.dll."""
+    platform, python = PLATFORMS["windows-x64"], python_of(Path(sys.executable))
+    dll = f"python{python.version.replace('.', '')}"
+    definition, empty = folder / "python3.def", folder / "empty.c"
+    names = exported_names(collect_headers(python))
+    definition.write_text("EXPORTS\n" + "".join(f"{name}={dll}.{name}\n" for name in names))
+    empty.write_text("static int nothing;\n")
+    words = [compilers(platform)["CMAKE_C_COMPILER"], "-shared", "-nostdlib", "-s", "-Wl,--no-entry"]
+    subprocess.run(
+        [*words, empty, definition, "-o", folder / "python3.dll"], env=environment(), check=True
+    )
+
+
 def make(version: str, folder: Path) -> None:
     unpack_compiled(version, folder)
     shutil.copytree(
@@ -84,6 +99,7 @@ def make(version: str, folder: Path) -> None:
     )
     (folder / "Lib/site-packages").mkdir()
     compile_program(folder)
+    link_forwarder(folder)
 
 
 def main() -> None:
