@@ -94,8 +94,8 @@ def compilers(platform: Platform) -> dict[str, str]:
 
 
 def environment() -> dict[str, str]:
-    # zig keeps what it makes of the C and C++ libraries in a folder of its own. ccache knows compilers by their
-    # bytes: by their dates it would not know a script that was written again.
+    # zig keeps what it makes of the C and C++ libraries in a folder of its own. ccache knows compilers by
+    # their bytes: by their dates it would not know a script that was written again.
     kept = {
         key: value for key, value in os.environ.items() if key not in ("CXX", "CC", "CXXFLAGS", "LDFLAGS")
     }
@@ -176,8 +176,9 @@ def configure(platform: Platform, log: Path, options: dict[str, str]) -> Path:
         "CMAKE_BUILD_TYPE": "Release",
         "CMAKE_SYSTEM_NAME": platform.system,
         "CMAKE_SYSTEM_PROCESSOR": platform.processor,
-        # Optimised as what CMake tries before the build, too: zig makes its libraries for each of both. Without
-        # what a debugger wants, which zig adds unless told: a seventh of the time, and nine tenths of an object.
+        # Optimised as what CMake tries before the build, too: zig makes its libraries for each of both.
+        # Without what a debugger wants, which zig adds unless told: a seventh of the time, and nine
+        # tenths of an object.
         "CMAKE_C_FLAGS": "-O2 -g0",
         "CMAKE_CXX_FLAGS": f"-O2 -g0 -ffile-prefix-map={ROOT}=.",
         # No symbols; for Windows no time, either.

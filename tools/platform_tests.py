@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs the tests of a platform that another system emulates: linux-arm64 by qemu, windows-x64 by wine.
+"""Runs tests of what tools/cross_build.py builds: linux-x64 here, linux-arm64 by qemu, windows-x64 by wine.
 
-C++ tests, then the Python tests in a Python of that platform, then for Windows some of the Blender tests
-in Blender's own build of bpy. The Python that runs this has what tools/cross_build.py wants; wheels that
-it does not have are fetched from the registry.
+C++ tests; for the two that are emulated the Python tests, in a Python of that platform; for Windows some of
+the Blender tests, in Blender's own build of bpy. The Python that runs this has what tools/cross_build.py
+wants; wheels that it does not have are fetched from the registry.
 """
 
 from __future__ import annotations
@@ -22,7 +22,17 @@ from pathlib import Path
 from cross_build import BUILD, ROOT, build_tests, build_wheels, python_of
 from platforms import PLATFORMS, Platform
 
-PARTS = ("native", "python", "blender")
+PARTS = {
+    "linux-x64": ("native",),
+    "linux-arm64": ("native", "python"),
+    "windows-x64": ("native", "python", "blender"),
+}
+# Words before a C++ program. The C library of arm64 is Debian's for who compiles for it (libc6-arm64-cross).
+NATIVE: dict[str, list[str | Path]] = {
+    "linux-x64": [],
+    "linux-arm64": ["qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"],
+    "windows-x64": ["wine"],
+}
 # About the checkout, its documents and its tools, which are the same wherever they run: ./dev test has them.
 CHECKOUT_TESTS = (
     *("test_documented", "test_layering", "test_locks", "test_platforms", "test_release", "test_report_map"),
@@ -101,24 +111,13 @@ def requirements() -> list[str]:
 
 
 class Emulated:
-    """How programs of a platform are run, and its Python.
-
-    native   words before a C++ program
-    tool     makes the Python, prints its path and installs packages
-    """
+    """The Python of a platform; tool makes it, prints its path and installs packages."""
 
     def __init__(self, platform: Platform) -> None:
         self.platform = platform
         is_windows = platform.is_windows
         self.tool = ROOT / "tools" / ("windows_python.py" if is_windows else "arm64_python.py")
         self._python: Path | None = None
-
-    @property
-    def native(self) -> list[str | Path]:
-        if self.platform.is_windows:
-            return ["wine"]
-        # Its C library is that of its Python.
-        return ["qemu-aarch64-static", "-L", self.python.parent]
 
     @property
     def python(self) -> Path:
@@ -157,11 +156,11 @@ class Emulated:
         return run(words, limit)
 
 
-def native_tests(emulated: Emulated) -> int:
+def native_tests(platform: Platform) -> int:
     worst = 0
-    for program in build_tests(emulated.platform):
+    for program in build_tests(platform):
         start = time.monotonic()
-        status = run([*emulated.native, program, "--gtest_brief=1"], LIMITS["native"])
+        status = run([*NATIVE[platform.name], program, "--gtest_brief=1"], LIMITS["native"])
         print(f"{program.name}: exit {status}, {time.monotonic() - start:.0f} s", flush=True)
         worst = worst or status
     return worst
@@ -190,17 +189,20 @@ def blender_tests(emulated: Emulated, options: Sequence[str]) -> int:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("platform", choices=("linux-arm64", "windows-x64"))
-    parser.add_argument("--part", choices=PARTS, action="append", help="only this (may be said again)")
+    parser.add_argument("platform", choices=PARTS)
+    parser.add_argument("--part", choices=("native", "python", "blender"), action="append", help="only this")
     parser.add_argument("options", nargs="*", help="for pytest, behind --, in place of all tests of a part")
     options = parser.parse_args()
-    emulated = Emulated(PLATFORMS[options.platform])
-    parts = options.part or (PARTS if emulated.platform.is_windows else PARTS[:2])
+    platform = PLATFORMS[options.platform]
+    parts = options.part or PARTS[options.platform]
+    if missing := set(parts) - set(PARTS[options.platform]):
+        parser.error(f"{options.platform} has no part {missing.pop()}.")
+    emulated = Emulated(platform)
     results = {}
     for part in parts:
         print(f"\n== {options.platform}: {part} ==", flush=True)
         if part == "native":
-            results[part] = native_tests(emulated)
+            results[part] = native_tests(platform)
         else:
             tests = python_tests if part == "python" else blender_tests
             results[part] = tests(emulated, options.options)

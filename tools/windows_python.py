@@ -4,9 +4,9 @@
 
 python3xx.dll and the compiled part of the standard library come from a wheel of panda3d, which takes them
 along for the programs that it packs; the rest of the standard library is the same on all systems, and so a
-copy of this Python's; python.exe is a program of one line, and python3.dll, which modules for any Python such
-as psutil's are linked with, says where its names are. Packages are installed beside it, as wheels for Windows.
-Prints python.exe.
+copy of this Python's; python.exe is a program of one line, and python3.dll, which modules for any Python
+such as psutil's are linked with, says where its names are. Packages are installed beside it, as wheels for
+Windows. Prints python.exe.
 """
 
 from __future__ import annotations
@@ -87,9 +87,7 @@ def link_forwarder(folder: Path) -> None:
     definition.write_text("EXPORTS\n" + "".join(f"{name}={dll}.{name}\n" for name in names))
     empty.write_text("static int nothing;\n")
     words = [compilers(platform)["CMAKE_C_COMPILER"], "-shared", "-nostdlib", "-s", "-Wl,--no-entry"]
-    subprocess.run(
-        [*words, empty, definition, "-o", folder / "python3.dll"], env=environment(), check=True
-    )
+    subprocess.run([*words, empty, definition, "-o", folder / "python3.dll"], env=environment(), check=True)
 
 
 def make(version: str, folder: Path) -> None:

@@ -250,8 +250,8 @@ def faults(workflow: dict) -> list[str]:
         if not re.fullmatch(r"[A-Za-z_][\w-]*", name):
             found.append(f"{name!r} is no name of a job")
         found += [f"{name}: {fault}" for fault in faults_in_job(name, job, jobs, known)]
-    for permissions in (workflow.get("permissions", {}), *(job.get("permissions", {}) for job in jobs.values())):
-        for key, value in permissions.items():
+    for part in (workflow, *jobs.values()):
+        for key, value in part.get("permissions", {}).items():
             if key not in PERMISSIONS or value not in ("read", "write", "none"):
                 found.append(f"there is no permission {key}: {value}")
     return found
