@@ -37,6 +37,25 @@ def write(point_buffer: bpy.types.Object, points: np.ndarray) -> None:
     mesh.update_tag()
 
 
+def is_in(depsgraph: bpy.types.Depsgraph, point_buffer: bpy.types.Object, with_points: bool) -> bool:
+    """Whether an evaluation that has the point buffer has it as it is. One that was deleted and that undo
+    brought back, in a view layer that is not shown, Blender (4.2 to 5.2) leaves as it was evaluated last: with
+    what another step had.
+
+    with_points  not only as many
+    """
+    evaluated = point_buffer.evaluated_get(depsgraph)
+    # What is at the address of something that was deleted has Blender give out that one.
+    if not (isinstance(evaluated, bpy.types.Object) and evaluated.type == "MESH" and evaluated.is_evaluated):
+        return True
+    mesh, own = evaluated.data, point_buffer.data
+    if len(mesh.vertices) != len(own.vertices):
+        return False
+    return not with_points or np.array_equal(
+        mesh_io.read_points(mesh), mesh_io.read_points(own), equal_nan=True
+    )
+
+
 def remove(obj: bpy.types.Object) -> None:
     settings = properties.of(obj)
     point_buffer, settings.point_buffer = settings.point_buffer, None

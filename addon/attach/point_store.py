@@ -93,12 +93,14 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: 
     point_buffer.write(properties.of(obj).point_buffer, stored)
 
 
-def set_rest_points(obj: bpy.types.Object, rest: np.ndarray, normals: int, anew: bool) -> None:
+def set_rest_points(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rest: np.ndarray, normals: int, anew: bool
+) -> None:
     """Gives the point buffer the rest points, which an evaluation moves: if their number differs, or anew.
 
     normals  how many are to follow, here zeros, which say that Sinew gave none
     """
-    if anew or not are_written(obj, len(rest) + normals):
+    if anew or not are_written(obj, depsgraph, len(rest) + normals, are_moved=True):
         write(obj, rest, rest, np.zeros((normals, 3), dtype=np.float32))
 
 
@@ -108,10 +110,17 @@ def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
         shown[:] = _marked(shown, rest)
 
 
-def are_written(obj: bpy.types.Object, count: int) -> bool:
-    """Whether the point buffer holds as many points and normals."""
-    point_buffer = properties.of(obj).point_buffer
-    return point_buffer is not None and len(point_buffer.data.vertices) == count
+def are_written(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, count: int, are_moved: bool = False
+) -> bool:
+    """Whether the point buffer holds as many points and normals, and this evaluation has them.
+
+    are_moved  by the evaluation itself: there are others in it
+    """
+    buffer = properties.of(obj).point_buffer
+    if buffer is None or len(buffer.data.vertices) != count:
+        return False
+    return point_buffer.is_in(depsgraph, buffer, with_points=not are_moved)
 
 
 def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> bool:

@@ -38,7 +38,9 @@ def deform(
         is_reshaped = before is not None and shown.rest_points is not before
         skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
     count = len(shown.rest_points) + skinned.normal_count
-    is_stored = not is_inspected or point_store.are_written(obj, count)
+    # A view layer that is seen again may have others.
+    is_known = changes.complete and not is_inspected
+    is_stored = is_known or point_store.are_written(obj, depsgraph, count)
     if differs or is_first or not is_stored:
         _store(obj, skinned)
     if differs or is_first:

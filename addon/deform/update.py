@@ -70,7 +70,7 @@ def update(
     is_same &= not skinned.has_new_data
     skinned.data_versions = skinned.bound.data_versions
     if plan.is_in_depsgraph:
-        _request_points(obj, skinned, changes, is_new_plan=plan != before, is_same=is_same)
+        _request_points(obj, skinned, depsgraph, changes, is_new_plan=plan != before, is_same=is_same)
     elif plan.after_update:
         is_first = before is None or not before.after_update
         with skinned.lock:
@@ -254,13 +254,18 @@ def _bind(
 
 
 def _request_points(
-    obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes, is_new_plan: bool, is_same: bool
+    obj: bpy.types.Object,
+    skinned: SkinnedObject,
+    depsgraph: bpy.types.Depsgraph,
+    changes: Changes,
+    is_new_plan: bool,
+    is_same: bool,
 ) -> None:
     """Has Blender evaluate the object once more, and so request its points, where they may differ."""
     skinned.dirtied_by_frames = False
     if skinned.plan.in_buffer:
         rest_points = skinned.bound.source.points
-        point_store.set_rest_points(obj, rest_points, skinned.normal_count, anew=is_new_plan)
+        point_store.set_rest_points(obj, depsgraph, rest_points, skinned.normal_count, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
         # The object is copied anew then, and what the change of frame has set is set again: of what is

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import routes
 import scenes
-from sinew_addon.attach import properties
-from sinew_addon.deform import handlers
+from sinew_addon.attach import attach, properties
+from sinew_addon.deform import handlers, session
 
 
 def points_in(obj: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
@@ -131,6 +131,54 @@ def test_a_view_layer_is_the_first_to_show_a_mesh_with_something_in_front(tmp_pa
         expected = scenes.final_points(obj)
         assert scenes.worst(shown, expected) <= 1e-5
     finally:
+        routes.release()
+
+
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_undo_brings_back_what_a_hidden_view_layer_had_evaluated(route):
+    """Blender leaves what that has of the point buffer as it was before the step that undo goes back to: the
+    points of another frame, or as many as another subdivision had."""
+    obj, _armature = scenes.make_arm()
+    scene, first = bpy.context.scene, bpy.context.view_layer
+    first_name = first.name
+    front = obj.modifiers.new("Front", "SUBSURF")
+    obj.modifiers.move(1, 0)
+    for frame, front.levels in ((4, 1), (9, 2)):
+        front.keyframe_insert("levels", frame=frame)
+    bpy.context.window.view_layer = scene.view_layers.new("Second")
+    bpy.context.view_layer.update()
+
+    def push() -> None:
+        # Along with data that comes or goes, a step is one of the whole file.
+        bpy.data.texts.remove(bpy.data.texts.new("step"))
+        bpy.ops.ed.undo_push(message="step")
+
+    routes.force(route)
+    try:
+        scenes.add_sinew(obj, "lbs")
+        scene.frame_set(4)
+        push()
+        scene.frame_set(9)
+        push()
+        attach.remove(obj)
+        session.forget()
+        push()
+        bpy.ops.ed.undo()
+        bpy.ops.ed.undo()
+        bpy.context.view_layer.update()
+        scene = bpy.context.scene
+        bpy.context.window.view_layer = scene.view_layers[first_name]
+        bpy.context.view_layer.update()
+        handlers.check_unannounced()
+        obj = bpy.data.objects["Arm"]
+        shown, plan = scenes.final_points(obj), session.state_of(obj).plan
+        properties.of(obj).enabled = False
+        expected = scenes.final_points(obj)
+        assert (scene.frame_current, obj.modifiers["Front"].levels) == (4, 1), "nothing is tested"
+        assert scenes.worst(shown, expected) <= 1e-5
+        assert plan.is_in_depsgraph == (route == routes.EVALUATION), plan.reason
+    finally:
+        bpy.context.window.view_layer = bpy.context.scene.view_layers[first_name]
         routes.release()
 
 
