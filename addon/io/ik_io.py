@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from types import MappingProxyType
+from typing import NamedTuple
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 from sinew.ik import Effector
 
 from ..core.errors import SinewError
@@ -59,8 +60,8 @@ def follows(constraint: bpy.types.Constraint) -> bool:
 
 
 def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
-    """All that read_trees() reads of a tree's bones and constraints, to be compared; empty where something of
-    it is gone."""
+    """All that is read once of a tree's bones and constraints, to be compared; empty where something of it is
+    gone."""
     found: list[object] = []
     bones = armature.pose.bones
     for name in tree.bones:
@@ -68,7 +69,8 @@ def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
         if bone is None:
             return ()
         rest = bone.bone
-        found += (rest.matrix.copy(), rest.length, bone.parent.name if bone.parent else "")
+        found += (rest.matrix_local.copy(), rest.length, bone.parent.name if bone.parent else "")
+        found += [getattr(rest, setting) for setting in _REST_SETTINGS]
         found += [getattr(bone, setting) for setting in _BONE_SETTINGS]
     for name, constraint_name in tree.constraints:
         constraint = bones[name].constraints.get(constraint_name) if name in bones else None
@@ -80,6 +82,7 @@ def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
     return tuple(found)
 
 
+_REST_SETTINGS = ("use_inherit_rotation", "inherit_scale", "use_local_location")
 _BONE_SETTINGS = (
     "ik_stretch",
     *(f"lock_ik_{axis}" for axis in "xyz"),
@@ -122,7 +125,8 @@ def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = armature.evaluated_get(graph)
     matrices = [evaluated.pose.bones[name].matrix for name in tree.bones]
-    return _posed(evaluated, tree, matrices, lambda target: target.evaluated_get(graph))
+    wanted = read_wanted(evaluated, tree, lambda target: target.evaluated_get(graph))
+    return _posed(evaluated, tree, matrices, wanted)
 
 
 def read_unsolved(evaluated: bpy.types.Object, tree: Tree) -> Posed:
@@ -138,7 +142,7 @@ def read_unsolved(evaluated: bpy.types.Object, tree: Tree) -> Posed:
                 "parent_matrix_local": bone.parent.bone.matrix_local,
             }
         matrices.append(bone.bone.convert_local_to_pose(bone.matrix_basis, bone.bone.matrix_local, **above))
-    return _posed(evaluated, tree, matrices, lambda target: target)
+    return _posed(evaluated, tree, matrices, read_wanted(evaluated, tree))
 
 
 def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
@@ -155,32 +159,47 @@ def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.
     return result
 
 
-def _posed(
+class Wanted(NamedTuple):
+    """What a tree's constraints ask for, armature space: matrices, points, and how much each counts."""
+
+    goals: list[Matrix]
+    poles: list[Vector]
+    influences: list[float]
+
+
+def read_wanted(
     evaluated: bpy.types.Object,
     tree: Tree,
-    matrices: list[Matrix],
-    evaluated_of: Callable[[bpy.types.Object], bpy.types.Object],
-) -> Posed:
-    """matrices: of the tree's bones."""
-    to_armature = np.array(evaluated.matrix_world.inverted_safe())
-    goals, poles, influences = [], [], []
+    evaluated_of: Callable[[bpy.types.Object], bpy.types.Object] = lambda target: target,
+) -> Wanted:
+    """Raises SinewError where a target can not be read.
+
+    evaluated_of  of what the constraints have as targets; within Blender's evaluation these are evaluated
+    """
+    from_world = evaluated.matrix_world.inverted_safe()
+    wanted = Wanted([], [], [])
     for bone, name in tree.constraints:
         constraint = evaluated.pose.bones[bone].constraints[name]
         target = evaluated_of(constraint.target)
-        goals.append(to_armature @ _target(evaluated.name, target, constraint.subtarget))
-        pole = np.zeros(3)
+        wanted.goals.append(_target(evaluated, from_world, target, constraint.subtarget))
+        pole = Vector((0.0, 0.0, 0.0))
         if constraint.pole_target is not None:
             target = evaluated_of(constraint.pole_target)
-            pole = (to_armature @ _target(evaluated.name, target, constraint.pole_subtarget))[:3, 3]
-        poles.append(pole)
-        influences.append(constraint.influence)
+            pole = _target(evaluated, from_world, target, constraint.pole_subtarget).translation
+        wanted.poles.append(pole)
+        wanted.influences.append(constraint.influence)
+    return wanted
+
+
+def _posed(evaluated: bpy.types.Object, tree: Tree, matrices: list[Matrix], wanted: Wanted) -> Posed:
+    """matrices: of the tree's bones."""
     parent = evaluated.pose.bones[tree.bones[0]].parent
     return Posed(
         np.array(matrices),
         np.array(parent.matrix) if parent is not None else np.eye(4),
-        np.array(goals),
-        np.array(poles),
-        np.array(influences),
+        np.array(wanted.goals),
+        np.array(wanted.poles),
+        np.array(wanted.influences),
     )
 
 
@@ -274,17 +293,13 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
                 )
 
 
-def _target(armature: str, evaluated: bpy.types.Object, part: str) -> np.ndarray:
-    """float64 [4, 4], in the world.
-
-    armature  the name of the object whose bones it pulls
-    """
-    matrix = np.array(evaluated.matrix_world, dtype=np.float64)
-    if evaluated.type != "ARMATURE" or not part:
-        return matrix
-    bone = evaluated.pose.bones.get(part)
+def _target(armature: bpy.types.Object, from_world: Matrix, target: bpy.types.Object, part: str) -> Matrix:
+    """In armature space; all evaluated."""
+    if target.type != "ARMATURE" or not part:
+        return from_world @ target.matrix_world
+    bone = target.pose.bones.get(part)
     if bone is None:
         raise SinewError(
-            f"{armature}: {evaluated.name} has no bone {part!r}, an IK target; choose another one"
+            f"{armature.name}: {target.name} has no bone {part!r}, an IK target; choose another one"
         )
-    return matrix @ np.array(bone.matrix, dtype=np.float64)
+    return bone.matrix.copy() if target == armature else from_world @ target.matrix_world @ bone.matrix

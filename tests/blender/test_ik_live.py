@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 import scenes
 import sinew
+import sinew_addon
 from mathutils import Matrix, Vector
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode
-from sinew_addon.features.ik import ik_bake, ik_in_depsgraph, ik_live
+from sinew_addon.features.ik import ik_bake, ik_handlers, ik_in_depsgraph, ik_live
 from sinew_addon.io import ik_io
 from test_ik import FRAMES, bake, constrain, make_arm, make_empty, near, places, poses, tails
 
@@ -75,6 +76,24 @@ def with_limits():
     return arm
 
 
+def scaled_evenly():
+    arm = make_arm(4, mode="ZXY")
+    key_pose(arm)
+    arm.pose.bones["arm.1"].scale = (1.3, 1.3, 1.3)
+    arm.pose.bones["base"].scale = (0.8, 0.8, 0.8)
+    arm.pose.bones["arm.0"].location = (0.1, 0.2, -0.1)
+    constraint = constrain(arm, "arm.3", make_empty("Target", near()), chain_count=4, use_rotation=True)
+    constraint.influence = 0.6
+    return arm
+
+
+def scaled_unevenly():
+    arm = make_arm(3)
+    arm.pose.bones["arm.0"].scale = (1.0, 1.2, 0.9)
+    constrain(arm, "arm.2", make_empty("Target", near()), chain_count=3)
+    return arm
+
+
 def scaled_and_rotated():
     arm = make_arm(4)
     arm.pose.bones["arm.1"].scale = (1.3, 1.3, 1.3)
@@ -116,7 +135,7 @@ def branches():
     return arm
 
 
-SCENES = (of_object, with_pole, with_limits, scaled_and_rotated, branches)
+SCENES = (of_object, with_pole, with_limits, scaled_evenly, scaled_unevenly, scaled_and_rotated, branches)
 
 
 class Recorder(bpy.types.RenderEngine):
@@ -129,13 +148,21 @@ class Recorder(bpy.types.RenderEngine):
 
     def render(self, depsgraph):
         assert depsgraph.mode == "RENDER"
+        frame = depsgraph.scene.frame_current
+        self._keep(depsgraph, frame)
+        # As for motion blur.
+        self.frame_set(frame, 0.4)
+        self._keep(depsgraph, frame + 0.4)
+        self.frame_set(frame, 0.0)
+
+    def _keep(self, depsgraph, frame):
         for obj in depsgraph.objects:
             if obj.type == "ARMATURE":
                 bones = {bone.name: np.array(obj.matrix_world @ bone.matrix) for bone in obj.pose.bones}
-                self.seen[obj.name, depsgraph.scene.frame_current] = bones
+                self.seen[obj.name, frame] = bones
             if obj.type == "MESH":
                 points = [obj.matrix_world @ vertex.co for vertex in obj.data.vertices]
-                self.seen[obj.name, depsgraph.scene.frame_current] = np.array(points)
+                self.seen[obj.name, frame] = np.array(points)
 
 
 @pytest.fixture
@@ -179,11 +206,17 @@ def test_a_render_has_the_pose_of_its_own_frame(make, recorder, tmp_path):
     names = [bone.name for bone in arm.pose.bones]
     expected = poses(arm, names)
     bpy.context.scene.frame_set(5)
-    for frame in (24, 3, 11):
+    for frame in (23, 3, 11):
         bpy.context.scene.frame_set(frame)
         bpy.ops.render.render()
         found = [recorder[arm.name, frame][name] for name in names]
         np.testing.assert_allclose(found, expected[FRAMES.index(frame)], atol=1e-6)
+        bpy.context.scene.frame_set(frame, subframe=0.4)
+        evaluated = arm.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        blurred = [recorder[arm.name, frame + 0.4][name] for name in names]
+        own = [evaluated.matrix_world @ evaluated.pose.bones[name].matrix for name in names]
+        np.testing.assert_allclose(blurred, own, atol=1e-6)
+        assert np.abs(np.array(blurred) - found).max() > 1e-4
     bpy.context.scene.frame_end = 6
     bpy.context.scene.render.filepath = str(tmp_path / "frame")
     recorder.clear()
@@ -497,6 +530,53 @@ def test_a_saved_file_plays_by_blenders_constraint_and_goes_on_here(tmp_path):
     np.testing.assert_allclose(poses(arm, names), found, atol=1e-6)
 
 
+def test_a_file_that_blender_saved_by_itself_goes_on(tmp_path):
+    """As auto-save does, without Sinew's handlers: the follower is not in it."""
+    arm = with_pole()
+    names = ["arm.0", "arm.1", "hand"]
+    live(arm)
+    found = poses(arm, names)
+    path = str(tmp_path / "arm.blend")
+    ik_handlers.unsubscribe()
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+    finally:
+        ik_handlers.subscribe()
+    bpy.ops.wm.open_mainfile(filepath=path)
+    arm = bpy.data.objects["Arm"]
+    assert len(followers()) == 1
+    np.testing.assert_allclose(poses(arm, names), found, atol=1e-6)
+    bpy.ops.sinew.remove_ik()
+    assert [(c.type, c.mute) for c in arm.pose.bones["arm.1"].constraints] == [("IK", False)]
+    assert sorted(armature.name for armature in bpy.data.armatures if armature.users) == ["Arm"]
+
+
+def test_without_the_add_on_blenders_constraints_play():
+    arm = with_pole()
+    names = ["arm.0", "arm.1", "hand"]
+    blender = poses(arm, names)
+    live(arm)
+    found = poses(arm, names)
+    sinew_addon.unregister()
+    try:
+        assert [(c.type, c.mute) for c in arm.pose.bones["arm.1"].constraints] == [("IK", False)]
+        assert [obj.name for obj in bpy.data.objects if obj.type == "ARMATURE"] == ["Arm"]
+        np.testing.assert_allclose(poses(arm, names), blender, atol=1e-6)
+    finally:
+        sinew_addon.register()
+    np.testing.assert_allclose(poses(arm, names), found, atol=1e-6)
+
+
+def test_it_plays_on_keys_that_sinew_plays_in_between():
+    arm = of_object()
+    names = [bone.name for bone in arm.pose.bones]
+    arm.sinew_inbetween = "dib"
+    live(arm)
+    found = poses(arm, names)
+    np.testing.assert_allclose(tails(arm, "arm.3"), places(bpy.data.objects["Target"]), atol=1e-5)
+    np.testing.assert_allclose(poses(arm, names, FRAMES[::-1])[::-1], found, atol=1e-6)
+
+
 def test_changes_of_the_constraint_are_taken_over():
     arm = with_pole()
     constraint = arm.pose.bones["arm.1"].constraints["IK"]
@@ -550,6 +630,11 @@ def test_what_can_not_be_live_is_said_and_blenders_constraint_plays():
     now(arm)
     assert "target hand hangs on the chain that it pulls" in ik_live.problem_of(arm)
     constraint.target, constraint.subtarget = target, ""
+    other = constrain(arm, "hand", target, chain_count=2)
+    now(arm)
+    with pytest.raises(SinewError, match=r"arm\.1 is pulled by chains that begin at different bones"):
+        ik_live.switch_on(arm)
+    arm.pose.bones["hand"].constraints.remove(other)
     now(arm)
     assert ik_live.problem_of(arm) == ""
     # What goes wrong in an evaluation.

@@ -12,12 +12,13 @@ def register() -> None:
     ik_bake.register()
     ik_records.register()
     ik_in_depsgraph.register()
-    ik_handlers.register()
+    ik_handlers.subscribe()
     ik_handlers.adopt_open_file()
 
 
 def unregister() -> None:
-    ik_handlers.unregister()
+    ik_handlers.unsubscribe()
+    ik_handlers.let_go()
     ik_in_depsgraph.unregister()
     ik_records.unregister()
     ik_bake.unregister()

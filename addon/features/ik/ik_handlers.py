@@ -112,8 +112,12 @@ _HANDLERS = {
 }
 
 
-def register() -> None:
+def subscribe() -> None:
     events.subscribe_all(_HANDLERS)
+
+
+def unsubscribe() -> None:
+    events.unsubscribe_all(_HANDLERS)
 
 
 def adopt_open_file() -> None:
@@ -121,8 +125,8 @@ def adopt_open_file() -> None:
         on_data_new()
 
 
-def unregister() -> None:
-    events.unsubscribe_all(_HANDLERS)
+def let_go() -> None:
+    """Blender's constraints play, as in a saved file."""
     for armature in list(_armatures()):
         ik_live.detach(armature)
         ik_live.remove_follower(armature)

@@ -17,9 +17,9 @@ import bpy
 import numpy as np
 import sinew
 
-from ...core import ik as core
 from ...core.errors import SinewError
 from ...io import ik_io
+from .ik_one_frame import OneFrame
 from .ik_records import Listener, SinewIkTree, live_constraints
 
 log = logging.getLogger(__name__)
@@ -30,10 +30,10 @@ problems: dict[str, str] = {}
 
 @dataclass(frozen=True)
 class _Known:
-    """A tree as it was read, and all settings that it was read from."""
+    """A tree, and all settings that it was read from."""
 
     settings: tuple
-    tree: core.Tree
+    one_frame: OneFrame
 
 
 class _Thread(threading.local):
@@ -59,53 +59,39 @@ def requested(record: SinewIkTree) -> None:
     if armature is None or armature.pose is None:
         return
     try:
-        tree = _tree_of(follower, armature, record.name)
+        one_frame = _one_frame_of(follower, armature, record.name)
     except SinewError:
         # Changed since it was put on, which the handler of this update sees, too.
         return
+    settings, bones = armature.sinew_ik, one_frame.tree.bones
     try:
-        _write(follower, armature, tree.bones, _solve(armature, tree))
+        rotations = one_frame.solve(armature, settings.method, settings.iterations)
+        _write(follower, armature, bones, rotations)
     except Exception as error:
         text = str(error) if isinstance(error, SinewError) else f"{type(error).__name__}: {error}"
         if armature.name not in problems:
             log.error("%s: inverse kinematics is not solved live: %s", armature.name, text)
         problems[armature.name] = text
-        _write(follower, armature, tree.bones, None)
+        _write(follower, armature, bones, None)
 
 
-def _tree_of(follower: bpy.types.Object, armature: bpy.types.Object, root: str) -> core.Tree:
+def _one_frame_of(follower: bpy.types.Object, armature: bpy.types.Object, root: str) -> OneFrame:
     key = follower.name, root
     known = _thread.known.get(key)
-    if known is None or known.settings != ik_io.settings_of(armature, known.tree):
+    if known is None or known.settings != ik_io.settings_of(armature, known.one_frame.tree):
         trees = ik_io.read_trees(armature, [root], live_constraints(armature))
         tree = next((tree for tree in trees if tree.bones[0] == root), None)
         if tree is None:
             raise SinewError(f"{armature.name}: no constraint pulls a chain from {root}")
-        known = _thread.known[key] = _Known(ik_io.settings_of(armature, tree), tree)
-    return known.tree
-
-
-def _solve(armature: bpy.types.Object, tree: core.Tree) -> list[np.ndarray]:
-    """Of each bone, its rotation as its channels have it."""
-    settings = armature.sinew_ik
-    posed = core.stack([ik_io.read_unsolved(armature, tree)])
-    problem = core.problem_of(tree, posed)
-    solution = core.solve(tree, problem, settings.method, settings.iterations)
-    rotations = core.blended(tree, problem, solution.rotations, posed.influences)
-    matrices = core.matrices_of(tree, problem, rotations)
-    found = []
-    for number, (name, parent) in enumerate(zip(tree.bones, tree.parents.tolist(), strict=True)):
-        before = posed.parent if parent < 0 else matrices[:, parent]
-        bone = armature.pose.bones[name]
-        found.append(ik_io.local_rotations(bone, matrices[:, number], before)[0])
-    return found
+        known = _thread.known[key] = _Known(ik_io.settings_of(armature, tree), OneFrame(armature, tree))
+    return known.one_frame
 
 
 def _write(
     follower: bpy.types.Object,
     armature: bpy.types.Object,
     bones: tuple[str, ...],
-    rotations: list[np.ndarray] | None,
+    rotations: np.ndarray | None,
 ) -> None:
     """Into the follower's channels; without rotations, the bones' own. By foreach_set(), as an assignment
     would tell Blender that a file has changed."""

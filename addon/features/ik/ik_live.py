@@ -37,7 +37,8 @@ class _Session:
     """What is known of armatures, by their session_uid."""
 
     def __init__(self) -> None:
-        self.attached: dict[int, tuple] = {}
+        # The trees, and what _state() said of them.
+        self.attached: dict[int, tuple[list[core.Tree], list]] = {}
         # Why constraints that are Sinew's are not solved live; until the settings change, or for good.
         self.problems: dict[int, str] = {}
         self.failed: set[int] = set()
@@ -63,8 +64,11 @@ def problem_of(armature: bpy.types.Object) -> str:
 
 def switch_on(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[core.Tree]:
     """Solves the trees of these bones live from now on, or all. Raises SinewError where that can not be."""
-    trees = ik_io.read_trees(armature, only, live_constraints(armature))
+    live = live_constraints(armature)
+    trees = ik_io.read_trees(armature, only, live)
     check(armature, trees)
+    check_apart([*trees, *(ik_io.read_trees(armature, list(live), live) if live else ())])
+    armature.sinew_ik_is_live = True
     for tree in trees:
         for bone, name in tree.constraints:
             armature.pose.bones[bone].sinew_ik_live = name
@@ -89,6 +93,7 @@ def switch_off(armature: bpy.types.Object, only: Collection[str] | None = None) 
     if not is_live(armature):
         remove_follower(armature)
         armature.property_unset("sinew_ik")
+        armature.property_unset("sinew_ik_is_live")
         for bone in armature.pose.bones:
             bone.property_unset("sinew_ik_live")
     sync(armature)
@@ -161,9 +166,24 @@ def check(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
                     )
 
 
+def check_apart(trees: list[core.Tree]) -> None:
+    """Raises SinewError where trees have a bone in common: it can follow one."""
+    roots: dict[str, str] = {}
+    for tree in trees:
+        for bone in tree.bones:
+            if roots.setdefault(bone, tree.bones[0]) != tree.bones[0]:
+                raise SinewError(
+                    f"{bone} is pulled by chains that begin at different bones, {roots[bone]} and "
+                    f"{tree.bones[0]}; have them begin at one (Chain Length), or bake them"
+                )
+
+
 def sync(armature: bpy.types.Object) -> None:
     """Makes an armature's constraints and its follower agree with what is switched on."""
     uid = armature.session_uid
+    trees, state = _session.attached.get(uid, ([], []))
+    if trees and not safe_mode.is_on() and _state(armature, trees) == state:
+        return
     _drop_what_the_artist_switched_off(armature)
     live = live_constraints(armature)
     may_run = not (safe_mode.is_on() or uid in _session.failed or uid in _session.suspended)
@@ -174,16 +194,15 @@ def sync(armature: bpy.types.Object) -> None:
         return
     try:
         trees = ik_io.read_trees(armature, list(live), live)
-        if _session.attached.get(uid) == _state(armature, trees):
-            return
         check(armature, trees)
+        check_apart(trees)
         _attach(armature, trees)
     except SinewError as error:
         detach(armature)
         _session.problems[uid] = str(error)
         return
     _session.problems.pop(uid, None)
-    _session.attached[uid] = _state(armature, trees)
+    _session.attached[uid] = trees, _state(armature, trees)
 
 
 def detach(armature: bpy.types.Object) -> None:
@@ -242,32 +261,24 @@ def _drop_what_the_artist_switched_off(armature: bpy.types.Object) -> None:
             owner.sinew_ik_live = ""
 
 
-def _state(armature: bpy.types.Object, trees: list[core.Tree]) -> tuple:
-    """Changes with what _attach() depends on and with what it makes."""
-    state = []
+def _state(armature: bpy.types.Object, trees: list[core.Tree]) -> list:
+    """Changes with all that _attach() depends on and with what it makes; empty where a bone is gone."""
+    state: list[object] = []
+    bones = armature.pose.bones
     for tree in trees:
-        bones = [armature.pose.bones[name] for name in tree.bones]
-        above = bones[0].parent
-        state.append((tree.bones, tree.constraints, above.name if above is not None else ""))
-        state += [
-            (constraint.mute, *_parts_of(constraint)) for constraint in ik_io.constraints_of(armature, tree)
-        ]
-        state += [
-            (constraint.target, constraint.subtarget, constraint.mute)
-            for bone in bones
-            for constraint in bone.constraints
-            if ik_io.follows(constraint)
-        ]
-    return tuple(state)
-
-
-def _parts_of(constraint: bpy.types.Constraint) -> tuple:
-    return (
-        constraint.target,
-        constraint.subtarget,
-        constraint.pole_target,
-        constraint.pole_subtarget,
-    )
+        settings = ik_io.settings_of(armature, tree)
+        if not settings:
+            return []
+        state.append(settings)
+        state += [constraint.mute for constraint in ik_io.constraints_of(armature, tree)]
+        for name in tree.bones:
+            state += [
+                (constraint.type, constraint.name, constraint.mute, constraint.is_valid)
+                for constraint in bones[name].constraints
+            ]
+            followed = bones[name].constraints.get(ik_io.FOLLOWS)
+            state.append(followed is not None and followed.target)
+    return state
 
 
 def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:

@@ -65,12 +65,18 @@ CLASSES = (SinewIkTree, SinewIkLive)
 
 def live_constraints(armature: bpy.types.Object) -> dict[str, str]:
     """By bone, the name of the IK constraint that Sinew is to solve live."""
-    bones = armature.pose.bones if armature.pose is not None else ()
-    return {bone.name: bone.sinew_ik_live for bone in bones if bone.sinew_ik_live}
+    if not armature.sinew_ik_is_live or armature.pose is None:
+        return {}
+    return {bone.name: bone.sinew_ik_live for bone in armature.pose.bones if bone.sinew_ik_live}
 
 
 def register() -> None:
-    # Not in the group below, which each object would get that is asked.
+    # Not in the group below, which each object would get that is asked. The first spares a look at all bones.
+    bpy.types.Object.sinew_ik_is_live = bpy.props.BoolProperty(
+        description="Whether Sinew solves chains of it live",
+        options={"HIDDEN"},
+        override=properties.OVERRIDABLE,
+    )
     bpy.types.Object.sinew_ik_is_follower = bpy.props.BoolProperty(
         description="Whether Sinew made it for bones that follow", options={"HIDDEN"}
     )
@@ -88,3 +94,4 @@ def unregister() -> None:
     del bpy.types.PoseBone.sinew_ik_live
     del bpy.types.Object.sinew_ik
     del bpy.types.Object.sinew_ik_is_follower
+    del bpy.types.Object.sinew_ik_is_live
