@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
+from operator import attrgetter
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -70,26 +71,26 @@ def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
             return ()
         rest = bone.bone
         found += (rest.matrix_local.copy(), rest.length, bone.parent.name if bone.parent else "")
-        found += [getattr(rest, setting) for setting in _REST_SETTINGS]
-        found += [getattr(bone, setting) for setting in _BONE_SETTINGS]
+        found += _rest_settings(rest)
+        found += _bone_settings(bone)
     for name, constraint_name in tree.constraints:
         constraint = bones[name].constraints.get(constraint_name) if name in bones else None
         if constraint is None:
             return ()
         for target in (constraint.target, constraint.pole_target):
             found.append(target.name if target is not None else "")
-        found += [getattr(constraint, setting) for setting in _CONSTRAINT_SETTINGS]
+        found += _constraint_settings(constraint)
     return tuple(found)
 
 
-_REST_SETTINGS = ("use_inherit_rotation", "inherit_scale", "use_local_location")
-_BONE_SETTINGS = (
+_rest_settings = attrgetter("use_inherit_rotation", "inherit_scale", "use_local_location")
+_bone_settings = attrgetter(
     "ik_stretch",
     *(f"lock_ik_{axis}" for axis in "xyz"),
     *(f"use_ik_limit_{axis}" for axis in "xyz"),
     *(f"ik_{bound}_{axis}" for bound in ("min", "max", "stiffness") for axis in "xyz"),
 )
-_CONSTRAINT_SETTINGS = (
+_constraint_settings = attrgetter(
     *("type", "subtarget", "pole_subtarget", "pole_angle", "chain_count"),
     *("use_tail", "use_location", "use_rotation", "use_stretch", "weight", "orient_weight"),
 )

@@ -129,5 +129,5 @@ def let_go() -> None:
     """Blender's constraints play, as in a saved file."""
     for armature in list(_armatures()):
         ik_live.detach(armature)
-        ik_live.remove_follower(armature)
+        ik_live.remove_followers(armature)
     ik_live.forget()

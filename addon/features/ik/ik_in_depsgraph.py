@@ -20,7 +20,7 @@ import sinew
 from ...core.errors import SinewError
 from ...io import ik_io
 from .ik_one_frame import OneFrame
-from .ik_records import Listener, SinewIkTree, live_constraints
+from .ik_records import Listener, live_constraints
 
 log = logging.getLogger(__name__)
 
@@ -41,16 +41,15 @@ class _Thread(threading.local):
 
     def __init__(self) -> None:
         sinew.keep_thread_state()
-        # By the names of follower and root: one of each thread, as a solver has one user at a time.
-        self.known: dict[tuple[str, str], _Known] = {}
+        # By the name of the follower: one of each thread, as a solver has one user at a time.
+        self.known: dict[str, _Known] = {}
 
 
 _thread = _Thread()
 
 
-def requested(record: SinewIkTree) -> None:
-    """Solves a tree of an evaluated follower."""
-    follower = record.id_data
+def requested(follower: bpy.types.Object, root: str) -> None:
+    """Solves the tree of an evaluated follower."""
     if not follower.is_evaluated:
         # Somebody else reads the property.
         return
@@ -59,7 +58,7 @@ def requested(record: SinewIkTree) -> None:
     if armature is None or armature.pose is None:
         return
     try:
-        one_frame = _one_frame_of(follower, armature, record.name)
+        one_frame = _one_frame_of(follower, armature, root)
     except SinewError:
         # Changed since it was put on, which the handler of this update sees, too.
         return
@@ -76,14 +75,14 @@ def requested(record: SinewIkTree) -> None:
 
 
 def _one_frame_of(follower: bpy.types.Object, armature: bpy.types.Object, root: str) -> OneFrame:
-    key = follower.name, root
-    known = _thread.known.get(key)
+    known = _thread.known.get(follower.name)
     if known is None or known.settings != ik_io.settings_of(armature, known.one_frame.tree):
         trees = ik_io.read_trees(armature, [root], live_constraints(armature))
         tree = next((tree for tree in trees if tree.bones[0] == root), None)
         if tree is None:
             raise SinewError(f"{armature.name}: no constraint pulls a chain from {root}")
-        known = _thread.known[key] = _Known(ik_io.settings_of(armature, tree), OneFrame(armature, tree))
+        known = _Known(ik_io.settings_of(armature, tree), OneFrame(armature, tree))
+        _thread.known[follower.name] = known
     return known.one_frame
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trees of bones that Sinew solves live, in the place of Blender's IK constraints.
 
-Of an armature with such trees there is a follower: an armature object with the same bones, in no scene, as
-bones wait for other objects' bones but not for what is computed of their own channels. For each tree
+Of each such tree there is a follower: an armature object with the same bones, in no scene, as bones wait for
+other objects' bones but not for what is computed of their own channels. One of each tree, as where Blender
+evaluates one driver of an object it evaluates them all.
 
-- a driver of the follower depends on all that the tree's pose does: its bones' own channels, what is above
+- A driver of the follower depends on all that the tree's pose does: its bones' own channels, what is above
   them, targets and poles. Its last variable reads a property whose getter solves the tree (ik_in_depsgraph)
   and writes the follower's channels;
 - each bone copies its pose from the follower's by a constraint, so children, meshes and renders see it in the
@@ -91,7 +92,7 @@ def switch_off(armature: bpy.types.Object, only: Collection[str] | None = None) 
     for bone in live if only is None else meant.intersection(live):
         armature.pose.bones[bone].sinew_ik_live = ""
     if not is_live(armature):
-        remove_follower(armature)
+        remove_followers(armature)
         armature.property_unset("sinew_ik")
         armature.property_unset("sinew_ik_is_live")
         for bone in armature.pose.bones:
@@ -123,7 +124,7 @@ def let_go() -> None:
     """Before undo: what is in no step of it must not be referred to (references)."""
     for armature in [obj for obj in bpy.data.objects if obj.session_uid in _session.in_no_step]:
         detach(armature)
-        remove_follower(armature)
+        remove_followers(armature)
     note_step()
 
 
@@ -219,9 +220,9 @@ def detach(armature: bpy.types.Object) -> None:
         ik_io.set_muted(armature, list(live_constraints(armature).items()), False)
 
 
-def remove_follower(armature: bpy.types.Object | None) -> None:
-    """None: those whose armature is gone."""
-    for follower in [each for each in _followers() if _followed_by(each) == armature]:
+def remove_followers(armature: bpy.types.Object | None, but: Collection[bpy.types.Object] = ()) -> None:
+    """Of an armature; None: those whose armature is gone."""
+    for follower in [each for each in _followers(armature) if each not in but]:
         data = follower.data
         bpy.data.objects.remove(follower)
         if data is not None and not data.users:
@@ -232,15 +233,16 @@ def remove_follower(armature: bpy.types.Object | None) -> None:
 def out_of_the_file() -> Iterator[None]:
     """Inside, Blender can save: nothing of followers is written, as neither they nor their bones have a
     user."""
-    remove_follower(None)
-    bones = [(follower, follower.data, _followed_by(follower)) for follower in _followers()]
-    for follower, _data, armature in bones:
+    remove_followers(None)
+    bones = {}
+    for armature in filter(is_live, bpy.data.objects):
         detach(armature)
-        follower.data = armature.data
+        for follower in _followers(armature):
+            bones[follower], follower.data = follower.data, armature.data
     try:
         yield
     finally:
-        for follower, data, _armature in bones:
+        for follower, data in bones.items():
             follower.data = data
 
 
@@ -283,15 +285,13 @@ def _state(armature: bpy.types.Object, trees: list[core.Tree]) -> list:
 
 def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
     detach(armature)
-    names = {name for tree in trees for name in tree.bones}
-    follower = _follower_of(armature, names)
-    follower.animation_data_clear()
-    follower.sinew_ik.trees.clear()
-    for number, tree in enumerate(trees):
+    followers = []
+    for tree in trees:
+        follower = _follower_of(armature, tree)
+        followers.append(follower)
+        _add_driver(follower, armature, tree)
         for bone, name in tree.constraints:
             armature.pose.bones[bone].sinew_ik_live = name
-        follower.sinew_ik.trees.add().name = tree.bones[0]
-        _add_driver(follower, armature, tree, f"sinew_ik.trees[{number}].request")
         for name in tree.bones:
             constraint = armature.pose.bones[name].constraints.new("COPY_TRANSFORMS")
             constraint.name = ik_io.FOLLOWS
@@ -299,12 +299,12 @@ def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
             # By the channels, so that each bone inherits from its own parent as it always does.
             constraint.owner_space = constraint.target_space = "LOCAL"
         ik_io.set_muted(armature, tree.constraints, True)
+    remove_followers(armature, but=followers)
 
 
-def _add_driver(
-    follower: bpy.types.Object, armature: bpy.types.Object, tree: core.Tree, request: str
-) -> None:
+def _add_driver(follower: bpy.types.Object, armature: bpy.types.Object, tree: core.Tree) -> None:
     """Of a property of the follower's root bone that means nothing: so all below is posed after it."""
+    follower.animation_data_clear()
     curve = follower.driver_add(f"{_path(tree.bones[0])}.ik_stretch")
     # Its value is 0, whatever the variables are.
     curve.modifiers.new("GENERATOR").coefficients.foreach_set((0.0, 0.0))
@@ -328,7 +328,7 @@ def _add_driver(
                     reads.append((target, f"{_path(part)}.matrix[0][0]"))
     # Whatever has Blender pose the follower anew has it solved anew.
     reads += [(follower, f"{_path(name)}.location[0]") for name in tree.bones[1:]]
-    reads.append((follower, request))
+    reads.append((follower, "sinew_ik_follower.request"))
     for number, (obj, path) in enumerate(dict.fromkeys(reads)):
         variable = curve.driver.variables.new()
         variable.name = f"sinew_{number}"
@@ -340,24 +340,35 @@ def _path(bone: str) -> str:
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"]'
 
 
-def _follower_of(armature: bpy.types.Object, names: Collection[str]) -> bpy.types.Object:
+def _follower_of(armature: bpy.types.Object, tree: core.Tree) -> bpy.types.Object:
     """The one that there is, where it has these bones; else a new one."""
-    for follower in _followers():
-        if _followed_by(follower) == armature and set(names) <= set(follower.pose.bones.keys()):
-            return follower
-    remove_follower(armature)
+    root, data = tree.bones[0], None
+    for follower in _followers(armature):
+        if set(tree.bones) <= set(follower.data.bones.keys()):
+            if follower.sinew_ik_follower.root == root:
+                return follower
+            data = follower.data
     if references.are_between_steps():
         _session.in_no_step.add(armature.session_uid)
-    follower = bpy.data.objects.new(f"{armature.name} {ik_io.FOLLOWS}", armature.data)
-    # By an assignment, which makes bones to be posed; a copy, so that the artist's has no other user.
-    follower.data = armature.data.copy()
-    follower.data.animation_data_clear()
+    follower = bpy.data.objects.new(f"{armature.name} {root} {ik_io.FOLLOWS}", armature.data)
+    if data is None:
+        # The artist's own would have a second user.
+        data = armature.data.copy()
+        data.animation_data_clear()
+    # By an assignment, which makes bones to be posed.
+    follower.data = data
     follower.sinew_ik_is_follower = True
+    follower.sinew_ik_follower.root = root
     return follower
 
 
-def _followers() -> list[bpy.types.Object]:
-    return [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.sinew_ik_is_follower]
+def _followers(armature: bpy.types.Object | None) -> list[bpy.types.Object]:
+    """Of an armature; None: of those that are gone."""
+    return [
+        obj
+        for obj in bpy.data.objects
+        if obj.type == "ARMATURE" and obj.sinew_ik_is_follower and _followed_by(obj) == armature
+    ]
 
 
 def _followed_by(follower: bpy.types.Object) -> bpy.types.Object | None:

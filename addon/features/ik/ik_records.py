@@ -14,12 +14,12 @@ from ...core import ik as core
 class Listener:
     """Who solves; set by ik_in_depsgraph, as records know nothing of it."""
 
-    requested: Callable[[SinewIkTree], None] | None = None
+    requested: Callable[[bpy.types.Object, str], None] | None = None
 
 
-def _requested(record: SinewIkTree) -> float:
+def _requested(follower: SinewIkFollower) -> float:
     if Listener.requested is not None:
-        Listener.requested(record)
+        Listener.requested(follower.id_data, follower.root)
     return 0.0
 
 
@@ -28,15 +28,16 @@ def _setting_changed(settings: SinewIkLive, _context: bpy.types.Context) -> None
     settings.id_data.update_tag()
 
 
-class SinewIkTree(bpy.types.PropertyGroup):
-    """Of a follower: a tree that is solved, by the name of its root bone."""
+class SinewIkFollower(bpy.types.PropertyGroup):
+    """Of a follower: the tree that is solved."""
 
-    # What the last variable of the tree's driver reads.
+    root: bpy.props.StringProperty(description="The tree's root bone", options={"HIDDEN"})
+    # What the last variable of its driver reads.
     request: bpy.props.FloatProperty(get=_requested, options={"HIDDEN"})
 
 
 class SinewIkLive(bpy.types.PropertyGroup):
-    """Of an armature object: how its live trees are solved; of a follower, which."""
+    """Of an armature object: how its live trees are solved."""
 
     method: bpy.props.EnumProperty(
         name="Method",
@@ -57,10 +58,9 @@ class SinewIkLive(bpy.types.PropertyGroup):
         update=_setting_changed,
         override=properties.OVERRIDABLE,
     )
-    trees: bpy.props.CollectionProperty(type=SinewIkTree, options={"HIDDEN"})
 
 
-CLASSES = (SinewIkTree, SinewIkLive)
+CLASSES = (SinewIkFollower, SinewIkLive)
 
 
 def live_constraints(armature: bpy.types.Object) -> dict[str, str]:
@@ -71,7 +71,7 @@ def live_constraints(armature: bpy.types.Object) -> dict[str, str]:
 
 
 def register() -> None:
-    # Not in the group below, which each object would get that is asked. The first spares a look at all bones.
+    # Not in the groups below, which each object would get that is asked. The first saves reading all bones.
     bpy.types.Object.sinew_ik_is_live = bpy.props.BoolProperty(
         description="Whether Sinew solves chains of it live",
         options={"HIDDEN"},
@@ -80,6 +80,7 @@ def register() -> None:
     bpy.types.Object.sinew_ik_is_follower = bpy.props.BoolProperty(
         description="Whether Sinew made it for bones that follow", options={"HIDDEN"}
     )
+    bpy.types.Object.sinew_ik_follower = bpy.props.PointerProperty(type=SinewIkFollower)
     bpy.types.Object.sinew_ik = bpy.props.PointerProperty(type=SinewIkLive, override=properties.OVERRIDABLE)
     # At the bone, so that it stays where bones are renamed.
     bpy.types.PoseBone.sinew_ik_live = bpy.props.StringProperty(
@@ -93,5 +94,6 @@ def register() -> None:
 def unregister() -> None:
     del bpy.types.PoseBone.sinew_ik_live
     del bpy.types.Object.sinew_ik
+    del bpy.types.Object.sinew_ik_follower
     del bpy.types.Object.sinew_ik_is_follower
     del bpy.types.Object.sinew_ik_is_live
