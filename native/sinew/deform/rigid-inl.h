@@ -26,6 +26,9 @@ namespace HWY_NAMESPACE {
 template <class Rigid>
 inline constexpr std::size_t kRowFloat4s = Rigid::kNumbers / 4;
 
+// A little more than the cosine of 45 degrees.
+inline constexpr float kCosine45 = 0.7072f;
+
 // Above this many influences a set's signs are found vertex by vertex.
 inline constexpr std::size_t kMaxResolved = 32;
 
@@ -138,7 +141,7 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
     }
     // Within 45 degrees of the first, all lie within 90 of each other.
     const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
-    if (Rigid::kSignedFloat4s == 0 || least > 0.7072f) return true;
+    if (Rigid::kSignedFloat4s == 0 || least > kCosine45) return true;
     if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
     if (!signs_agree(rows, Rigid::kNumbers, count)) return false;
     if (!kPlain) subtract_first<Rigid::kNumbers>(rows, count);

@@ -15,6 +15,7 @@
 #define HWY_TARGET_INCLUDE "sinew/deform/kernels/ddm.cpp"
 #include "hwy/foreach_target.h"
 //
+#include "hwy/cache_control.h"
 #include "hwy/highway.h"
 #include "sinew/deform/centre-inl.h"
 #include "sinew/deform/rigid-inl.h"
@@ -23,11 +24,10 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
-// Newton's method has found the nearest rotation where its last step is at most this square of half an angle.
-inline constexpr float kLastStep = 1e-7f;
+// The nearest rotation is found where a step's two parts, tangents of half angles, have at most this product, squared.
+inline constexpr float kLastStep = 1e-14f;
 
 // From the blended quaternion on; what takes longer is far from it, and found one by one.
-inline constexpr int kFewestSteps = 2;
 inline constexpr int kMostSteps = 6;
 
 // Where the determinant of a step's matrix, over the cube of its trace, is less, it has no maximum to go to.
@@ -39,6 +39,11 @@ inline constexpr std::size_t kDdmNumbers = CentreRows::kNumbers;
 
 // Bones of more rows are prepared one by one for each vector.
 inline constexpr std::size_t kMaxPrepared = kMaxResolved;
+
+/// As copy_aligned() takes it.
+struct SignedRows : CentreRows {
+    static constexpr std::size_t kSignedFloat4s = 1;
+};
 
 /// The bones of blocks, as their rows are added.
 ///
@@ -55,6 +60,13 @@ public:
         float least = palette_.sizes[bones[0]];
         for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette_.sizes[bones[k]]);
         is_plain = sinew::is_plain(palette_.sizes[bones[0]], least);
+        // Within 45 degrees of the first, all lie within 90 of each other.
+        is_resolved = !is_plain && count <= kMaxPrepared &&
+                      copy_aligned<SignedRows, true>(palette_, bones, count, rows_) > kCosine45;
+        if (HWY_LIKELY(is_resolved)) {
+            for (std::size_t k = 0; k < count; ++k) to_model(rows_ + kDdmNumbers * k);
+            return;
+        }
         const std::size_t prepared = std::min(count, kMaxPrepared);
         for (std::size_t k = 0; k < prepared; ++k) load(k, rows_ + kDdmNumbers * k);
         resolve_signs();
@@ -62,6 +74,9 @@ public:
             subtract_first(rows_ + kDdmNumbers * k, is_resolved ? 0 : 4);
         }
     }
+
+    /// Of each bone kDdmNumbers, of up to kMaxPrepared.
+    [[nodiscard]] HWY_INLINE const float* rows() const { return rows_; }
 
     /// [kDdmNumbers]
     ///
@@ -76,6 +91,11 @@ public:
 private:
     HWY_INLINE void load(std::size_t k, float* row) const {
         std::memcpy(row, row_of<kDdmNumbers>(palette_, bones_[k]), sizeof(float) * kDdmNumbers);
+        to_model(row);
+    }
+
+    /// Of a row, or of what it differs from another.
+    HWY_INLINE void to_model(float* row) const {
         if (from_model_ == nullptr) return;
         for (std::size_t i = 4; i < kDdmNumbers; i += 4) {
             const float* const r = row + i;
@@ -131,6 +151,23 @@ HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::si
     return {part(MomentPart::weight), part(MomentPart::first), part(MomentPart::second)};
 }
 
+/// Has the processor fetch the moments of block `b`, if there is one. It does not by itself: the rows of the first bone
+/// are left out, as those are but for sums over all bones.
+HWY_INLINE void prefetch_moments(const Frame& frame, std::size_t b) {
+    const BoneMoments& moments = *frame.moments;
+    if (b >= moments.blocks.size()) return;
+    const std::size_t bones = moments.blocks[b].bones;
+    const MomentRows rows = rows_of(moments, b, 0);
+    const auto fetch = [](const float* part, std::size_t begin, std::size_t end) {
+        for (std::size_t row = begin; row < end; ++row) hwy::Prefetch(part + kLanes * row);
+    };
+    fetch(rows.weight, 0, 3);
+    fetch(rows.weight, 4, 3 + bones);
+    fetch(rows.first, 3, 3 * bones);
+    fetch(rows.second, 0, 6);
+    fetch(rows.second, 12, 6 + 6 * bones);
+}
+
 /// A row of a part.
 template <class D>
 HWY_INLINE Vec<D> load_row(D d, const float* part, std::size_t row) {
@@ -172,7 +209,8 @@ HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
     for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
 }
 
-template <bool kFirst, bool kPlain, bool kResolved, class D>
+/// kCount  the bones, or 0 for any number
+template <bool kFirst, bool kPlain, bool kResolved, std::size_t kCount, class D>
 HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
                                    const Points<D>& centroid) {
     alignas(64) float space[kDdmNumbers];
@@ -187,7 +225,8 @@ HWY_INLINE Motion<D> blend_moments(D d, const MomentBones& bones, const MomentRo
             add_signed<D>(d, first, load_row(d, rows.weight, 3), sum.rotation);
         }
     }
-    for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
+    const std::size_t count = kCount > 0 ? kCount : bones.count;
+    for (std::size_t k = kPlain ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         const Vec<D> weight = load_row(d, rows.weight, 3 + k);
         Points<D> first;
@@ -242,7 +281,7 @@ HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, con
 /// Of the posed neighbourhood, in the space of the bones, with the one at rest in model space.
 ///
 /// displacement  of the centroid
-template <bool kPlain, class D>
+template <bool kPlain, std::size_t kCount, class D>
 HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows& rows,
                                 const Points<D>& centroid, const Points<D>& displacement,
                                 const float* from_model) {
@@ -263,7 +302,8 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
     }
     const Vec<D> one = hn::Set(d, 1.0f);
     const Vec<D> zero = hn::Zero(d);
-    for (std::size_t k = kPlain ? 0 : 1; k < bones.count; ++k) {
+    const std::size_t count = kCount > 0 ? kCount : bones.count;
+    for (std::size_t k = kPlain ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         add_rows(row + 4, row + 8, row + 12, load_symmetric(d, rows.second, 6 + 6 * k));
         // Only what bones differ by counts, as the first moments about the centroid have sum 0.
@@ -300,6 +340,11 @@ HWY_INLINE Points<D> times(Vec<D> scale, const Points<D>& r) {
     return {hn::Mul(scale, r.x), hn::Mul(scale, r.y), hn::Mul(scale, r.z)};
 }
 
+template <class D>
+HWY_INLINE Vec<D> dot(const Points<D>& a, const Points<D>& b) {
+    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
+
 /// R(q)^T m.
 template <class D>
 HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
@@ -327,8 +372,12 @@ HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
             combined(m.z, hn::Add(xz, wy), hn::Sub(yz, wx), hn::Neg(hn::Add(xx, yy)))};
 }
 
-/// One step of Newton's method from `q`, of any length, to the rotation nearest to `matrix`: q times (1, half the step).
-/// There is none where its matrix has no maximum to go to. Of all rotations only the nearest is a maximum.
+/// One step from `q`, of any length, to the rotation nearest to `matrix`: q times (1, v). There is none where its matrix
+/// has no maximum to go to. Of all rotations only the nearest is a maximum.
+///
+/// With S = R(q)^T matrix, its vector a of S - S^T and H = trace(S) - (S + S^T) / 2, Newton's step is v = H^-1 a / 2.
+/// Behind it a is exactly -(a.v) v / (1 + v.v), so that the same H gives a second part: what is left is of the fourth
+/// order, about the product of both.
 ///
 /// Whether it is found.
 template <class D>
@@ -355,22 +404,30 @@ HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
                                      hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
     const Vec<D> scale = hn::IfThenElseZero(
         has_maximum, hn::Div(hn::Set(d, 0.5f), hn::IfThenElse(has_maximum, determinant, hn::Set(d, 1.0f))));
-    const auto along = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
-        return hn::Mul(scale, hn::MulAdd(a, slope.x, hn::MulAdd(b, slope.y, hn::Mul(c, slope.z))));
+    const auto solved = [&](const Points<D>& v, Vec<D> by) HWY_ATTR {
+        const auto along = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+            return hn::Mul(by, hn::MulAdd(a, v.x, hn::MulAdd(b, v.y, hn::Mul(c, v.z))));
+        };
+        return Points<D>{along(first.x, first.y, first.z), along(first.y, second_y, second_z),
+                         along(first.z, second_z, minor)};
     };
-    const Vec<D> x = along(first.x, first.y, first.z);
-    const Vec<D> y = along(first.y, second_y, second_z);
-    const Vec<D> z = along(first.z, second_z, minor);
-    const Vec<D> w = hn::NegMulAdd(q[1], x, hn::NegMulAdd(q[2], y, hn::NegMulAdd(q[3], z, q[0])));
-    const Vec<D> i = hn::MulAdd(q[0], x, hn::MulAdd(q[2], z, hn::NegMulAdd(q[3], y, q[1])));
-    const Vec<D> j = hn::MulAdd(q[0], y, hn::MulAdd(q[3], x, hn::NegMulAdd(q[1], z, q[2])));
-    const Vec<D> k = hn::MulAdd(q[0], z, hn::MulAdd(q[1], y, hn::NegMulAdd(q[2], x, q[3])));
+    const Points<D> newton = solved(slope, scale);
+    const Points<D> second = solved(newton, hn::Mul(hn::Neg(scale), dot<D>(slope, newton)));
+    const Vec<D> square = dot<D>(newton, newton);
+    const Vec<D> second_square = dot<D>(second, second);
+    // Far from the nearest rotation it may lead away.
+    const auto is_near = hn::Lt(second_square, hn::Mul(hn::Set(d, 0.25f), square));
+    const Points<D> v = add_scaled<D>(newton, hn::IfThenElseZero(is_near, hn::Set(d, 1.0f)), second);
+    const Vec<D> w = hn::NegMulAdd(q[1], v.x, hn::NegMulAdd(q[2], v.y, hn::NegMulAdd(q[3], v.z, q[0])));
+    const Vec<D> i = hn::MulAdd(q[0], v.x, hn::MulAdd(q[2], v.z, hn::NegMulAdd(q[3], v.y, q[1])));
+    const Vec<D> j = hn::MulAdd(q[0], v.y, hn::MulAdd(q[3], v.x, hn::NegMulAdd(q[1], v.z, q[2])));
+    const Vec<D> k = hn::MulAdd(q[0], v.z, hn::MulAdd(q[1], v.y, hn::NegMulAdd(q[2], v.x, q[3])));
     q[0] = w;
     q[1] = i;
     q[2] = j;
     q[3] = k;
-    const Vec<D> square = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
-    return hn::And(has_maximum, hn::Lt(square, hn::Set(d, kLastStep)));
+    const Vec<D> left = hn::Mul(square, second_square);
+    return hn::And(has_maximum, hn::Lt(left, hn::Set(d, kLastStep)));
 }
 
 /// The nearest rotations of lanes where `is_found` is false, one by one; the blended quaternion where there is none.
@@ -426,7 +483,7 @@ HWY_INLINE void to_nearest(D d, Rows3<D> matrix, hn::Mask<D> is_point, const flo
     hn::Mask<D> is_found = is_point;
     for (int step = 1; step <= kMostSteps; ++step) {
         is_found = hn::Or(is_point, step_to_nearest(d, matrix, q));
-        if (step >= kFewestSteps && hn::AllTrue(d, is_found)) break;
+        if (hn::AllTrue(d, is_found)) break;
     }
     for (std::size_t i = 0; i < 4; ++i) q[i] = hn::IfThenElse(is_point, blended[i], q[i]);
     if (HWY_UNLIKELY(!hn::AllTrue(d, is_found))) find_others(d, matrix, is_found, blended, q);
@@ -466,16 +523,34 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
     return total;
 }
 
-template <Variant kVariant, bool kPlain, bool kResolved, class D>
+/// The same by weights alone, of bones whose signs are resolved.
+template <std::size_t kCount, class D>
+HWY_INLINE Motion<D> blend_weights(D d, const MomentBones& bones, const MomentRows& rows,
+                                   const Points<D>& centroid) {
+    const Sum<D, kDdmNumbers> sum = blend_rows<kDdmNumbers, kCount, false>(
+        d, bones.rows(), bones.count, nullptr, rows.weight + kLanes * 4);
+    const auto moved = [&](std::size_t row) HWY_ATTR {
+        const Vec<D>* const m = sum.value + row;
+        return hn::MulAdd(m[0], centroid.x, hn::MulAdd(m[1], centroid.y, hn::MulAdd(m[2], centroid.z, m[3])));
+    };
+    return {{sum.value[0], sum.value[1], sum.value[2], sum.value[3]}, {moved(4), moved(8), moved(12)}};
+}
+
+template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0, class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
     const MomentRows rows = rows_of(*frame.moments, b, lane);
     Points<D> centroid = load_point(d, rows.weight, 0);
-    Motion<D> motion =
-        blend_moments<kVariant != Variant::weights, kPlain, kResolved>(d, bones, rows, centroid);
+    Motion<D> motion;
+    if constexpr (kVariant == Variant::weights && kResolved) {
+        motion = blend_weights<kCount>(d, bones, rows, centroid);
+    } else {
+        motion =
+            blend_moments<kVariant != Variant::weights, kPlain, kResolved, kCount>(d, bones, rows, centroid);
+    }
     if constexpr (kVariant == Variant::nearest) {
         const Rows3<D> matrix =
-            correlation<kPlain>(d, bones, rows, centroid, motion.displacement, spaces.bones_from_model);
+            correlation<kPlain, kCount>(d, bones, rows, centroid, motion.displacement, spaces.bones_from_model);
         to_nearest(d, matrix, is_point_at(d, rows.second, centroid), spaces.bones_from_model,
                    motion.rotation);
     }
@@ -492,15 +567,18 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
 }
 
 /// Blocks [begin, end), which have the same bones.
-template <Variant kVariant, bool kPlain, bool kResolved>
+///
+/// kCount  these, or 0 for any number
+template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0>
 void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t begin, std::size_t end) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = spaces_of(frame);
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
+        if (kVariant == Variant::nearest) prefetch_moments(frame, b + 1);
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
-            deform_lanes<kVariant, kPlain, kResolved>(d, frame, pointers, spaces, bones, b, lane);
+            deform_lanes<kVariant, kPlain, kResolved, kCount>(d, frame, pointers, spaces, bones, b, lane);
         }
     }
 }
@@ -509,12 +587,14 @@ template <Variant kVariant>
 void deform_set_of(const Frame& frame, std::size_t begin, std::size_t end) {
     const MomentBlock& block = frame.moments->blocks[begin];
     const MomentBones bones(frame, &frame.moments->bones[block.first_bone], block.bones);
-    if (HWY_UNLIKELY(bones.is_plain)) {
-        deform_blocks<kVariant, true, false>(frame, bones, begin, end);
-    } else if (bones.is_resolved) {
-        deform_blocks<kVariant, false, true>(frame, bones, begin, end);
-    } else {
-        deform_blocks<kVariant, false, false>(frame, bones, begin, end);
+    if (HWY_UNLIKELY(bones.is_plain)) return deform_blocks<kVariant, true, false>(frame, bones, begin, end);
+    if (!bones.is_resolved) return deform_blocks<kVariant, false, false>(frame, bones, begin, end);
+    switch (bones.count) {
+        case 1: return deform_blocks<kVariant, false, true, 1>(frame, bones, begin, end);
+        case 2: return deform_blocks<kVariant, false, true, 2>(frame, bones, begin, end);
+        case 3: return deform_blocks<kVariant, false, true, 3>(frame, bones, begin, end);
+        case 4: return deform_blocks<kVariant, false, true, 4>(frame, bones, begin, end);
+        default: return deform_blocks<kVariant, false, true>(frame, bones, begin, end);
     }
 }
 
