@@ -238,6 +238,8 @@ def build_module(platform: Platform, python: Python, log: Path) -> Path:
         "PYBIND11_FINDPYTHON": "ON",
         "pybind11_DIR": pybind11.get_cmake_dir(),
     }
+    if platform.system == "Darwin":
+        options["CMAKE_USER_MAKE_RULES_OVERRIDE_CXX"] = str(ROOT / "cmake/zig_macos.cmake")
     if platform.is_windows:
         options["Python_LIBRARY"] = str(import_library(platform, python, include))
     build = configure(platform, log, options)
