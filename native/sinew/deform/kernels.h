@@ -43,7 +43,7 @@ struct TargetKernel {
 };
 
 /// Instruction sets, see targets.h.
-inline constexpr std::size_t kTargetCount = 5;
+inline constexpr std::size_t kTargetCount = 4;
 
 /// How the library deforms whole meshes by one method. The file of this name in kernels/ defines it.
 struct Kernel {

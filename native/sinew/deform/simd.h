@@ -9,7 +9,7 @@
 namespace sinew {
 
 /// Instruction sets that kernels were built for and that this processor has, the fastest first, as
-/// Highway names them: "AVX3" (AVX-512), "AVX2", "SSE4", "SSSE3", "NEON", "SCALAR".
+/// Highway names them: "AVX3" (AVX-512), "AVX2", "SSE4", "SSE2", "NEON", "SCALAR".
 [[nodiscard]] SINEW_EXPORT std::vector<std::string_view> simd_targets();
 
 /// The one in use: the first of simd_targets() unless use_simd_target() chose another.

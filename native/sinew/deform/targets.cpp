@@ -15,7 +15,7 @@ namespace sinew {
 namespace {
 
 /// In the order of SINEW_TARGETS.
-constexpr std::int64_t kTargets[kTargetCount] = {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_SSSE3, HWY_STATIC_TARGET};
+constexpr std::int64_t kTargets[kTargetCount] = {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_STATIC_TARGET};
 
 std::string_view name_of_target(std::size_t target) { return hwy::TargetName(kTargets[target]); }
 
@@ -25,7 +25,6 @@ bool runs_here(std::int64_t bit) {
 #if HWY_ARCH_X86
     const X86Support support = x86_support();
     switch (bit) {
-        case HWY_SSSE3: return support.ssse3;
         case HWY_SSE4: return support.sse4;
         case HWY_AVX2: return support.avx2;
         case HWY_AVX3: return support.avx3;

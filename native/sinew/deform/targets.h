@@ -4,6 +4,7 @@
 
 // Disabled are those that have the vectors of another and add integer instructions (AVX3_DL and after it),
 // or whose vectors have a size that the compiler does not know: they can not be members (SVE, RVV).
+// SSSE3 is left out, too: Blender needs SSE4.2.
 // Of several NEON, whose vectors are the same, the one is left that every 64-bit ARM runs; Highway numbers the others
 // from SVE to NEON.
 #ifdef SINEW_HWY_HAS_NEON_WITHOUT_AES
@@ -11,9 +12,9 @@
 #else
 #define SINEW_OTHER_NEON 0
 #endif
-#define HWY_DISABLED_TARGETS                                                                       \
-    (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV | \
-     SINEW_OTHER_NEON)
+#define HWY_DISABLED_TARGETS                                                                         \
+    (HWY_AVX3_DL | (HWY_AVX3_DL - 1) | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | \
+     HWY_RVV | SINEW_OTHER_NEON)
 
 // Kernel::targets, the fastest first. The last is what the compiler may use anywhere.
 //
@@ -25,7 +26,6 @@
             {HWY_CHOOSE_AVX3(deform), HWY_CHOOSE_AVX3(prepare)},               \
                 {HWY_CHOOSE_AVX2(deform), HWY_CHOOSE_AVX2(prepare)},           \
                 {HWY_CHOOSE_SSE4(deform), HWY_CHOOSE_SSE4(prepare)},           \
-                {HWY_CHOOSE_SSSE3(deform), HWY_CHOOSE_SSSE3(prepare)},         \
                 {&HWY_STATIC_DISPATCH(deform), &HWY_STATIC_DISPATCH(prepare)}, \
         }                                                                      \
     }
@@ -34,5 +34,5 @@
 #define SINEW_TARGETS_OF(function)                                                       \
     {                                                                                    \
         HWY_CHOOSE_AVX3(function), HWY_CHOOSE_AVX2(function), HWY_CHOOSE_SSE4(function), \
-            HWY_CHOOSE_SSSE3(function), &HWY_STATIC_DISPATCH(function)                   \
+            &HWY_STATIC_DISPATCH(function)                                               \
     }

@@ -55,10 +55,9 @@ constexpr std::uint32_t bit(int index) { return 1u << index; }
 }  // namespace
 
 X86Support x86_support() noexcept {
-    constexpr std::uint32_t kSsse3 = bit(9);
-    constexpr std::uint32_t kSse4 = bit(19) | bit(20) | bit(1) | bit(25);  // SSE4.1, SSE4.2, CLMUL, AES
-    constexpr std::uint32_t kXsave = bit(27);                              // the operating system uses it
-    constexpr std::uint32_t kAvx = bit(28) | bit(12) | bit(29);            // AVX, FMA, F16C
+    constexpr std::uint32_t kSse4 = bit(9) | bit(19) | bit(20);  // SSSE3, SSE4.1, SSE4.2
+    constexpr std::uint32_t kXsave = bit(27);                    // the operating system uses it
+    constexpr std::uint32_t kAvx = bit(28) | bit(12) | bit(29);  // AVX, FMA, F16C
     constexpr std::uint32_t kLzcnt = bit(5);
     constexpr std::uint32_t kAvx2 = bit(5) | bit(3) | bit(8);                           // AVX2, BMI, BMI2
     constexpr std::uint32_t kAvx512 = bit(16) | bit(17) | bit(28) | bit(30) | bit(31);  // F, DQ, CD, BW, VL
@@ -69,8 +68,7 @@ X86Support x86_support() noexcept {
     const std::uint32_t extended = cpuid(7).b;
     const std::uint64_t kept = has(basic, kXsave) ? kept_registers() : 0;
     X86Support result;
-    result.ssse3 = has(basic, kSsse3);
-    result.sse4 = result.ssse3 && has(basic, kSse4);
+    result.sse4 = has(basic, kSse4);
     result.avx2 = result.sse4 && has(basic, kAvx) && has(extended, kAvx2) &&
                   has(cpuid(0x80000001u).c, kLzcnt) && has(kept, kKeptForAvx);
     result.avx3 = result.avx2 && has(extended, kAvx512) && has(kept, kKeptForAvx512);

@@ -5,8 +5,8 @@ namespace sinew {
 
 /// Which of Highway's instruction sets the processor and its operating system run. Each implies those before it.
 struct X86Support {
-    bool ssse3 = false;
-    bool sse4 = false;  // up to SSE4.2, with AES and CLMUL
+    // SSSE3 to SSE4.2. Highway adds AES and CLMUL, which no kernel uses and some processors lack that have SSE4.2.
+    bool sse4 = false;
     bool avx2 = false;  // with FMA, F16C, LZCNT, BMI and BMI2
     bool avx3 = false;  // AVX-512 F, CD, BW, DQ, VL
 };
