@@ -176,25 +176,34 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     What they pose or move is seen with the next event, where Sinew deforms after the update: to have Blender
     evaluate within a handler can crash it (4.2)."""
     seen, current.seen = current.seen, None
-    names = names_of_changed_meshes(depsgraph) if seen is not None else set()
-    if not names:
+    if seen is None:
         return
-    new = Changes(complete=True)
+    names, new = names_of_changed_meshes(depsgraph), Changes(complete=True)
     with reaction() as may_react:
+        unread = []
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
-                if obj.data.name_full in names & seen:
-                    state.needs_recheck = True
-                elif obj.data.name_full in names and properties.of(obj).upstream_proxy is not None:
-                    # What stands in front is evaluated anew only now.
-                    state.needs_recheck = state.evaluation.changed_unannounced = True
-                elif obj.data.name_full in names:
+                if not state.is_as_noted(obj):
+                    # Its modifiers, say: that decides who computes its normals.
+                    new.objects.add(obj.session_uid)
+                if obj.data.name_full not in names:
+                    continue
+                if obj.data.name_full in seen or properties.of(obj).upstream_proxy is not None:
+                    unread.append(obj)
+                else:
                     new.meshes.add(obj.data.session_uid)
-        if new.meshes:
-            new.touched |= new.meshes
+        if new.meshes or new.objects:
+            new.touched |= new.meshes | new.objects
             # What Sinew does itself came before them.
             current.expected -= new.meshes
             _react(depsgraph, new, may_react)
+        for obj in unread:
+            with contextlib.suppress(ReferenceError):
+                state = session.state_of(obj)
+                if state is not None:
+                    state.needs_recheck = True
+                    # What stands in front is evaluated anew only now.
+                    state.evaluation.changed_unannounced |= obj.data.name_full not in seen
     _end_event()
 
 

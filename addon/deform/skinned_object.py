@@ -197,7 +197,11 @@ class SkinnedObject:
             return True
         if self.needs_recheck or obj.data.session_uid in meshes:
             return False
-        return self.mode == obj.mode and self.object_state == object_state_of(obj)
+        return self.mode == obj.mode and self.is_as_noted(obj)
+
+    def is_as_noted(self, obj: bpy.types.Object) -> bool:
+        """Whether what the artist can change of the object itself is as it was when the plan was applied."""
+        return self.object_state == object_state_of(obj)
 
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the last evaluation gave the object its shape."""

@@ -60,9 +60,10 @@ def update(
     skinned = _bind(obj, skinned, depsgraph, changes, inspect, bones_changed)
     plan = _with_data(obj, skinned, plan, depsgraph)
     if inspect or skinned.bound.is_of_another_stack(known):
-        skinned.note_object(obj, plan)
         if not plan.uses_builtin:
-            keep_poses_evaluated(obj, skinned)
+            keep_poses_evaluated(obj, skinned, plan)
+        # With Sinew's driver, which is animation, too.
+        skinned.note_object(obj, plan)
     skinned.plan = plan
     # A render lists all as new with each frame; to tag the object has Blender (4.2 to 5.2) copy it anew,
     # without what animation had set.
@@ -273,7 +274,7 @@ def _request_points(
         obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
 
 
-def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
+def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan) -> None:
     """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where it
     can."""
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
@@ -285,4 +286,4 @@ def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
         if replaced.armature is not None
         for path in armature_io.paths_to_wait_for(replaced.armature, stage.binding.moving_bones)
     ]
-    pose_driver.ensure(obj, list(dict.fromkeys(poses)), skinned.plan.is_in_depsgraph)
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), plan.is_in_depsgraph)

@@ -409,6 +409,46 @@ def test_a_modifier_behind_that_is_switched_off_or_deleted_is_no_obstacle():
         assert has_given(obj) == (levels == 0)
 
 
+def add_cast(obj):
+    obj.modifiers.new("Cast", "CAST")
+
+
+def switch_cast_on(obj):
+    obj.modifiers["Off"].show_viewport = True
+
+
+def instance_on_faces(obj):
+    obj.instance_type = "FACES"
+
+
+@needs_support
+@pytest.mark.parametrize("act", [add_cast, switch_cast_on, instance_on_faces], ids=lambda each: each.__name__)
+@pytest.mark.parametrize("event", ["frame_change_post", "depsgraph_update_post"])
+def test_what_a_handler_behind_sinews_puts_behind_is_an_obstacle_at_once(event, act):
+    """Blender evaluates it without telling anybody."""
+    obj, _armature = make(smooth)
+    off = obj.modifiers.new("Off", "CAST")
+    off.show_viewport = off.show_render = False
+    bpy.context.scene.frame_set(4)
+    assert has_given(obj)
+    handlers = getattr(bpy.app.handlers, event)
+
+    def call(*_args):
+        handlers.remove(call)
+        act(obj)
+
+    handlers.append(call)
+    obj.update_tag()
+    if event == "frame_change_post":
+        bpy.context.scene.frame_set(5)
+    else:
+        bpy.context.view_layer.update()
+    assert call not in handlers
+    assert not has_given(obj)
+    given, left = both(obj)
+    np.testing.assert_array_equal(given, left)
+
+
 @needs_support
 def test_free_normals_of_the_mesh_stay():
     obj, _armature = scenes.make_arm()
