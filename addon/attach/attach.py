@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SinewError
-from ..io.animation_paths import animated_paths, is_visibility_animated
+from ..io.animation_paths import animated_paths, is_animated, is_visibility_animated
 from . import (
     corrective_smooth,
     node_group,
@@ -249,6 +249,8 @@ def _switch_off(obj: bpy.types.Object) -> None:
             properties.store(replaced, "show_render", modifier.show_render)
         # What an animation sets, it would set again with the next frame; until then it counts.
         is_keyed = is_visibility_animated(obj, modifier)
+        if is_keyed and properties.of(obj).replaces_modifiers and not replaced.visibility_is_keyed:
+            _restore_unkeyed_visibility(obj, modifier, replaced)
         # While the object is hidden, no animation sets what Sinew has switched off.
         if not is_keyed or obj.visible_get():
             properties.store(replaced, "visibility_is_keyed", is_keyed)
@@ -262,6 +264,15 @@ def _restore_visibility(
     """What an animation sets, or has set last, Sinew did not change."""
     if not replaced.visibility_is_keyed:
         _show(modifier, replaced.show_viewport, replaced.show_render)
+
+
+def _restore_unkeyed_visibility(
+    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
+) -> None:
+    """Where an animation sets one of the flags from now on, the other is the artist's own again."""
+    for name in ("show_viewport", "show_render"):
+        if not is_animated(obj, modifier, name) and getattr(modifier, name) != getattr(replaced, name):
+            setattr(modifier, name, getattr(replaced, name))
 
 
 def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:

@@ -128,7 +128,9 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
             continue
         if modifier.object is None:
             modifier.object = replaced.armature
-        modifier.show_viewport, modifier.show_render = replaced.show_viewport, replaced.show_render
+        # Where Sinew is off, or an animation sets them, they are the artist's own.
+        if properties.of(origin).replaces_modifiers and not replaced.visibility_is_keyed:
+            modifier.show_viewport, modifier.show_render = replaced.show_viewport, replaced.show_render
     if origin is None or attach.armature_of(obj) is None:
         return True
     try:

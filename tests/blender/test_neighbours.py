@@ -16,6 +16,7 @@ from sinew_addon.attach.updates import reaction, updates_suspended
 from sinew_addon.core.scale_rule import BLENDER_3
 from sinew_addon.deform import in_depsgraph, safe_mode, session
 from sinew_addon.deform.plan import State
+from sinew_addon.features.compare import comparison
 from sinew_addon.io import animation_paths
 
 FRAMES = [1, 6, 11]
@@ -115,8 +116,28 @@ def test_an_edit_in_a_handler_behind_sinews_is_in_the_frame(arm, neighbour, edit
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
 
 
+def beside_nothing(obj: bpy.types.Object) -> None:
+    pass
+
+
+def beside_a_linked_duplicate(obj: bpy.types.Object) -> None:
+    """With the same mesh, and Sinew, but nothing in front."""
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    assert session.state_of(copy) is not None
+
+
+def beside_its_comparison(obj: bpy.types.Object) -> None:
+    comparison.start(bpy.context, [obj], ["lbs"], np.array((1.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("beside", [beside_nothing, beside_a_linked_duplicate, beside_its_comparison])
 @pytest.mark.parametrize("edit", [edit_weights, edit_vertices])
-def test_an_edit_in_a_handler_behind_something_in_front_is_seen_with_the_next_frame(arm, neighbour, edit):
+def test_an_edit_in_a_handler_behind_something_in_front_is_seen_with_the_next_frame(
+    arm, neighbour, edit, beside
+):
+    beside(arm)
     arm.modifiers.new("Front", "CAST")
     arm.modifiers.move(len(arm.modifiers) - 1, 0)
     bpy.context.view_layer.update()
@@ -129,6 +150,7 @@ def test_an_edit_in_a_handler_behind_something_in_front_is_seen_with_the_next_fr
     bpy.context.scene.frame_set(8)
     bpy.context.scene.frame_set(9)
     got = scenes.final_points(arm)
+    comparison.end(bpy.context)
     properties.of(arm).enabled = False
     expected = scenes.modifier_shapes(arm, [9], True)[0]
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
@@ -269,6 +291,34 @@ def test_copied_modifiers_work(arm):
     assert properties.of(other).armature == properties.of(arm).armature
     assert_equals_modifier(other)
     assert_equals_modifier(arm)
+
+
+@pytest.mark.parametrize("keyed", [False, True])
+@pytest.mark.parametrize("enabled", [False, True])
+def test_copied_modifiers_are_on_where_the_artists_own_are(arm, enabled, keyed):
+    """Blender copies no animation with them."""
+    modifier = arm.modifiers["Armature"]
+    properties.of(arm).enabled = enabled
+    if keyed:
+        path = modifier.path_from_id("show_viewport")
+        for frame, value in ((1, True), (5, False)):
+            modifier.show_viewport = value
+            arm.keyframe_insert(path, frame=frame)
+    elif not enabled:
+        modifier.show_viewport = False
+    bpy.context.scene.frame_set(6)
+    other, _rig = scenes.make_arm(name="Other")
+    bpy.context.scene.frame_set(6)
+    other.modifiers.clear()
+    for each in (arm, other):
+        each.select_set(True)
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.make_links_data(type="MODIFIERS")
+    bpy.context.view_layer.update()
+    attach.remove(other)
+    session.refresh(bpy.context)
+    assert other.modifiers["Armature"].show_viewport == (enabled and not keyed)
+    assert other.modifiers["Armature"].show_render
 
 
 def test_copied_modifiers_have_the_mix(arm):
@@ -428,6 +478,25 @@ def test_a_mesh_that_is_off_is_rendered_as_it_is(arm, rendered_points, tmp_path)
     got = KeepingEngine.shapes[arm.name]
     scene.frame_set(6)
     assert scenes.worst(got, scenes.final_points(arm)) <= 1e-6
+
+
+@pytest.mark.parametrize("keyed", ["viewport", "render"])
+def test_where_one_visibility_is_keyed_the_other_is_the_artists(arm, rendered_points, keyed):
+    modifier = arm.modifiers["Armature"]
+    for frame, value in ((1, True), (5, False)):
+        setattr(modifier, f"show_{keyed}", value)
+        arm.keyframe_insert(modifier.path_from_id(f"show_{keyed}"), frame=frame)
+    for frame in (8, 3, 8, 3, 6):
+        bpy.context.scene.frame_set(frame)
+    shown, rendered = scenes.final_points(arm), rendered_points(arm)
+    attach.remove(arm)
+    bpy.context.scene.frame_set(6)
+    assert (modifier.show_viewport, modifier.show_render) == (keyed == "render", keyed == "viewport")
+    modifier.use_deform_preserve_volume = True
+    near = scenes.TOLERANCE * scenes.diagonal(arm)
+    assert scenes.worst(shown, scenes.final_points(arm)) <= near
+    assert scenes.worst(rendered, rendered_points(arm)) <= near
+    assert scenes.worst(shown, rendered) > 0.1
 
 
 def test_an_artists_driver_stays(arm):
