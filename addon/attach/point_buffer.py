@@ -39,8 +39,8 @@ def write(point_buffer: bpy.types.Object, points: np.ndarray) -> None:
 
 def is_in(depsgraph: bpy.types.Depsgraph, point_buffer: bpy.types.Object, with_points: bool) -> bool:
     """Whether an evaluation that has the point buffer has it as it is. One that was deleted and that undo
-    brought back, in a view layer that is not shown, Blender (4.2 to 5.2) leaves as it was evaluated last: with
-    what another step had.
+    brought back, in a view layer that is not shown, Blender (4.2 to 5.2) leaves as it was evaluated last:
+    with what another step had.
 
     with_points  not only as many
     """

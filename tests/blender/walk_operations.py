@@ -185,6 +185,16 @@ class Walker:
         self.before_evaluation()
         bpy.context.scene.frame_set(bpy.context.scene.frame_current)
 
+    def this_scene(self) -> None:
+        """Has the originals of what is animated as they are in the scene that is shown. Those that another
+        scene's frame has set Blender copies at whatever edit (4.2 and 4.5: at one of another armature), and
+        does not evaluate what depends on them: what is shown then depends on what else was touched, which is
+        not the same with Sinew."""
+        self.before_evaluation()
+        # By this the evaluation is that of the window, which alone writes to originals.
+        bpy.context.evaluated_depsgraph_get()
+        self.this_frame()
+
     def edit_mode(self) -> None:
         """With the step of undo that Blender's own key pushes: undo without one crashes it (5.2). What was
         changed before has its own: whether Blender makes one for it depends on what else is in the file."""
@@ -1837,14 +1847,13 @@ def scene(w: Walker, r: random.Random) -> str | None:
     other = next(s for s in bpy.data.scenes if s != bpy.context.scene)
     if r.random() < 0.3:
         other.frame_set(r.randint(*FRAMES))
-        return f"frame {other.frame_current} in scene {other.name}"
-    # At the first edit Blender copies an object anew, with what the other scene's frame has set of it; and
-    # Sinew edits another object than who puts Preserve Volume on.
-    if any(len(obj.users_scene) > 1 and "location" in animated_paths(obj) for obj in w.objects()):
-        return None
+        frame = other.frame_current
+        w.this_scene()
+        return f"frame {frame} in scene {other.name}"
     w.before_evaluation()
     bpy.context.view_layer.update()
     bpy.context.window.scene = other
+    w.this_scene()
     return f"scene {other.name}"
 
 
@@ -1855,8 +1864,9 @@ def copy_scene(w: Walker, r: random.Random) -> str | None:
     if len(bpy.data.scenes) > 1 or (whole and len(w.objects("MESH")) > 5) or w.compared:
         return None
     w.object_mode()
-    w.before_evaluation()
-    bpy.context.view_layer.update()
+    # Blender shows the new scene by keys alone, but only until something comes or goes in it, as Sinew's
+    # helpers do: then what was changed without a key is there again.
+    w.this_frame()
     bpy.ops.scene.new(type="FULL_COPY" if whole else "LINK_COPY")
     bpy.context.scene.name = "Second"
     # As a window does at once.
