@@ -309,6 +309,18 @@ def test_blending_actions_in_a_window(photographed):
     assert facts["ended"]["frame"] == before["frame"]
 
 
+def test_inverse_kinematics_live_in_a_window(photographed):
+    """Plays, moves a target, undoes that, renders beside the window, saves and reopens."""
+    options = ["--enable-event-simulate"]
+    facts = photographed("docs/photograph_ik.py", "ik-panel.png", "ik-render.png", options=options)
+    # Lengths of the figure's chains are some 0.5.
+    assert facts["blender"] > 2e-6
+    for when in ("live", "played", "moved", "undone", "rendered", "saved", "opened"):
+        assert facts[when] < 2e-6, when
+    assert facts["frames"] > 5
+    assert facts["muted"]
+
+
 def test_a_comparison_in_a_window(photographed):
     """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
     facts = photographed("docs/photograph_comparison.py", "comparison.png")
