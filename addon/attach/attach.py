@@ -162,7 +162,7 @@ def take_off(obj: bpy.types.Object) -> None:
 
 def _take_off(obj: bpy.types.Object) -> None:
     switch(obj, on=False)
-    resume_after_save(obj)
+    restore_volume(obj)
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     notify(subscribers.before_removal, obj)
     if nodes is not None:
@@ -187,8 +187,8 @@ def _take_off(obj: bpy.types.Object) -> None:
 def switch(obj: bpy.types.Object, on: bool) -> None:
     """On: Sinew deforms. Off: the Armature modifiers do, as they were, and Sinew's modifier is off."""
     settings, nodes = properties.of(obj), sinew_modifier(obj)
-    resume_after_save(obj)
     if on:
+        restore_volume(obj)
         adopt_pointers(obj)
         _switch_off(obj)
         corrective_smooth.switch(obj, on=False)
@@ -217,21 +217,52 @@ def prepare_for_save(obj: bpy.types.Object) -> bool:
     switch(obj, on=False)
     if nodes is not None and nodes.node_group is not None:
         node_group.set_inputs(nodes, {node_group.PRESENT: False})
-    for number, (modifier, replaced) in enumerate(replaced_modifiers(obj)):
-        properties.store(replaced, "preserve_volume", modifier.use_deform_preserve_volume)
-        method = properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
-        _preserve_volume(modifier, method == "dq")
-    properties.store(settings, "is_saved", True)
+    # What was set for a mode can be another than what is nearest.
+    restore_volume(obj)
+    use_nearest_volume(obj)
     return was_on
 
 
-def resume_after_save(obj: bpy.types.Object) -> None:
-    """The Armature modifiers have the artist's own choices again, where a saved file had others."""
+def use_nearest_volume(obj: bpy.types.Object) -> None:
+    """While the Armature modifiers deform, in a saved file and in modes whose tools need them, their Preserve
+    Volume is what is nearest to Sinew's method. Set once: what the artist switches meanwhile stays."""
     settings = properties.of(obj)
-    if settings.is_saved:
-        for modifier, replaced in replaced_modifiers(obj):
+    pairs = replaced_modifiers(obj)
+    nearest = [
+        properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0) == "dq"
+        for number, (_modifier, replaced) in enumerate(pairs)
+    ]
+    if settings.has_nearest_volume:
+        before = [replaced.preserve_volume == replaced.was_nearest for _modifier, replaced in pairs]
+        if nearest == before:
+            return
+        # The method is another now.
+        restore_volume(obj)
+    for (modifier, replaced), wanted in zip(pairs, nearest, strict=True):
+        own = modifier.use_deform_preserve_volume
+        properties.store(replaced, "preserve_volume", own)
+        properties.store(replaced, "was_nearest", own == wanted)
+        _preserve_volume(modifier, wanted)
+    properties.store(settings, "is_saved", True)
+
+
+def restore_volume(obj: bpy.types.Object) -> None:
+    """The Armature modifiers have the artist's own Preserve Volume again."""
+    settings = properties.of(obj)
+    if not settings.has_nearest_volume:
+        return
+    for replaced in settings.replaced_modifiers:
+        modifier = stack.modifier_of(obj, replaced)
+        # What the artist has switched since is the artist's own, too.
+        if modifier is not None and not replaced.was_nearest:
             _preserve_volume(modifier, replaced.preserve_volume)
-        properties.store(settings, "is_saved", False)
+    properties.store(settings, "is_saved", False)
+
+
+def has_switched_volume(obj: bpy.types.Object) -> bool:
+    """Whether one of the Armature modifiers has another Preserve Volume for now than the artist's."""
+    settings = properties.of(obj)
+    return settings.has_nearest_volume and not all(each.was_nearest for each in settings.replaced_modifiers)
 
 
 def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> None:
@@ -291,6 +322,7 @@ def _replaced_modifier(
     if found is None:
         found = replaced_modifiers.add()
         found.show_viewport, found.show_render = modifier.show_viewport, modifier.show_render
+        found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
     properties.store(found, "name", modifier.name)
     properties.store(found, "uid", modifier.persistent_uid)
     return found

@@ -111,7 +111,12 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         override=OVERRIDABLE,
     )
     preserve_volume: bpy.props.BoolProperty(
-        description="The Armature modifier's own choice, while a saved file has the one nearest to Sinew's",
+        description="The Armature modifier's own choice, while it has the one nearest to Sinew's",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
+    was_nearest: bpy.props.BoolProperty(
+        description="That was the nearest already, so nothing is to be given back",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
@@ -219,7 +224,8 @@ class SinewSettings(bpy.types.PropertyGroup):
         override=OVERRIDABLE,
     )
     is_saved: bpy.props.BoolProperty(
-        description="As saved files have it: the Armature modifiers deform, by their nearest shape",
+        description="The Armature modifiers deform by their nearest shape: in saved files, and in modes of "
+        "tools that need them",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
@@ -286,6 +292,12 @@ class SinewSettings(bpy.types.PropertyGroup):
     def replaces_modifiers(self) -> bool:
         """Whether Sinew's modifier deforms now, and the Armature modifiers are off."""
         return self.standing_in
+
+    @property
+    def has_nearest_volume(self) -> bool:
+        """Whether the Armature modifiers' Preserve Volume is what is nearest to Sinew's method, and not the
+        artist's own."""
+        return self.is_saved
 
     @property
     def point_buffer(self) -> bpy.types.Object | None:

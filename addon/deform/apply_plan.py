@@ -45,7 +45,7 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
     return ObjectFacts(
         enabled=settings.enabled,
         is_linked=obj.library is not None,
-        mode="EDIT" if mesh.is_editmode else obj.mode,
+        mode=_mode_of(obj),
         builtin_is_faster=small_meshes.is_builtin_faster(obj, given),
         has_upstream=upstream_proxy.is_needed(obj),
         upstream_changes_weights=upstream_proxy.changes_weights(obj),
@@ -76,11 +76,26 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
             point_store.remove_point_attributes(obj)
         elif obj.mode not in MODES_OF_THE_MODIFIER:
             point_store.remove(obj)
+        if wanted.state is State.BUILT_IN and _shows_nearest_volume(obj):
+            attach.use_nearest_volume(obj)
+        else:
+            attach.restore_volume(obj)
         return
     given = wanted.normals
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
     attach.switch(obj, on=True)
     attach.restore_pointers(obj)
+
+
+def _mode_of(obj: bpy.types.Object) -> str:
+    """That of another object, too, where both have one mesh."""
+    return "EDIT" if obj.data.is_editmode else obj.mode
+
+
+def _shows_nearest_volume(obj: bpy.types.Object) -> bool:
+    """Whether it is in a mode in which its Armature modifiers, by Preserve Volume, have the shape that Sinew
+    is set to."""
+    return _mode_of(obj) in MODES_OF_THE_MODIFIER and small_meshes.has_builtin_shape(obj)
 
 
 def has_lost_modifier(obj: bpy.types.Object) -> bool:

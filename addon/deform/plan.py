@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-# Tools of these modes work through the Armature modifier, which shows its own shape meanwhile.
+# Tools of these modes work through the Armature modifier, which deforms the mesh meanwhile.
 MODES_OF_THE_MODIFIER = frozenset({"EDIT", "SCULPT"})
 
 
@@ -116,7 +116,7 @@ def plan(facts: ObjectFacts) -> Plan:
         )
         return Plan(State.BUILT_IN, reason)
     if facts.mode in MODES_OF_THE_MODIFIER:
-        return Plan(State.BUILT_IN, "In this mode the Armature modifier shows its own shape")
+        return Plan(State.BUILT_IN, "In this mode the Armature modifier deforms it")
     # Its tools look for bones behind an Armature modifier that is on: which is not Sinew's to decide here.
     if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:
         reason = "The visibility of its Armature modifier is animated: in this mode that shows its own shape"

@@ -257,7 +257,7 @@ def prepare_for_save() -> None:
                 # The others are in the same file.
                 log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
         precomputing.store_in_meshes([(obj, state_of(obj)) for obj in objects])
-        note.write([obj for obj in objects if properties.of(obj).is_saved])
+        note.write([obj for obj in objects if properties.of(obj).has_nearest_volume])
 
 
 def resume_after_save(context: bpy.types.Context) -> None:
@@ -266,6 +266,8 @@ def resume_after_save(context: bpy.types.Context) -> None:
     with updates_suspended():
         for obj in filter(properties.has_sinew, bpy.data.objects):
             _expect_mesh_update(obj)
+            if obj.is_editable:
+                attach.restore_volume(obj)
             if obj.is_editable and stack.sinew_modifier(obj) is not None:
                 attach.switch(obj, on=obj.session_uid in current.on_before_saving)
     refresh(context)

@@ -202,7 +202,7 @@ def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
     if stack.armature_modifier(obj) is None:
         raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
     # What decides the plan, such as Preserve Volume, is the artist's own.
-    attach.resume_after_save(obj)
+    attach.restore_volume(obj)
     attach.follow_stack(obj)
     attach.adopt_pointers(obj)
     _check_armatures(obj, changes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..attach import hooks, properties
+from ..attach import attach, hooks, properties
 from ..deform import session, small_meshes
 from ..deform.plan import MODES_OF_THE_MODIFIER, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
@@ -75,7 +75,7 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
 
 def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
     """In modes whose tools work through the Armature modifier: whether its shape is Sinew's, and the switch
-    that makes it so where there is one."""
+    that makes it so where the artist has switched it."""
     if obj.mode not in MODES_OF_THE_MODIFIER or not properties.of(obj).enabled or obj.library is not None:
         return
     sentence, modifiers = shape_in_mode(obj)
@@ -98,7 +98,11 @@ def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureMo
     others = small_meshes.other_volume(obj)
     if others:
         return tr("Switch Preserve Volume to see {method} here, too", method=method), others
-    return tr("It is the same: {method}", method=method), []
+    if attach.has_switched_volume(obj):
+        return tr(
+            "The shape is the same: {method}. Preserve Volume is switched for it meanwhile", method=method
+        ), []
+    return tr("The shape is the same: {method}", method=method), []
 
 
 def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:

@@ -375,22 +375,71 @@ def test_the_panel_says_whether_the_modifiers_shape_is_sinews(mode):
     ours = scenes.final_points(obj)
     bpy.ops.object.mode_set(mode=mode)
     bpy.context.view_layer.update()
-    assert scenes.worst(final_points_in_any_mode(obj), ours) > 0.01
-    sentence, to_switch = state_text.shape_in_mode(obj)
-    assert sentence == "Switch Preserve Volume to see Dual Quaternion here, too"
-    assert to_switch == [modifier]
-    modifier.use_deform_preserve_volume = True
-    bpy.context.view_layer.update()
     assert scenes.worst(final_points_in_any_mode(obj), ours) <= 1e-6
-    assert state_text.shape_in_mode(obj) == ("It is the same: Dual Quaternion", [])
+    sentence = "The shape is the same: Dual Quaternion. Preserve Volume is switched for it meanwhile"
+    assert state_text.shape_in_mode(obj) == (sentence, [])
+    # As by hand: it stays, and the panel has the switch.
+    modifier.use_deform_preserve_volume = False
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(9)
+    bpy.context.scene.frame_set(8)
+    assert scenes.worst(final_points_in_any_mode(obj), ours) > 0.01
+    assert state_text.shape_in_mode(obj) == (
+        "Switch Preserve Volume to see Dual Quaternion here, too",
+        [modifier],
+    )
+    modifier.use_deform_preserve_volume = True
     properties.of(obj).bulge_limit.enabled = True
     sentence, to_switch = state_text.shape_in_mode(obj)
     assert "another shape" in sentence
     assert to_switch == []
+    # There it is of no use.
+    assert not modifier.use_deform_preserve_volume
+    properties.of(obj).bulge_limit.enabled = False
+    assert modifier.use_deform_preserve_volume
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
-    # What was switched is the artist's own choice from now on.
+    assert not modifier.use_deform_preserve_volume
+    assert np.array_equal(scenes.final_points(obj), ours)
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_the_method_changes_in_a_mode_of_the_modifier(mode):
+    """Be it to the one that the artist's own Preserve Volume gives."""
+    obj, _armature = scenes.make_arm()
+    modifier = obj.modifiers["Armature"]
+    modifier.show_in_editmode = modifier.use_deform_preserve_volume = True
+    scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(8)
+    shapes = {}
+    for method in ("lbs", "dq"):
+        properties.of(obj).method = method
+        shapes[method] = scenes.final_points(obj)
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.view_layer.update()
+    for method in ("lbs", "dq", "lbs"):
+        properties.of(obj).method = method
+        assert scenes.worst(final_points_in_any_mode(obj), shapes[method]) <= 1e-6
+        end = ". Preserve Volume is switched for it meanwhile" if method == "lbs" else ""
+        label = properties.method_label(method)
+        assert state_text.shape_in_mode(obj) == (f"The shape is the same: {label}{end}", [])
+    bpy.ops.sinew.remove()
     assert modifier.use_deform_preserve_volume
+
+
+def test_chained_modifiers_have_a_volume_each_in_sculpt_mode():
+    obj, armature = scenes.make_arm()
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object, second.use_multi_modifier = armature, True
+    second.vertex_group = "bone.1"
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).replaced_modifiers["Second"].method = "lbs"
+    bpy.context.scene.frame_set(8)
+    ours = scenes.final_points(obj)
+    bpy.ops.object.mode_set(mode="SCULPT")
+    bpy.context.view_layer.update()
+    assert scenes.worst(final_points_in_any_mode(obj), ours) <= 1e-6
+    assert [m.use_deform_preserve_volume for m in (obj.modifiers["Armature"], second)] == [True, False]
 
 
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
@@ -402,7 +451,8 @@ def test_modes_in_which_blenders_tools_need_the_modifier(mode):
     expected = final_points_in_any_mode(obj)
     bpy.ops.object.mode_set(mode="OBJECT")
     shown = scenes.final_points(obj)
-    scenes.add_sinew(obj, "dq")
+    # Which no modifier of Blender's has.
+    scenes.add_sinew(obj, "qv")
     bpy.ops.object.mode_set(mode=mode)
     bpy.context.view_layer.update()
     assert scenes.worst(final_points_in_any_mode(obj), expected) == 0.0

@@ -1422,6 +1422,9 @@ def armature_options(w: Walker, r: random.Random) -> str | None:
         modifier.use_bone_envelopes = not modifier.use_bone_envelopes
     elif what == "groups":
         modifier.use_vertex_groups = not modifier.use_vertex_groups
+    # In a mode of the modifier it is Sinew's for a while, and to switch it means something else.
+    elif obj.mode in {"EDIT", "SCULPT"} or obj.data.is_editmode:
+        return None
     else:
         w.side.set_preserve_volume(modifier, not w.side.preserve_volume(modifier))
     return f"{what} of {modifier.name} of {obj.name}"

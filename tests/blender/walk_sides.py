@@ -550,6 +550,11 @@ class SinewSide:
         pass
 
     def preserve_volume(self, modifier: bpy.types.Modifier) -> bool:
+        obj = modifier.id_data
+        if self.has_sinew(obj) and obj.sinew.has_nearest_volume:
+            kept = obj.sinew.replaced_modifiers.get(modifier.name)
+            if kept is not None and not kept.was_nearest:
+                return kept.preserve_volume
         return modifier.use_deform_preserve_volume
 
     def set_preserve_volume(self, modifier: bpy.types.Modifier, on: bool) -> None:

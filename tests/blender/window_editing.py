@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 
 import bpy
+import numpy as np
 import window
 import window_scene
 from mathutils import Vector
@@ -109,17 +110,60 @@ def weight_paint(run: Run) -> Steps:
 
 
 def _stroke() -> None:
-    """Over the middle of the view."""
     with window.in_view3d("WINDOW"):
-        middle = bpy.context.region.width / 2, bpy.context.region.height / 2
-        given = {"name": "", "location": (0.0, 0.0, 0.0), "pressure": 1.0, "size": 200.0, "x_tilt": 0.0}
-        stroke = [
-            given
-            | {"y_tilt": 0.0, "time": n / 10, "is_start": n == 0}
-            | dict.fromkeys(("mouse", "mouse_event"), (middle[0] + 4.0 * n, middle[1]))
-            for n in range(8)
-        ]
-        bpy.ops.paint.weight_paint("EXEC_DEFAULT", True, stroke=stroke)
+        bpy.ops.paint.weight_paint("EXEC_DEFAULT", True, stroke=_points_of_stroke())
+
+
+def _points_of_stroke() -> list[dict[str, object]]:
+    """Over the middle of the view."""
+    middle = bpy.context.region.width / 2, bpy.context.region.height / 2
+    given = {"name": "", "location": (0.0, 0.0, 0.0), "pressure": 1.0, "size": 200.0, "x_tilt": 0.0}
+    return [
+        given
+        | {"y_tilt": 0.0, "time": n / 10, "is_start": n == 0}
+        | dict.fromkeys(("mouse", "mouse_event"), (middle[0] + 4.0 * n, middle[1]))
+        for n in range(8)
+    ]
+
+
+@step("modes")
+def sculpt(run: Run) -> Steps:
+    """Under dq, which the Armature modifier shows with Preserve Volume: a stroke, frames, and the way back by
+    Ctrl Z."""
+    modifier = hero().modifiers["Armature"]
+    execute("object.mode_set", "Hero", mode="SCULPT")
+    yield from wait()
+    run.check(modifier.use_deform_preserve_volume, "Preserve Volume is not set in sculpt mode")
+    run.check_shapes("in sculpt mode")
+    before = np.empty(3 * len(hero().data.vertices), np.float32)
+    after = before.copy()
+    hero().data.vertices.foreach_get("co", before)
+    with window.in_view3d("WINDOW"):
+        bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=_points_of_stroke(), mode="NORMAL")
+    yield from wait()
+    hero().data.vertices.foreach_get("co", after)
+    run.check(not np.array_equal(before, after), "nothing was sculpted")
+    run.check_shapes("sculpted")
+    yield from run.check_frames()
+    press("Z", ctrl=True)
+    yield from wait(4)
+    hero().data.vertices.foreach_get("co", after)
+    run.check(np.array_equal(before, after), "the stroke was not undone")
+    run.check_shapes("the stroke undone")
+    execute("object.mode_set", "Hero", mode="OBJECT")
+    yield from wait()
+    modifier = hero().modifiers["Armature"]
+    run.check(not modifier.use_deform_preserve_volume, "Preserve Volume stays behind sculpt mode")
+    run.check_shapes("after sculpt mode")
+    for _time in range(2):
+        press("Z", ctrl=True)
+        yield from wait(4)
+        is_sculpted = hero().mode == "SCULPT"
+        has_volume = hero().modifiers["Armature"].use_deform_preserve_volume
+        run.check(has_volume == is_sculpted, f"undone, Preserve Volume is {has_volume} in {hero().mode}")
+        run.check_shapes(f"undone to {hero().mode}")
+    execute("object.mode_set", "Hero", mode="OBJECT")
+    yield from run.check_frames()
 
 
 @step("modes")

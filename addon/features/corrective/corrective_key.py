@@ -70,9 +70,7 @@ def _check(obj: bpy.types.Object) -> None:
     if not obj.data.is_editable or obj.override_library is not None:
         raise SinewError(f"{obj.name}: its mesh comes from another file, where shape keys have to be made")
     if obj.mode in MODES_OF_THE_MODIFIER:
-        raise SinewError(
-            f"{obj.name}: leave its mode first, in which the Armature modifier shows its own shape"
-        )
+        raise SinewError(f"{obj.name}: leave its mode first, in which the Armature modifier deforms it")
     if keys is not None and not keys.use_relative:
         raise SinewError(f"{obj.name}: its shape keys are absolute; a corrective key is a relative one")
     upstream_proxy.check_not_needed(obj, "where shape keys can not follow")

@@ -404,9 +404,7 @@ TEXTS = {
         "Aus einer anderen Datei verknüpft: Ihr Skelett-Modifikator verformt sie; überschreibe die "
         "Bibliothek, um Sinew zu verwenden"
     ),
-    "In this mode the Armature modifier shows its own shape": (
-        "In diesem Modus zeigt der Skelett-Modifikator seine eigene Form"
-    ),
+    "In this mode the Armature modifier deforms it": "In diesem Modus verformt sie der Skelett-Modifikator",
     "The visibility of its Armature modifier is animated: in this mode that shows its own shape": (
         "Die Sichtbarkeit ihres Skelett-Modifikators ist animiert: In diesem Modus zeigt er seine eigene Form"
     ),
@@ -840,7 +838,10 @@ TEXTS = {
     "Switch Preserve Volume to see {method} here, too": (
         "Volumenerhalt umschalten, um {method} auch hier zu sehen"
     ),
-    "It is the same: {method}": "Sie ist dieselbe: {method}",
+    "The shape is the same: {method}": "Die Form ist dieselbe: {method}",
+    "The shape is the same: {method}. Preserve Volume is switched for it meanwhile": (
+        "Die Form ist dieselbe: {method}. Volumenerhalt ist so lange dafür umgeschaltet"
+    ),
     # Lesson
     "Open the Lesson": "Die Lektion öffnen",
     "Sinew Lesson": "Sinew-Lektion",
