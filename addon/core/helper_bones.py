@@ -78,16 +78,19 @@ class Errors:
 
 @dataclass(frozen=True)
 class Blend:
-    """How a helper bone follows the pose: the dual quaternion blend of some of the rig's bones.
+    """How a helper bone follows the pose: it rotates as the dual quaternion blend of some of the rig's bones.
 
-    bones    int [n]
-    weights  float64 [n], none below 0, of sum 1
-    head     float64 [3], of the helper bone at rest: scale of bones is about it
+    bones      int [n]
+    weights    float64 [n], none below 0, of sum 1
+    head       float64 [3], of the helper bone at rest: scale of bones is about it
+    is_centre  the head is moved as linear blending moves it, as optimised centres of rotation are; else as
+               the dual quaternion blend moves it
     """
 
     bones: np.ndarray
     weights: np.ndarray
     head: np.ndarray
+    is_centre: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones that follow the pose, whatever animation there is: each moves as the dual quaternion blend of
-the rig's bones around it, with weights of its own. Blender's Armature constraint with Preserve Volume is it.
+"""Helper bones that follow the pose, whatever animation there is: each rotates as the dual quaternion blend
+of the rig's bones around it, with weights of its own. Its head moves as that blend does, or as linear
+blending with the same weights: so it is with optimised centres of rotation (Le and Hodgins 2016), of which
+the head then is one. Blender's Armature constraints, with Preserve Volume and without, are the two.
 
-Motions of this kind are in the place of those that each frame may choose (helper_bones.py): their weights are
-found by Gauss-Newton, damped (Levenberg, Marquardt), while everything else stands still.
+Motions of these kinds are in the place of those that each frame may choose (helper_bones.py): weights, and
+the place of a centre, are found by Gauss-Newton, damped (Levenberg, Marquardt), while everything else stands
+still.
 """
 
 from __future__ import annotations
@@ -21,7 +24,11 @@ from .helper_bones import Blend, Errors, Helper, Motion, Solution, Solver, Wante
 _MOST_BONES = 6
 _STEPS, _TRIES = 4, 5
 _DIFFERENCE = 1e-4
+# A centre that moves by this share of the diagonal counts as a weight that changes by 1.
+_UNIT = 0.1
 _DAMPING = 1e-3
+# Of the squares of an error. Methods that are dual quaternion blends leave 1e-12, others 1e-2 and more.
+_NEXT_TO_NOTHING = 1e-3
 # Weights that change by less are found.
 _CLOSE = 1e-4
 
@@ -52,6 +59,7 @@ class _PoseSolver(Solver):
         super().__post_init__()
         motions = np.zeros((*self.motion.bones.shape[:2], 4, 4))
         motions[:, :, :3], motions[:, :, 3, 3] = self.motion.bones, 1.0
+        self._length = max(self.motion.diagonal, 1e-30) * _UNIT
         # Blender splits a bone's scale off, and blends it apart.
         self._split = sinew.affine.split_scale(motions, np.asarray(self.rest_bones, dtype=np.float64))
 
@@ -81,7 +89,12 @@ class _PoseSolver(Solver):
         pairs = sinew.affine.to_dual_quat(rigid)
         blended = sinew.interpolate.blend(pairs, weights, "dlb", "running_sum")
         motion = np.array(sinew.dual_quat.to_affine(blended.transforms))[:, :3]
-        if linear is not None:
+        if blend.is_centre:
+            if linear is not None:
+                motion[:, :, :3] = motion[:, :, :3] @ linear
+            posed = self._linear(blend)
+            motion[:, :, 3] = posed[:, :, :3] @ head + posed[:, :, 3] - motion[:, :, :3] @ head
+        elif linear is not None:
             motion[:, :, 3] += (motion[:, :, :3] @ (head - linear @ head)[..., None])[..., 0]
             motion[:, :, :3] = motion[:, :, :3] @ linear
         return motion
@@ -99,16 +112,23 @@ class _PoseSolver(Solver):
         else:
             products = np.einsum("vfi,vfj->fij", wanted, rest)
 
+        start = self._start(vertices, weights) if helper.blend is None else helper.blend
+        helper.blend, motion = self._descended(start, squares, products)
+        return motion
+
+    def _descended(self, blend: Blend, squares: np.ndarray, products: np.ndarray) -> tuple[Blend, np.ndarray]:
+        """The blend of the least sum over vertices that is found from another on, and its motion.
+
+        squares, products  of the sum, as in _fitted()
+        """
+
         def error(motion: np.ndarray) -> float:
             return float(((motion @ squares - 2.0 * products) * motion).sum())
 
-        blend = self._start(vertices, weights) if helper.blend is None else helper.blend
         motion = self._blended(blend)
         least, damping = error(motion), _DAMPING
         for _step in range(_STEPS if len(blend.bones) > 1 else 0):
-            slopes = np.stack(
-                [(self._blended(_more(blend, at)) - motion) / _DIFFERENCE for at in range(len(blend.bones))]
-            )
+            numbers, slopes = self._numbers(blend), self._slopes(blend, motion)
             gradient = np.einsum("bfij,fij->b", slopes, motion @ squares - products)
             curvature = np.einsum("bfij,cfij->bc", slopes @ squares, slopes)
             size = np.trace(curvature) / len(gradient)
@@ -116,7 +136,7 @@ class _PoseSolver(Solver):
                 break
             for _try in range(_TRIES):
                 step = np.linalg.solve(curvature + damping * size * np.identity(len(gradient)), -gradient)
-                ahead = _onto_simplex(blend, blend.weights + step)
+                ahead = self._at(blend, numbers + step)
                 moved = self._blended(ahead)
                 now = error(moved)
                 if now < least:
@@ -124,12 +144,46 @@ class _PoseSolver(Solver):
                 damping *= 8.0
             else:
                 break
-            change = np.abs(ahead.weights - blend.weights).max()
+            change = np.abs(self._numbers(ahead) - numbers).max()
             blend, motion, least, damping = ahead, moved, now, damping / 8.0
             if change < _CLOSE:
                 break
-        helper.blend = blend
-        return motion
+        return blend, motion
+
+    def _slopes(self, blend: Blend, motion: np.ndarray) -> np.ndarray:
+        """float64 [n, frames, 3, 4]: of its motion, by each of its numbers."""
+        slopes = []
+        for at in range(len(blend.bones)):
+            more = blend.weights.copy()
+            more[at] += _DIFFERENCE
+            slopes.append((self._blended(replace(blend, weights=more)) - motion) / _DIFFERENCE)
+        if blend.is_centre:
+            posed = self._linear(blend)
+            for axis in range(3):
+                slope = np.zeros_like(motion)
+                slope[:, :, 3] = self._length * (posed[:, :, axis] - motion[:, :, axis])
+                slopes.append(slope)
+        return np.stack(slopes)
+
+    def _linear(self, blend: Blend) -> np.ndarray:
+        """float64 [frames, 3, 4]: the linear blend."""
+        shares = blend.weights / blend.weights.sum()
+        return np.einsum("b,fbij->fij", shares, self.motion.bones[:, blend.bones])
+
+    def _numbers(self, blend: Blend) -> np.ndarray:
+        """float64 [n]: what is found of a blend, weights and the place of a centre, all of one size."""
+        return np.concatenate([blend.weights, blend.head / self._length if blend.is_centre else []])
+
+    def _at(self, blend: Blend, numbers: np.ndarray) -> Blend:
+        """A blend with others, as near to these as may be: its weights are not below 0 and of sum 1."""
+        weights, head = np.split(numbers, [len(blend.bones)])
+        weights = np.maximum(weights, 0.0)
+        total = weights.sum()
+        return replace(
+            blend,
+            weights=weights / total if total > 0.0 else blend.weights,
+            head=self._length * head if blend.is_centre else blend.head,
+        )
 
     def _start(self, vertices: np.ndarray, weights: np.ndarray) -> Blend:
         """As the vertices themselves are moved, together."""
@@ -139,23 +193,24 @@ class _PoseSolver(Solver):
         bones = np.argsort(-total, kind="stable")[:_MOST_BONES]
         bones = bones[total[bones] > 0.0]
         head = np.average(self.middle[vertices], axis=0, weights=weights + 1e-30)
-        return Blend(bones, total[bones] / total[bones].sum(), head)
+        return Blend(bones, total[bones] / total[bones].sum(), head, not self._move_as_blends(vertices))
+
+    def _move_as_blends(self, vertices: np.ndarray) -> bool:
+        """Whether dual quaternion blending by the vertices' own weights leaves next to nothing of the error
+        that linear blending has."""
+        left = linear = 0.0
+        for vertex in vertices:
+            used = self.own[vertex] >= 0
+            own = Blend(self.own[vertex][used], self.own_weights[vertex][used], self.middle[vertex])
+            at = np.array([vertex])
+            left += np.square(self._moved(self._blended(own), at) - self.targets[at]).sum()
+            linear += np.square(self._moved(self._linear(own), at) - self.targets[at]).sum()
+        return bool(left <= _NEXT_TO_NOTHING * linear)
 
     def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
         assert helper.blend is not None
         assert old.blend is not None
-        ahead = helper.blend.weights + further * (helper.blend.weights - old.blend.weights)
-        helper.blend = _onto_simplex(helper.blend, ahead)
+        numbers = self._numbers(helper.blend)
+        ahead = numbers + further * (numbers - self._numbers(old.blend))
+        helper.blend = self._at(helper.blend, ahead)
         helper.motion = self._blended(helper.blend)
-
-
-def _more(blend: Blend, at: int) -> Blend:
-    weights = blend.weights.copy()
-    weights[at] += _DIFFERENCE
-    return replace(blend, weights=weights)
-
-
-def _onto_simplex(blend: Blend, weights: np.ndarray) -> Blend:
-    weights = np.maximum(weights, 0.0)
-    total = weights.sum()
-    return replace(blend, weights=weights / total) if total > 0.0 else blend

@@ -41,29 +41,31 @@ def read_joints(rig: bpy.types.Object, bones: Bones) -> Joints:
 
 
 def add_bones(
-    rig: bpy.types.Object, parents: Sequence[str], heads: np.ndarray, hanging: bool = True
+    rig: bpy.types.Object,
+    parents: Sequence[str],
+    heads: np.ndarray,
+    hanging: bool = True,
+    kind: str = "Helper",
 ) -> list[str]:
-    """Gives an armature object a copy of its armature with a helper bone for each of the `parents`; the one
-    without them stays in the file.
+    """Gives an armature object a helper bone for each of the `parents`.
 
     heads    float [helpers, 3], armature space
     hanging  under these; else without a parent
+    kind     how their names begin: a Helper moves vertices, others move helpers
     Returns their names.
     """
-    if rig.data.library is None:
-        rig.data.use_fake_user = True
-    rig.data = rig.data.copy()
     names = []
     with _editing(rig) as armature:
         collection = armature.collections.get(COLLECTION) or armature.collections.new(COLLECTION)
         for parent_name, head in zip(parents, heads, strict=True):
             parent = armature.edit_bones[parent_name]
-            bone = armature.edit_bones.new(_free_name(armature, parent_name))
+            bone = armature.edit_bones.new(_free_name(armature, kind, parent_name))
             bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, _LENGTH * parent.length, 0.0)
             placed = parent.matrix.to_3x3().to_4x4()
             placed.translation = head
             bone.matrix = placed
-            bone.parent, bone.use_connect, bone.use_deform = parent if hanging else None, False, True
+            bone.parent, bone.use_connect = parent if hanging else None, False
+            bone.use_deform = kind == "Helper"
             # A motion that is rigid but for the parent's size.
             bone.inherit_scale = "AVERAGE"
             collection.assign(bone)
@@ -73,11 +75,18 @@ def add_bones(
     return names
 
 
-def _free_name(armature: bpy.types.Armature, parent: str) -> str:
+def use_copy_of_armature(rig: bpy.types.Object) -> None:
+    """The one without helper bones stays in the file."""
+    if rig.data.library is None:
+        rig.data.use_fake_user = True
+    rig.data = rig.data.copy()
+
+
+def _free_name(armature: bpy.types.Armature, kind: str, parent: str) -> str:
     number = 1
     while True:
         end = f"_{number}"
-        start = f"Helper_{parent}".encode()[: _LONGEST_NAME - len(end)].decode(errors="ignore")
+        start = f"{kind}_{parent}".encode()[: _LONGEST_NAME - len(end)].decode(errors="ignore")
         if start + end not in armature.edit_bones:
             return start + end
         number += 1
@@ -86,17 +95,32 @@ def _free_name(armature: bpy.types.Armature, parent: str) -> str:
 def add_constraints(
     rig: bpy.types.Object, names: Sequence[str], blends: Sequence[Blend], bones: Sequence[str]
 ) -> None:
-    """Has each helper bone follow the pose of the rig's own.
+    """Has each helper bone follow the pose of the rig's own. Where its head is a centre, another bone there
+    blends linearly, which moves nothing else.
 
     bones  names of those that blends mean
     """
     for name, blend in zip(names, blends, strict=True):
-        constraint = rig.pose.bones[name].constraints.new("ARMATURE")
-        constraint.use_deform_preserve_volume = True
-        for bone, weight in zip(blend.bones, blend.weights, strict=True):
-            if weight > 0.0:
-                target = constraint.targets.new()
-                target.target, target.subtarget, target.weight = rig, bones[bone], weight
+        _blend(rig, name, blend, bones, preserve_volume=True)
+    centred = [(name, blend) for name, blend in zip(names, blends, strict=True) if blend.is_centre]
+    parents = [bones[blend.bones[blend.weights.argmax()]] for _name, blend in centred]
+    heads = np.array([blend.head for _name, blend in centred])
+    centres = add_bones(rig, parents, heads, hanging=False, kind="Centre")
+    for (name, blend), centre in zip(centred, centres, strict=True):
+        _blend(rig, centre, blend, bones, preserve_volume=False)
+        follow = rig.pose.bones[name].constraints.new("COPY_LOCATION")
+        follow.target, follow.subtarget = rig, centre
+
+
+def _blend(
+    rig: bpy.types.Object, name: str, blend: Blend, bones: Sequence[str], preserve_volume: bool
+) -> None:
+    constraint = rig.pose.bones[name].constraints.new("ARMATURE")
+    constraint.use_deform_preserve_volume = preserve_volume
+    for bone, weight in zip(blend.bones, blend.weights, strict=True):
+        if weight > 0.0:
+            target = constraint.targets.new()
+            target.target, target.subtarget, target.weight = rig, bones[bone], weight
 
 
 def write_keys(

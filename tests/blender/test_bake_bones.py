@@ -33,9 +33,9 @@ __import__("os")._exit(0)
 """
 
 
-def baked(path, out, *options):
+def baked(path, out, *options, method=METHOD):
     """The file, and what it says of each armature."""
-    command = ("bake", path, "--method", METHOD, "--to", "bones", "--frames", "1-11", "--json", "--out", out)
+    command = ("bake", path, "--method", method, "--to", "bones", "--frames", "1-11", "--json", "--out", out)
     (said,) = json.loads(run_sinew(*command, *options).stdout)
     assert said["errors"] == []
     return out / path.name, said["bones"]
@@ -99,8 +99,9 @@ def pose_anew(rig):
             bone.keyframe_insert("rotation_euler", frame=frame)
 
 
+@pytest.mark.parametrize(("method", "share"), [(METHOD, 0.25), ("cor", 0.35)])
 @pytest.mark.parametrize("scaled", [False, True])
-def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, scaled):
+def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, scaled, method, share):
     obj, path = arm
     rig = obj.modifiers["Armature"].object
     if scaled:
@@ -110,13 +111,13 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
             bone.scale = size
             bone.keyframe_insert("scale", frame=frame)
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    scenes.add_sinew(obj, METHOD)
+    scenes.add_sinew(obj, method)
     expected = world_shapes([obj], FRAMES)[0]
-    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", "--helpers", "3")
+    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", "--helpers", "3", method=method)
     assert_states(report, read_elsewhere(file, FRAMES, tmp_path)["Arm"], expected)
     assert report["after"]["rms"] < 0.25 * report["before"]["rms"]
     assert report["unseen_after"]["rms"] < 0.25 * report["unseen_before"]["rms"]
-    keyed, _reports = baked(path, tmp_path / "keyed", "--helpers", "3")
+    keyed, _reports = baked(path, tmp_path / "keyed", "--helpers", "3", method=method)
 
     # An animation that neither was made from: what Sinew makes of it, and what is played.
     pose_anew(rig)
@@ -130,23 +131,24 @@ def test_helper_bones_that_follow_the_pose_play_other_animation(arm, tmp_path, s
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
         played = read_elsewhere(tmp_path / "other.blend", FRAMES, tmp_path)["Arm"]
         found[each] = rms_and_worst(played, expected)[0]
-    assert found[file] < 0.25 * linear
+    assert found[file] < share * linear
     assert found[file] < 0.5 * found[keyed]
 
 
 @pytest.mark.once
-def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path):
+@pytest.mark.parametrize(("method", "share"), [(METHOD, 0.15), ("cor", 0.25)])
+def test_a_character_in_frames_that_it_was_not_baked_from(real_rig, tmp_path, method, share):
     path, frames = real_rig("human.blend"), (28, 36, 44)
     bpy.ops.wm.open_mainfile(filepath=str(path))
     obj = bpy.data.objects["Human"]
-    scenes.add_sinew(obj, METHOD)
+    scenes.add_sinew(obj, method)
     expected = world_shapes([obj], frames)[0]
     obj.sinew.method = "lbs"
     linear = rms_and_worst(world_shapes([obj], frames)[0], expected)[0]
     out, options = tmp_path / "out", ("--to", "bones", "--motion", "pose", "--frames", "1-24", "--step", "2")
-    run_sinew("bake", path, "--method", METHOD, *options, "--out", out)
+    run_sinew("bake", path, "--method", method, *options, "--out", out)
     played = read_elsewhere(out / path.name, frames, tmp_path)["Human"]
-    assert rms_and_worst(played, expected)[0] < 0.15 * linear
+    assert rms_and_worst(played, expected)[0] < share * linear
 
 
 def test_pose_helpers_in_the_file(arm, tmp_path):
@@ -166,6 +168,30 @@ def test_pose_helpers_in_the_file(arm, tmp_path):
         assert (constraint.type, constraint.use_deform_preserve_volume) == ("ARMATURE", True)
         assert {target.subtarget for target in constraint.targets} <= {"bone.0", "bone.1"}
         assert abs(sum(target.weight for target in constraint.targets) - 1.0) < 1e-5
+
+
+def test_centres_of_rotation_in_the_file(arm, tmp_path):
+    """Helper bones of cor follow bones that move nothing else, linearly."""
+    obj, path = arm
+    scenes.add_sinew(obj, "cor")
+    file, (report,) = baked(path, tmp_path / "out", "--motion", "pose", method="cor")
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    rig = bpy.data.objects["Arm Rig"]
+    helpers = [bone for bone in rig.pose.bones if bone.name.startswith("Helper_")]
+    assert len(helpers) == report["helpers"] == 2
+    for helper in helpers:
+        blend, follow = helper.constraints
+        assert (blend.type, blend.use_deform_preserve_volume) == ("ARMATURE", True)
+        centre = rig.pose.bones[follow.subtarget]
+        assert (follow.type, follow.target, centre.bone.use_deform) == ("COPY_LOCATION", rig, False)
+        assert centre.name not in bpy.data.objects["Arm"].vertex_groups
+        assert centre.bone.head_local == helper.bone.head_local
+        (linear,) = centre.constraints
+        assert (linear.type, linear.use_deform_preserve_volume) == ("ARMATURE", False)
+        assert [(t.subtarget, t.weight) for t in linear.targets] == [
+            (t.subtarget, t.weight) for t in blend.targets
+        ]
+        assert {bone.collections[0].name for bone in (centre.bone, helper.bone)} == {"Sinew helpers"}
 
 
 def test_meshes_of_one_armature_with_keys_and_transforms(arm, tmp_path):
@@ -214,13 +240,13 @@ def skinned_by_gltf(glb, frames, rate):
     return points
 
 
-@pytest.mark.parametrize("motion", ["keys", "pose"])
-def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion):
+@pytest.mark.parametrize(("motion", "method"), [("keys", METHOD), ("pose", METHOD), ("pose", "cor")])
+def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     """The exporter makes keys of constraints."""
     obj, path = arm
-    scenes.add_sinew(obj, METHOD)
+    scenes.add_sinew(obj, method)
     expected = world_shapes([obj], FRAMES)[0]
-    file, (report,) = baked(path, tmp_path / "out", "--motion", motion)
+    file, (report,) = baked(path, tmp_path / "out", "--motion", motion, method=method)
     glb = tmp_path / "arm.glb"
     command = [sys.executable, "-c", EXPORT, str(file), str(glb)]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

@@ -215,10 +215,11 @@ class _Rig:
         follows_pose = bool(solution.blends)
         # Only what is visible can be edited.
         with nullcontext() if self.rig.visible_get() else evaluate.shown([self.rig]):
+            helper_bones_io.use_copy_of_armature(self.rig)
             names = helper_bones_io.add_bones(self.rig, own, solution.heads, hanging=not follows_pose)
-        if follows_pose:
-            helper_bones_io.add_constraints(self.rig, names, solution.blends, bones.names)
-        else:
+            if follows_pose:
+                helper_bones_io.add_constraints(self.rig, names, solution.blends, bones.names)
+        if not follows_pose:
             motions = np.zeros((*solution.motions.shape[:2], 4, 4))
             motions[:, :, :3], motions[:, :, 3, 3] = solution.motions, 1.0
             parents = np.array(self._poses)[:, solution.parents]
