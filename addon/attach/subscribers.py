@@ -20,6 +20,7 @@ class Subscribers:
     deformed         all objects have the shape of this evaluation, as far as handlers are concerned
     frame_shown      what the panel shows of a frame may differ
     exported         an export has ended, or failed
+    safe_mode_changed  it was switched on or off
     precomputation_asked  something is computed on a thread, or will be
     precomputation_shown  how far that is may differ
     """
@@ -33,6 +34,7 @@ class Subscribers:
     )
     frame_shown: list[Callable[[], None]] = field(default_factory=list)
     exported: list[Callable[[], None]] = field(default_factory=list)
+    safe_mode_changed: list[Callable[[], None]] = field(default_factory=list)
     precomputation_asked: list[Callable[[], None]] = field(default_factory=list)
     precomputation_shown: list[Callable[[], None]] = field(default_factory=list)
 

@@ -7,6 +7,7 @@ import os
 
 import bpy
 
+from ..attach.subscribers import notify, subscribers
 from ..deform import precomputing, safe_mode, session
 from ..io import addon_preferences, units
 from . import menus, operators
@@ -16,6 +17,7 @@ from .translations import tr
 
 def _safe_mode_changed(_preferences: SinewPreferences, context: bpy.types.Context) -> None:
     session.refresh(context)
+    notify(subscribers.safe_mode_changed)
 
 
 def _cache_changed(_preferences: SinewPreferences, _context: bpy.types.Context) -> None:

@@ -16,6 +16,7 @@ import scenes
 import sinew
 import sinew_addon
 from mathutils import Matrix, Vector
+from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode
 from sinew_addon.features.ik import ik_bake, ik_handlers, ik_in_depsgraph, ik_live
@@ -680,6 +681,7 @@ def test_linked_armatures_and_overrides_are_refused(tmp_path):
 def test_safe_mode_leaves_it_to_blender():
     arm = make_arm()
     constraint = constrain(arm, "arm.1", make_empty("Target", near()))
+    blender = poses(arm, ["arm.0", "arm.1"])
     live(arm)
     try:
         safe_mode.set_forced(True)
@@ -687,10 +689,11 @@ def test_safe_mode_leaves_it_to_blender():
         bpy.context.view_layer.update()
         assert not constraint.mute
         assert ik_live.problem_of(arm) == ik_live.SAFE_MODE
+        np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1"]), blender, atol=1e-6)
     finally:
         safe_mode.set_forced(None)
-    arm.update_tag()
-    bpy.context.view_layer.update()
+    # As the preference does.
+    notify(subscribers.safe_mode_changed)
     assert constraint.mute
     assert ik_live.problem_of(arm) == ""
 

@@ -11,6 +11,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...attach import references
+from ...attach.subscribers import subscribers
 from ...attach.updates import is_main_thread, is_rendering_in_window
 from ...deform import events
 from . import ik_in_depsgraph, ik_live
@@ -21,6 +22,8 @@ def _armatures() -> Iterator[bpy.types.Object]:
 
 
 def sync_all() -> None:
+    if not _may_change():
+        return
     with references.between_steps():
         for armature in list(_armatures()):
             ik_live.sync(armature)
@@ -114,10 +117,12 @@ _HANDLERS = {
 
 def subscribe() -> None:
     events.subscribe_all(_HANDLERS)
+    subscribers.safe_mode_changed.append(sync_all)
 
 
 def unsubscribe() -> None:
     events.unsubscribe_all(_HANDLERS)
+    subscribers.safe_mode_changed.remove(sync_all)
 
 
 def adopt_open_file() -> None:
