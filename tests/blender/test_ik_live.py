@@ -441,6 +441,24 @@ def test_the_switch_is_of_the_selected_chains():
     assert followers() == []
 
 
+def test_a_constraint_that_comes_later_pulls_the_same_tree():
+    arm = branches()
+    for name in ("branch.-1.3", "branch.1.3"):
+        constraints = arm.pose.bones[name].constraints
+        constraints.remove(constraints["IK"])
+    later = arm.pose.bones["branch.1.1"].constraints["IK"]
+    later.mute = True
+    live(arm)
+    now(arm, "branch.-1.1")
+    later.mute = False
+    now(arm, "branch.-1.1")
+    live(arm)
+    assert later.mute
+    for side in (-1, 1):
+        control = arm.matrix_world @ arm.pose.bones[f"control.{side}"].head
+        np.testing.assert_allclose(now(arm, f"branch.{side}.1"), control, atol=1e-4)
+
+
 def test_undo_and_redo():
     arm = with_pole()
     names = ["arm.0", "arm.1", "hand"]

@@ -41,14 +41,14 @@ class _Thread(threading.local):
 
     def __init__(self) -> None:
         sinew.keep_thread_state()
-        # By the name of the follower: one of each thread, as a solver has one user at a time.
-        self.known: dict[str, _Known] = {}
+        # By the follower's name and what pulls: one of each thread, as a solver has one user at a time.
+        self.known: dict[tuple[str, str], _Known] = {}
 
 
 _thread = _Thread()
 
 
-def requested(follower: bpy.types.Object, root: str) -> None:
+def requested(follower: bpy.types.Object, root: str, constraints: str) -> None:
     """Solves the tree of an evaluated follower."""
     if not follower.is_evaluated:
         # Somebody else reads the property.
@@ -58,7 +58,7 @@ def requested(follower: bpy.types.Object, root: str) -> None:
     if armature is None or armature.pose is None:
         return
     try:
-        one_frame = _one_frame_of(follower, armature, root)
+        one_frame = _one_frame_of(follower, armature, root, constraints)
     except SinewError:
         # Changed since it was put on, which the handler of this update sees, too.
         return
@@ -74,15 +74,18 @@ def requested(follower: bpy.types.Object, root: str) -> None:
         _write(follower, armature, bones, None)
 
 
-def _one_frame_of(follower: bpy.types.Object, armature: bpy.types.Object, root: str) -> OneFrame:
-    known = _thread.known.get(follower.name)
+def _one_frame_of(
+    follower: bpy.types.Object, armature: bpy.types.Object, root: str, constraints: str
+) -> OneFrame:
+    key = follower.name, constraints
+    known = _thread.known.get(key)
     if known is None or known.settings != ik_io.settings_of(armature, known.one_frame.tree):
         trees = ik_io.read_trees(armature, [root], live_constraints(armature))
         tree = next((tree for tree in trees if tree.bones[0] == root), None)
         if tree is None:
             raise SinewError(f"{armature.name}: no constraint pulls a chain from {root}")
         known = _Known(ik_io.settings_of(armature, tree), OneFrame(armature, tree))
-        _thread.known[follower.name] = known
+        _thread.known[key] = known
     return known.one_frame
 
 

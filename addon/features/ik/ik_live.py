@@ -18,6 +18,7 @@ Blender's constraints play; which of them are Sinew's stays at the bones (ik_rec
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
@@ -289,6 +290,7 @@ def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
     for tree in trees:
         follower = _follower_of(armature, tree)
         followers.append(follower)
+        follower.sinew_ik_follower.constraints = json.dumps(tree.constraints)
         _add_driver(follower, armature, tree)
         for bone, name in tree.constraints:
             armature.pose.bones[bone].sinew_ik_live = name

@@ -181,7 +181,7 @@ def _tips(tree: core.Tree) -> list[str]:
 
 
 def _is_live(tree: core.Tree, live: dict[str, str]) -> bool:
-    return any(bone in live for bone, _name in tree.constraints)
+    return all(bone in live for bone, _name in tree.constraints)
 
 
 def _has_sinew_ik(armature: bpy.types.Object) -> bool:

@@ -14,12 +14,12 @@ from ...core import ik as core
 class Listener:
     """Who solves; set by ik_in_depsgraph, as records know nothing of it."""
 
-    requested: Callable[[bpy.types.Object, str], None] | None = None
+    requested: Callable[[bpy.types.Object, str, str], None] | None = None
 
 
 def _requested(follower: SinewIkFollower) -> float:
     if Listener.requested is not None:
-        Listener.requested(follower.id_data, follower.root)
+        Listener.requested(follower.id_data, follower.root, follower.constraints)
     return 0.0
 
 
@@ -32,6 +32,7 @@ class SinewIkFollower(bpy.types.PropertyGroup):
     """Of a follower: the tree that is solved."""
 
     root: bpy.props.StringProperty(description="The tree's root bone", options={"HIDDEN"})
+    constraints: bpy.props.StringProperty(description="What pulls the tree", options={"HIDDEN"})
     # What the last variable of its driver reads.
     request: bpy.props.FloatProperty(get=_requested, options={"HIDDEN"})
 

@@ -584,6 +584,7 @@ TEXTS = {
     "The bone's IK constraint that Sinew solves live": "Der IK-Zwang des Knochens, den Sinew live löst",
     "Whether Sinew solves chains of it live": "Ob Sinew Ketten davon live löst",
     "The tree's root bone": "Der Wurzelknochen des Baums",
+    "What pulls the tree": "Was am Baum zieht",
     "Whether Sinew made it for bones that follow": "Ob Sinew es für Knochen gemacht hat, die folgen",
     "Safe mode: Blender's own constraints play": "Sicherer Modus: Blenders eigene Zwänge wirken",
     "Whether keys of Sinew IK play": "Ob Schlüsselbilder von Sinew-IK laufen",
