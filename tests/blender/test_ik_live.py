@@ -16,6 +16,7 @@ import scenes
 import sinew
 import sinew_addon
 from mathutils import Matrix, Vector
+from sinew_addon import cli
 from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.core.errors import SinewError
 from sinew_addon.deform import safe_mode
@@ -747,3 +748,19 @@ def test_a_bake_of_one_live_tree_leaves_the_other_live():
     assert not upper.mute
     assert not ik_bake.is_baked(arm)
     assert ik_in_depsgraph.problems == {}
+
+
+def test_the_command_solves_a_file_whose_chains_are_live(tmp_path, capfd):
+    arm = make_arm(3)
+    constrain(arm, "arm.2", make_empty("Target", near()), chain_count=3)
+    live(arm)
+    found = poses(arm, ["arm.0", "arm.1", "arm.2"])
+    source = tmp_path / "arm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    assert cli.main(["ik", str(source), "--out", str(tmp_path / "out"), "--compare"]) == 0
+    assert "1 of 1 files solved" in capfd.readouterr().out
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "arm.blend"))
+    arm = bpy.data.objects["Arm"]
+    assert not ik_live.is_live(arm)
+    assert ik_bake.is_baked(arm)
+    np.testing.assert_allclose(poses(arm, ["arm.0", "arm.1", "arm.2"]), found, atol=2e-5)
