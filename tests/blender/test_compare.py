@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tomllib
 from html import unescape
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -320,41 +321,58 @@ def test_tolerant(sinew_render):
 """
 
 
+def run_pytest(folder, *options):
+    # The installed plugin would come a second time under its own name.
+    environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
+    command = [sys.executable, "-m", "pytest", "-p", "sinew_addon.pytest_plugin", "-p", "no:cacheprovider"]
+    return subprocess.run(
+        [*command, "-q", "--rootdir", str(folder), *options, str(folder)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
 @newest_only
 def test_the_pytest_fixture(tmp_path):
-    def run_pytest(*options):
-        # The installed plugin would come a second time under its own name.
-        environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-p",
-            "sinew_addon.pytest_plugin",
-            "-p",
-            "no:cacheprovider",
-        ]
-        return subprocess.run(
-            [*command, "-q", "--rootdir", str(tmp_path), *options, str(tmp_path)],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
-
     scenes.make_arm()
     save(tmp_path / "arm.blend")
     (tmp_path / "test_rig.py").write_text(TESTS)
-    without = run_pytest("-k", "same")
+    without = run_pytest(tmp_path, "-k", "same")
     assert "no golden pictures; make them with pytest --sinew-update" in without.stdout
     assert without.returncode == 1
-    assert run_pytest("-k", "same", "--sinew-update").returncode == 0
-    result = run_pytest()
+    assert run_pytest(tmp_path, "-k", "same", "--sinew-update").returncode == 0
+    result = run_pytest(tmp_path)
     assert "1 failed, 2 passed" in result.stdout, result.stdout
     assert "FAILED" in result.stdout
     assert "test_other_method" in result.stdout
     assert "0011.difference.png" in result.stdout
+
+
+@newest_only
+def test_the_example_of_a_repository_of_rigs(tmp_path):
+    page = (REPOSITORY / "docs" / "render-tests.md").read_text(encoding="utf-8")
+    layout, tests = re.findall(r"```(?:text|python)\n(.*?)```", page, re.DOTALL)
+    for folder in ("rigs", "tests"):
+        (tmp_path / folder).mkdir()
+    _obj, armature = scenes.make_arm()
+    for name in re.findall(r"\w+\.blend", layout):
+        save(tmp_path / "rigs" / name)
+    (tmp_path / "tests" / "test_rigs.py").write_text(tests)
+    made = run_pytest(tmp_path, "--sinew-update")
+    assert made.returncode == 0, made.stdout
+    pictures = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.png"))
+    golden = "tests/golden"
+    assert pictures == [f"{golden}/hero/0001.png", f"{golden}/hero/0011.png", f"{golden}/sidekick/0011.png"]
+    assert all(Path(path).parent.name + "/" in layout for path in pictures)
+    assert "0001.png, 0011.png" in layout
+    scenes.key_pose(armature, 60.0)
+    save(tmp_path / "rigs" / "sidekick.blend")
+    compared = run_pytest(tmp_path)
+    assert "1 failed, 1 passed" in compared.stdout, compared.stdout
+    assert "test_rig[sidekick]" in compared.stdout
 
 
 def test_pytest_is_told_of_the_fixture():
