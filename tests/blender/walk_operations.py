@@ -1273,6 +1273,9 @@ KINDS = (
 )
 # Behind, what they make of a shape hangs on its last bit.
 IN_FRONT = ("DECIMATE", "VERTEX_WEIGHT_EDIT")
+# Of a mesh that was given a shape as its own, so that its last bits differ between the sides: Decimate makes
+# other faces of it (without Sinew, too, where a mesh is moved by a rounding).
+SHAPED = "shaped"
 
 
 def _make_nodes(name: str) -> bpy.types.NodeTree:
@@ -1334,6 +1337,8 @@ def add_modifier(w: Walker, r: random.Random) -> str | None:
         return None
     front |= kind in IN_FRONT
     if kind in ("HOOK", *IN_FRONT) and (obj.override_library is not None or not obj.vertex_groups):
+        return None
+    if kind == "DECIMATE" and obj.data.get(SHAPED):
         return None
     modifier = obj.modifiers.new(w.new_name(kind.title()), kind)
     if modifier is None:
@@ -1506,6 +1511,8 @@ def copy_modifiers(w: Walker, r: random.Random) -> str | None:
     target = w.one(r, [o for o in meshes if o != source])
     if source is None or target is None or not w.select(target, source):
         return None
+    if target.data.get(SHAPED) and any(m.type == "DECIMATE" for m in source.modifiers):
+        return None
     bpy.ops.object.make_links_data(type="MODIFIERS")
     w.side.copied_modifiers(source, target)
     return f"copy the modifiers of {source.name} to {target.name}"
@@ -1538,7 +1545,7 @@ def apply_modifier(w: Walker, r: random.Random) -> str | None:
     # A window has evaluated what was appended just now.
     bpy.context.view_layer.update()
     w.side.apply(obj)
-    obj.data.name = w.new_name("mesh")
+    obj.data.name, obj.data[SHAPED] = w.new_name("mesh"), True
     return f"apply what deforms {obj.name}, and before it {', '.join(in_front) or 'nothing'}"
 
 
@@ -1550,7 +1557,7 @@ def convert_to_mesh(w: Walker, r: random.Random) -> str | None:
     w.before_evaluation()
     bpy.ops.object.convert(target="MESH")
     obj = bpy.context.view_layer.objects.active
-    obj.data.name = w.new_name("mesh")
+    obj.data.name, obj.data[SHAPED] = w.new_name("mesh"), True
     w.side.applied(obj)
     return f"convert {obj.name} to a mesh"
 
