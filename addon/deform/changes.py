@@ -27,6 +27,8 @@ class Changes:
     complete   whatever is not listed is as it was at the last update; else all may have changed
     lost       something listed is no longer found, as a handler deleted or renamed it: any mesh may have
                changed
+    after_step  they are those of a step of undo or redo: what is listed was read anew, however little of it
+               Blender says to be touched
     """
 
     touched: set[int] = field(default_factory=set)
@@ -39,6 +41,7 @@ class Changes:
     frame: bool = False
     complete: bool = False
     lost: bool = False
+    after_step: bool = False
 
     @staticmethod
     def are_of_meshes_only(depsgraph: bpy.types.Depsgraph) -> bool:
@@ -61,12 +64,18 @@ class Changes:
         return _changed_meshes(depsgraph.updates, _uid_by(original))
 
     @classmethod
-    def read(cls, depsgraph: bpy.types.Depsgraph, frame: bool, complete: bool, original: Find) -> Changes:
+    def read(
+        cls,
+        depsgraph: bpy.types.Depsgraph,
+        frame: bool,
+        complete: bool,
+        original: Find,
+        after_step: bool = False,
+    ) -> Changes:
         """original: what finds originals."""
         updates = depsgraph.updates
-        changes = cls(
-            frame=frame, complete=complete, meshes=_changed_meshes(updates, _uid_by(original)) - {GONE}
-        )
+        meshes = _changed_meshes(updates, _uid_by(original)) - {GONE}
+        changes = cls(frame=frame, complete=complete, after_step=after_step, meshes=meshes)
         for update in updates:
             what = update.id
             if isinstance(what, bpy.types.Scene | bpy.types.Collection):
@@ -85,6 +94,10 @@ class Changes:
             self.armatures.add(uid)
             return
         self.touched.add(uid)
+        if self.after_step and isinstance(original, bpy.types.Mesh):
+            self.meshes.add(uid)
+        if self.after_step and isinstance(original, bpy.types.Key):
+            self.meshes.add(original.user.session_uid)
         if isinstance(original, bpy.types.Object):
             if update.is_updated_geometry:
                 self.objects.add(uid)
@@ -104,6 +117,7 @@ class Changes:
         self.structure |= other.structure
         self.complete &= other.complete
         self.lost |= other.lost
+        self.after_step |= other.after_step
 
 
 def names_of_changed_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:

@@ -111,7 +111,7 @@ def _read_changes(depsgraph: bpy.types.Depsgraph, original: originals.Find, fram
     """What an evaluation lists is all only to who saw the one before: a render has a depsgraph of its own."""
     same = current.depsgraph == depsgraph.as_pointer()
     current.depsgraph = depsgraph.as_pointer()
-    return Changes.read(depsgraph, frame, same, original)
+    return Changes.read(depsgraph, frame, same, original, current.is_after_step)
 
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) -> None:
@@ -236,16 +236,24 @@ def before_loading(*_args: object) -> None:
 
 @persistent
 def before_undo(*_args: object) -> None:
-    on_data_replaced()
     with reaction():
-        for obj in filter(properties.has_sinew, references.noted()):
+        current.is_saving = False
+        between = list(filter(properties.has_sinew, references.noted()))
+        session.forget_for_step({obj.session_uid for obj in between})
+        for obj in between:
             point_store.let_go(obj)
         references.forget()
 
 
 @persistent
+def on_undone(*_args: object) -> None:
+    with reaction():
+        session.adopt_after_step()
+
+
+@persistent
 def on_data_replaced(*_args: object) -> None:
-    """Undo, redo and loading: every reference is void and what holds points has others."""
+    """Loading: every reference is void and what holds points has others."""
     with reaction():
         current.is_saving = False
         session.forget()
@@ -354,9 +362,9 @@ _HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_depsgraph_update,
     "undo_pre": before_undo,
-    "undo_post": on_data_replaced,
+    "undo_post": on_undone,
     "redo_pre": before_undo,
-    "redo_post": on_data_replaced,
+    "redo_post": on_undone,
     "load_pre": before_loading,
     "load_post": on_loaded,
     "save_pre": on_save,

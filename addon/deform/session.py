@@ -14,7 +14,7 @@ from ..attach import attach, normals, note, orphans, overrides, point_store, pro
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, reaction, updates_suspended
 from ..core.errors import SinewError
-from . import after_update, apply_plan, events, precomputing
+from . import after_update, apply_plan, events, precomputing, undo
 from .changes import GONE, Changes
 from .gate import Gate
 from .in_depsgraph import DepsgraphRequests
@@ -31,7 +31,7 @@ Pairs = list[tuple[bpy.types.Object, SkinnedObject]]
 @dataclass
 class Session:
     """What is known of the open file. Objects are referred to between events only; undo and loading make all
-    references void, so both forget everything.
+    references void: loading forgets everything, undo what undo.py does not keep.
 
     objects           those that have Sinew; None where that has to be found out
     object_count      how many objects the file had then
@@ -47,6 +47,7 @@ class Session:
     is_rendering      between the events of a render's start and end
     must_refresh      something waits for the end of a render
     seen              the meshes that had changed before functions behind Sinew's were called
+    is_after_step     no evaluation was seen since a step of undo or redo
     all_use_builtin   Armature modifiers deform all of them, and only an event that is listened to can change
                       that
     """
@@ -66,6 +67,7 @@ class Session:
     is_rendering: bool = False
     must_refresh: bool = False
     seen: set[str] | None = None
+    is_after_step: bool = False
     all_use_builtin: bool = False
 
     @property
@@ -89,9 +91,33 @@ def forget() -> None:
     current.missed = None
     current.seen = None
     current.expected = set()
+    current.is_after_step = False
     current.skinned.clear()
-    current.pairs = []
-    requests.set_objects({})
+    _set_pairs([])
+
+
+def forget_for_step(let_go: set[int]) -> None:
+    """Before undo and redo: every reference is void from here on.
+
+    let_go  the session_uid of objects that are changed for it
+    """
+    known, depsgraph = {}, current.depsgraph
+    if current.missed is None:
+        known = undo.known_before(current.pairs, depsgraph)
+    forget()
+    current.skinned = {uid: state for uid, state in known.items() if uid not in let_go}
+    current.depsgraph, current.is_after_step = depsgraph, True
+
+
+def adopt_after_step() -> None:
+    """After undo and redo: the evaluation that comes next deforms what is still known by it."""
+    objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
+    _set_pairs([(obj, state) for obj in objects if (state := state_of(obj)) is not None])
+
+
+def _set_pairs(pairs: Pairs) -> None:
+    current.pairs = pairs
+    requests.set_objects({obj.name: state for obj, state in pairs})
 
 
 def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
@@ -284,6 +310,8 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         if current.missed is not None:
             changes.add(current.missed)
             current.missed = None
+        if current.is_after_step:
+            _drop_unknown(depsgraph, changes)
         read_later = _drop_expected(changes)
         _adopt_copied_modifiers(changes)
         _note_readers(changes)
@@ -296,12 +324,21 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
             if state is not None and obj.data.session_uid in read_later:
                 state.needs_recheck = True
         states = [(obj, state_of(obj)) for obj in objects_with_sinew(Changes())]
-        current.pairs = [(obj, state) for obj, state in states if state is not None]
-        requests.set_objects({obj.name: state for obj, state in current.pairs})
+        _set_pairs([(obj, state) for obj, state in states if state is not None])
         current.all_use_builtin = _do_all_use_builtin()
         _subscribe_to_needed_frames()
         notify(subscribers.deformed, current.objects or [], depsgraph)
         notify(subscribers.frame_shown)
+
+
+def _drop_unknown(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
+    """With the first evaluation after undo or redo."""
+    current.is_after_step = False
+    current.skinned = {
+        obj.session_uid: state
+        for obj, state in current.pairs
+        if changes.complete and undo.is_known_after(obj, state, depsgraph, changes)
+    }
 
 
 def identity_of_layer(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tuple[int, str]:

@@ -245,5 +245,5 @@ def object_state_of(obj: bpy.types.Object) -> list:
             # With none of them it is off.
             state += (modifier.levels, modifier.render_levels)
         if modifier.type == "ARMATURE":
-            state += (modifier.object, attach.method_of(modifier), *ModifierOptions.values(modifier))
+            state += (uid(modifier.object), attach.method_of(modifier), *ModifierOptions.values(modifier))
     return state

@@ -50,7 +50,7 @@ def update(
     plan = _apply_plan(obj, skinned, changes) if inspect else before
     # First of all, as groups are renamed along with bones.
     bones_changed = skinned is not None and bound.have_bones_changed(
-        obj, skinned.bound, depsgraph, None if skinned.plan.state is State.OFF else changes
+        obj, skinned.bound, depsgraph, None if _may_have_other_bones(skinned, changes) else changes
     )
     # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
     if not source.is_ready(obj, depsgraph, was_on):
@@ -80,6 +80,11 @@ def update(
         skinned.shown.frames = None
     skinned.bound.source.known_key_values = skinned.bound.source.key_values
     return skinned
+
+
+def _may_have_other_bones(skinned: SkinnedObject, changes: Changes) -> bool:
+    """Whatever the changes say: they were not seen while it was off."""
+    return skinned.plan.state is State.OFF or changes.after_step
 
 
 def _is_in_mode_of_modifier(obj: bpy.types.Object) -> bool:

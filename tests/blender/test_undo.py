@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo and redo of what Sinew reacted to after Blender had made its step: Blender keeps an object that is the
-same in both steps, and with it what the object refers to. A test that fails here mostly ends the process."""
+"""Undo and redo: of what Sinew reacted to after Blender had made its step, and of edits of all that a shape
+is made of, as what is known of an object outlives a step.
 
+Blender keeps an object that is the same in both steps, and with it what the object refers to. A test of the
+first kind that fails mostly ends the process.
+"""
+
+import bmesh
 import bpy
 import pytest
 import routes
 import scenes
-from sinew_addon.attach import properties, stack
+from sinew_addon.attach import attach, properties, stack
+from sinew_addon.deform import session
 
 
 @pytest.fixture(autouse=True)
@@ -99,3 +105,242 @@ def test_undo_of_what_sinew_reacted_to_after_the_step(route, change, name):
     bpy.ops.ed.undo()
     bpy.ops.ed.undo()
     assert scenes.worst(scenes.final_points(bpy.data.objects["Arm"]), expected) < 1e-6
+
+
+def _weights(arm):
+    arm.vertex_groups["bone.0"].add(range(100, 200), 0.3, "REPLACE")
+
+
+def _weights_of_one_vertex(arm):
+    arm.vertex_groups["bone.1"].add([130], 0.05, "REPLACE")
+
+
+def _points(arm):
+    for vertex in arm.data.vertices:
+        vertex.co.z += 0.3
+    arm.data.update()
+
+
+def _points_in_edit_mode(arm):
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(arm.data)
+    for vertex in edited.verts:
+        vertex.co.z += 0.3
+    bmesh.update_edit_mesh(arm.data)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def _fewer_vertices(arm):
+    edited = bmesh.new()
+    edited.from_mesh(arm.data)
+    edited.verts.ensure_lookup_table()
+    bmesh.ops.delete(edited, geom=edited.verts[200:], context="VERTS")
+    edited.to_mesh(arm.data)
+    edited.free()
+    arm.data.update()
+
+
+def _other_mesh(arm):
+    """Of as many vertices."""
+    arm.data = bpy.data.meshes["Spare"]
+
+
+def _keys(arm):
+    arm.data.shape_keys.key_blocks["Key 1"].data[130].co.y += 0.4
+    arm.data.update_tag()
+
+
+def _key_value(arm):
+    arm.data.shape_keys.key_blocks["Key 1"].value = 0.7
+
+
+def _bones(arm):
+    rig = attach.armature_of(arm)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones["bone.1"].tail.y += 0.5
+    rig.data.edit_bones["bone.1"].roll += 0.4
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = arm
+
+
+def _bone_name(arm):
+    attach.armature_of(arm).data.bones["bone.1"].name = "elsewhere"
+
+
+def _bone_option(arm):
+    attach.armature_of(arm).data.bones["bone.1"].use_deform = False
+
+
+def _pose(arm):
+    attach.armature_of(arm).pose.bones["bone.1"].rotation_quaternion = (0.9, 0.2, 0.3, 0.0)
+
+
+def _group_name(arm):
+    arm.vertex_groups["bone.1"].name = "nothing"
+
+
+def _group_order(arm):
+    bpy.context.view_layer.objects.active = arm
+    arm.vertex_groups.active_index = 1
+    bpy.ops.object.vertex_group_move(direction="UP")
+    arm.vertex_groups[0].add(range(50), 0.9, "REPLACE")
+
+
+def _options(arm):
+    modifier = arm.modifiers["Armature"]
+    modifier.vertex_group, modifier.invert_vertex_group = "bone.0", True
+
+
+def _in_front(arm):
+    arm.modifiers.new("Front", "CAST")
+    arm.modifiers.move(len(arm.modifiers) - 1, 0)
+
+
+def _behind(arm):
+    arm.modifiers.new("Behind", "CAST")
+
+
+def _armature(arm):
+    arm.modifiers["Armature"].object = bpy.data.objects["Other Rig"]
+
+
+def _method(arm):
+    attach.use_one_method(arm, "lbs")
+
+
+def _removed(arm):
+    attach.remove(arm)
+    session.refresh(bpy.context)
+
+
+def _deleted(arm):
+    bpy.data.objects.remove(arm)
+
+
+def _hidden_and_edited(arm):
+    arm.hide_viewport = True
+    bpy.context.view_layer.update()
+    _weights(arm)
+
+
+_EDITS = [
+    *(_weights, _weights_of_one_vertex, _points, _points_in_edit_mode, _fewer_vertices, _other_mesh),
+    *(_keys, _key_value, _bones, _bone_name, _bone_option, _pose, _group_name, _group_order),
+    *(_options, _in_front, _behind, _armature, _method, _removed, _deleted, _hidden_and_edited),
+]
+
+
+def _of_modifier(name):
+    """What the Armature modifier makes of an object in Sinew's place."""
+    obj = bpy.data.objects[name]
+    if not (properties.has_sinew(obj) and properties.of(obj).enabled):
+        return scenes.final_points(obj)
+    preserve_volume = properties.of(obj).method == "dq"
+    modifier = obj.modifiers["Armature"]
+    own = modifier.use_deform_preserve_volume
+    properties.of(obj).enabled = False
+    modifier.use_deform_preserve_volume = preserve_volume
+    found = scenes.final_points(obj)
+    modifier.use_deform_preserve_volume = own
+    properties.of(obj).enabled = True
+    return found
+
+
+def _shapes(read=lambda name: scenes.final_points(bpy.data.objects[name])):
+    found = {}
+    for name in ("Arm", "Other"):
+        if name in bpy.data.objects and bpy.data.objects[name].visible_get():
+            found[name] = read(name)
+    return found
+
+
+def _assert_same(got, expected, near=1e-6):
+    assert got.keys() == expected.keys()
+    for name, points in got.items():
+        assert points.shape == expected[name].shape
+        assert scenes.worst(points, expected[name]) <= near
+
+
+def _opened_again(tmp_path, edit):
+    """Two arms in a file that was just opened: Sinew has taken to them what is in the first step of undo."""
+    arm, _rig = scenes.make_arm()
+    other, _rig = scenes.make_arm(name="Other")
+    other.location.y = 2.0
+    if edit in (_keys, _key_value):
+        arm.shape_key_add()
+        arm.shape_key_add(name="Key 1").value = 1.0
+    spare = arm.data.copy()
+    spare.name, spare.use_fake_user = "Spare", True
+    for vertex in spare.vertices:
+        vertex.co.y *= 1.5
+    for obj in (arm, other):
+        scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(7)
+    bpy.context.view_layer.objects.active = arm
+    path = str(tmp_path / "undo.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="opened")
+
+
+@pytest.mark.parametrize("edit", _EDITS, ids=lambda each: each.__name__)
+@pytest.mark.parametrize("route", routes.ROUTES)
+def test_shapes_after_undo_and_redo(route, edit, tmp_path):
+    routes.force(route)
+    _opened_again(tmp_path, edit)
+    near = scenes.TOLERANCE * scenes.diagonal(bpy.data.objects["Arm"])
+    before = _shapes()
+    edit(bpy.data.objects["Arm"])
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="edited")
+    after = _shapes()
+    for _time in range(2):
+        bpy.ops.ed.undo()
+        _assert_same(_shapes(), before)
+        bpy.ops.ed.redo()
+        _assert_same(_shapes(), after)
+    bpy.ops.ed.undo()
+    _assert_same(_shapes(), _shapes(_of_modifier), near)
+    bpy.context.scene.frame_set(4)
+    _assert_same(_shapes(), _shapes(_of_modifier), near)
+
+
+@pytest.mark.parametrize("edit", [_weights, _points, _key_value, _bone_option, _pose])
+def test_what_a_step_leaves_alone_is_not_read_again(edit, tmp_path):
+    routes.force(routes.EVALUATION)
+    _opened_again(tmp_path, edit)
+    # All meshes are listed after undo of the first step of a file.
+    for each in (_pose, edit):
+        each(bpy.data.objects["Arm"])
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message=each.__name__)
+    known = session.state_of(bpy.data.objects["Other"])
+    bound, number = known.bound, known.shown.number
+    bpy.ops.ed.undo()
+    other = bpy.data.objects["Other"]
+    assert session.state_of(other) is known
+    assert known.bound is bound
+    # Blender itself evaluates what has an armature after each step: once.
+    assert known.shown.number <= number + 1
+    assert session.state_of(bpy.data.objects["Arm"]) is not None
+
+
+@pytest.mark.parametrize("edit", [_weights, _points, _bones, _options, _method, _pose])
+def test_undo_while_an_object_is_hidden(edit, tmp_path):
+    """What is not evaluated is in no list of what changed."""
+    routes.force(routes.EVALUATION)
+    _opened_again(tmp_path, edit)
+    before = _shapes()
+    edit(bpy.data.objects["Arm"])
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="edited")
+    bpy.data.objects["Arm"].hide_set(True)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="hidden")
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    bpy.data.objects["Arm"].hide_set(False)
+    bpy.context.view_layer.update()
+    _assert_same(_shapes(), before)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of objects over a step of undo or redo: to read them all anew takes longer than the step.
+
+Blender keeps in memory what is the same in two steps, and lists all else in the next evaluation. So an object
+stays known that Sinew deforms within the evaluation, by its own mesh alone, and that was shown before and is
+after. What the list names of its data is read anew; bones, and what the artist can change of the object
+itself, are compared in any case.
+"""
+
+from __future__ import annotations
+
+import contextlib
+
+import bpy
+
+from .changes import Changes
+from .plan import State
+from .skinned_object import SkinnedObject
+
+
+def known_before(
+    pairs: list[tuple[bpy.types.Object, SkinnedObject]], depsgraph_seen: int
+) -> dict[int, SkinnedObject]:
+    """By session_uid, before the step.
+
+    depsgraph_seen  the address of the one that Sinew saw last
+    """
+    depsgraph = bpy.context.view_layer.depsgraph
+    is_seen = depsgraph is not None and depsgraph.as_pointer() == depsgraph_seen
+    if not is_seen or bpy.context.preferences.experimental.use_undo_legacy:
+        return {}
+    known = {}
+    for obj, state in pairs:
+        # It may have been deleted since they were listed.
+        with contextlib.suppress(ReferenceError):
+            if _is_known(obj, state, depsgraph):
+                known[obj.session_uid] = state
+    return known
+
+
+def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool:
+    plan, evaluation = state.plan, state.evaluation
+    return (
+        plan.state is State.IN_DEPSGRAPH
+        and not (plan.in_buffer or state.bound.source.from_front)
+        and not (state.needs_recheck or state.needs_apply)
+        and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
+        and obj.mode == state.mode == "OBJECT"
+        and _is_shown(obj, depsgraph)
+    )
+
+
+def is_known_after(
+    obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
+) -> bool:
+    """With the first evaluation after the step: whether it is the object that is known, with its shape."""
+    has_shape = state.was_deformed(obj, depsgraph) or state.dependencies.isdisjoint(changes.touched)
+    return _is_shown(obj, depsgraph) and has_shape and state.is_as_noted(obj)
+
+
+def _is_shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    return obj.visible_get(view_layer=depsgraph.view_layer) and obj.evaluated_get(depsgraph).is_evaluated
