@@ -102,7 +102,7 @@ def forget_for_step(let_go: set[int]) -> None:
     let_go  the session_uid of objects that are changed for it
     """
     known, depsgraph = {}, current.depsgraph
-    if current.missed is None:
+    if current.missed is None and not current.is_after_step:
         known = undo.known_before(current.pairs, depsgraph)
     forget()
     current.skinned = {uid: state for uid, state in known.items() if uid not in let_go}
