@@ -31,8 +31,8 @@ LEFT_TO_OTHERS = {
     *("test_command_line", "test_compare", "test_comparison", "test_export", "test_hostile", "test_output"),
     *("test_report", "test_restore", "test_stages_in_features"),
 }
-# What Sinew makes of a character that Blender gave it, and its panels: left to the long-term releases by the others. These run
-# how Blender evaluates, stores, edits and renders.
+# What Sinew makes of a character that Blender gave it, and its panels: left to the long-term releases by the
+# others. These run how Blender evaluates, stores, edits and renders.
 LEFT_TO_LONG_TERM = {
     *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
     *("test_diagnostics_panel", "test_found_where_looked_for", "test_golden", "test_heat_map", "test_ik"),
