@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import window
 import window_scene
+from bpy_extras import view3d_utils
 from mathutils import Vector
 from window_hand import FOLDER, Run, Steps, choose, click, execute, hero, press, rig, set_frame, step, wait
 from window_scene import LARGE, shown_points, worst
@@ -114,10 +115,26 @@ def _stroke() -> None:
         bpy.ops.paint.weight_paint("EXEC_DEFAULT", True, stroke=_points_of_stroke())
 
 
-def _points_of_stroke() -> list[dict[str, object]]:
-    """Over the middle of the view."""
+def _nearest_point() -> Vector:
+    """Of Hero as it is shown, in its own space, the one that is nearest to the viewer."""
+    depsgraph = bpy.context.window_manager.windows[0].view_layer.depsgraph
+    to_view = bpy.context.space_data.region_3d.view_matrix @ hero().matrix_world
+    return max(map(Vector, shown_points(hero(), depsgraph)), key=lambda point: (to_view @ point).z)
+
+
+def _points_of_stroke(place: Vector | None = None) -> list[dict[str, object]]:
+    """Over the middle of the view, or over a place on Hero, in its own space."""
     middle = bpy.context.region.width / 2, bpy.context.region.height / 2
-    given = {"name": "", "location": (0.0, 0.0, 0.0), "pressure": 1.0, "size": 200.0, "x_tilt": 0.0}
+    if place is not None:
+        view, shown = bpy.context.space_data.region_3d, hero().matrix_world @ place
+        middle = tuple(view3d_utils.location_3d_to_region_2d(bpy.context.region, view, shown))
+    given = {
+        "name": "",
+        "location": tuple(place or (0.0,) * 3),
+        "pressure": 1.0,
+        "size": 200.0,
+        "x_tilt": 0.0,
+    }
     return [
         given
         | {"y_tilt": 0.0, "time": n / 10, "is_start": n == 0}
@@ -139,7 +156,7 @@ def sculpt(run: Run) -> Steps:
     after = before.copy()
     hero().data.vertices.foreach_get("co", before)
     with window.in_view3d("WINDOW"):
-        bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=_points_of_stroke(), mode="NORMAL")
+        bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=_points_of_stroke(_nearest_point()))
     yield from wait()
     hero().data.vertices.foreach_get("co", after)
     run.check(not np.array_equal(before, after), "nothing was sculpted")
