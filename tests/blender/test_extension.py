@@ -321,6 +321,14 @@ def test_inverse_kinematics_live_in_a_window(photographed):
     assert facts["muted"]
 
 
+def test_sculpt_mode_in_a_window(photographed):
+    facts = photographed("docs/photograph_sculpt.py", "sculpt.png")
+    assert facts["linear"] > 1e-3 * facts["diagonal"]
+    assert facts["worst"] <= scenes.TOLERANCE * facts["diagonal"]
+    assert facts["worst after"] == 0.0
+    assert facts["volume"] == [True, False]
+
+
 def test_a_comparison_in_a_window(photographed):
     """Plays, poses, flips, undoes, saves and reopens a comparison between its start and its end."""
     facts = photographed("docs/photograph_comparison.py", "comparison.png")
