@@ -88,6 +88,8 @@ def steps() -> Iterator[None]:
     blend = armature.sinew_blend
     facts["listed"] = [clip.action.name for clip in blend.clips]
     blend.clips[1].weight = 0.5
+    # With the fields that it shows.
+    blend.changes = True
     bpy.context.scene.frame_set(16)
     with window.in_view3d("WINDOW"):
         view = bpy.context.space_data.region_3d
@@ -95,6 +97,7 @@ def steps() -> Iterator[None]:
     for _tick in range(10):
         yield
     window.photograph(PICTURE)
+    blend.changes = False
     yield
     other.frame_end = LONG
     bpy.ops.ed.undo_push(message="Before")
