@@ -53,7 +53,7 @@ def test_agrees_with_the_reference(domain, share):
     np.testing.assert_allclose(got, expected_of(points, mesh, sharp, domain), rtol=0, atol=1e-5)
 
 
-@pytest.mark.parametrize("share", [(0.0, 0.0), (0.2, 0.1), (0.0, 1.0)])
+@pytest.mark.parametrize("share", [(0.0, 0.0), (0.2, 0.1), (0.8, 0.0), (0.0, 1.0)])
 @pytest.mark.parametrize("is_bent", [False, True])
 def test_custom_normals_agree_with_the_reference(share, is_bent):
     mesh = mesh_of(1)

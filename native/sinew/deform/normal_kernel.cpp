@@ -102,10 +102,103 @@ HWY_INLINE Points<D> face_normal(D d, const Points<D>& newell) {
     return {scaled(newell.x), scaled(newell.y), hn::IfThenElse(has_area, scaled(newell.z), one)};
 }
 
+template <class D>
+struct SineCosine {
+    Vec<D> sine;
+    Vec<D> cosine;
+};
+
+/// Of angles of at most a turn or so, to 1e-7: by Taylor series, made to fit by Moshier (Cephes), of an eighth of a turn.
+template <class D>
+HWY_INLINE SineCosine<D> sine_cosine(D d, Vec<D> angle) {
+    const auto set = [d](float value) HWY_ATTR { return hn::Set(d, value); };
+    const auto quarters = hn::Round(hn::Mul(angle, set(0.636619772367581f)));
+    // A quarter of a turn in two parts, the first of few digits.
+    auto r = hn::Sub(angle, hn::Mul(quarters, set(1.5703125f)));
+    r = hn::Sub(r, hn::Mul(quarters, set(4.83826794896619e-4f)));
+    const auto r2 = hn::Mul(r, r);
+    auto sine = hn::Add(hn::Mul(r2, set(-1.9515295891e-4f)), set(8.3321608736e-3f));
+    sine = hn::Add(hn::Mul(r2, sine), set(-1.6666654611e-1f));
+    sine = hn::Add(r, hn::Mul(hn::Mul(r, r2), sine));
+    auto cosine = hn::Add(hn::Mul(r2, set(2.443315711809948e-5f)), set(-1.388731625493765e-3f));
+    cosine = hn::Add(hn::Mul(r2, cosine), set(4.166664568298827e-2f));
+    cosine = hn::Add(hn::Sub(set(1.0f), hn::Mul(r2, set(0.5f))), hn::Mul(hn::Mul(r2, r2), cosine));
+    const auto quadrant = hn::Sub(quarters, hn::Mul(hn::Floor(hn::Mul(quarters, set(0.25f))), set(4.0f)));
+    const auto is_odd = hn::Or(hn::Eq(quadrant, set(1.0f)), hn::Eq(quadrant, set(3.0f)));
+    const auto a = hn::IfThenElse(is_odd, cosine, sine);
+    const auto b = hn::IfThenElse(is_odd, sine, cosine);
+    const auto is_first_or_last = hn::Or(hn::Eq(quadrant, hn::Zero(d)), hn::Eq(quadrant, set(3.0f)));
+    return {hn::IfThenElse(hn::Lt(quadrant, set(2.0f)), a, hn::Neg(a)),
+            hn::IfThenElse(is_first_or_last, b, hn::Neg(b))};
+}
+
+/// How far `part` turns: by as much of `whole`, or backwards of what is left of a turn.
+template <class D>
+HWY_INLINE Vec<D> turned(D d, Vec<D> part, Vec<D> whole) {
+    const auto rest = hn::Sub(hn::Set(d, 6.28318530717959f), whole);
+    return hn::Mul(part, hn::IfThenElse(hn::Gt(part, hn::Zero(d)), whole, rest));
+}
+
+template <class D>
+HWY_INLINE Points<D> rounded_cross(const Points<D>& a, const Points<D>& b) {
+    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+
+/// The direction of what is perpendicular to `n`, of cosine `along`.
+template <class D>
+HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, Vec<D> along) {
+    const Points<D> of_n{hn::Mul(n.x, along), hn::Mul(n.y, along), hn::Mul(n.z, along)};
+    return direction(d, minus<D>(v, of_n));
+}
+
+/// The edges of fans between which their custom normals are.
+template <class D>
+struct FanEdges {
+    Points<D> first;
+    Points<D> last;
+    // Cosines of their angles to the normal.
+    Vec<D> along_first;
+    Vec<D> along_last;
+    Vec<D> mean_angle;  // of all edges to it
+};
+
+/// The normals `n`, tilted and turned.
+template <class D>
+HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& edges, Vec<D> tilt,
+                                    Vec<D> turn) {
+    const Points<D> x = perpendicular<D>(d, edges.first, n, edges.along_first);
+    const Points<D> y = direction(d, rounded_cross<D>(n, x));
+    const Points<D> to_last = perpendicular<D>(d, edges.last, n, edges.along_last);
+    const auto steep = hn::Set(d, kTooSteep);
+    const auto whole = hn::Set(d, 6.28318530717959f);
+    const auto cosine = rounded_dot<D>(x, to_last);
+    const auto acute = polynomial_angle(d, cosine);
+    const auto is_behind = hn::Lt(rounded_dot<D>(y, to_last), hn::Zero(d));
+    const auto beta =
+        hn::IfThenElse(hn::Lt(cosine, steep), hn::IfThenElse(is_behind, hn::Sub(whole, acute), acute), whole);
+    const SineCosine<D> of_tilt = sine_cosine(d, turned(d, tilt, edges.mean_angle));
+    const SineCosine<D> of_turn = sine_cosine(d, turned(d, turn, beta));
+    const auto on_x = hn::Mul(of_tilt.sine, of_turn.cosine);
+    const auto on_y = hn::Mul(of_tilt.sine, of_turn.sine);
+    const auto zero = hn::Zero(d);
+    const auto stays = hn::Or(hn::Eq(tilt, zero), hn::Or(hn::Eq(edges.mean_angle, zero), hn::Eq(beta, zero)));
+    const auto has_space =
+        hn::And(hn::Lt(hn::Abs(edges.along_first), steep), hn::Lt(hn::Abs(edges.along_last), steep));
+    const auto of = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+        const auto sum = hn::Add(hn::Add(hn::Mul(a, of_tilt.cosine), hn::Mul(b, on_x)), hn::Mul(c, on_y));
+        return hn::IfThenElseZero(has_space, hn::IfThenElse(stays, a, sum));
+    };
+    return {of(n.x, x.x, y.x), of(n.y, x.y, y.y), of(n.z, x.z, y.z)};
+}
+
+// --- Faces and the angles of their corners
+
 /// Lanes of a block from `lane` on.
 ///
 /// kCorners  of each face; 0: those of the block
-template <std::size_t kCorners, bool kAngles, bool kIsLast, class D>
+/// kLone     with the custom normals of lone fans
+template <std::size_t kCorners, bool kAngles, bool kIsLast, bool kLone, class D>
 HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& block, std::size_t lane) {
     const std::size_t count = kCorners > 0 ? kCorners : block.corners;
     const std::size_t lanes = block.lanes;
@@ -118,6 +211,8 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
         newell.z = hn::Add(newell.z, hn::Mul(hn::Sub(from.x, to.x), hn::Add(from.y, to.y)));
     };
     Float4* const slots = frame.slots + 2 * (block.first_slot + lane);
+    // From each corner to the next.
+    [[maybe_unused]] Points<D> edges[kLone ? kCorners : 1];
     if (count > 0) {
         const Points<D> first = points_of<kIsLast>(d, frame.points, vertices);
         const Points<D> last = points_of<kIsLast>(d, frame.points, vertices + (count - 1) * lanes);
@@ -133,6 +228,7 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
                 const Points<D> after = k + 1 < count ? direction(d, minus<D>(next, current)) : closing;
                 of_slot[k % 4] = polynomial_angle(d, hn::Neg(rounded_dot<D>(before, after)));
                 before = after;
+                if constexpr (kLone) edges[k] = after;
                 if (k % 4 == 3 || k + 1 == count) {
                     store_slots(d, of_slot[0], of_slot[1], of_slot[2], of_slot[3],
                                 slots + 2 * (k / 4) * lanes + 1);
@@ -150,14 +246,29 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
     for (std::size_t k = 0; k == 0 || k < count; k += 4) {
         store_slots(d, normal.x, normal.y, normal.z, zero, slots + 2 * (k / 4) * lanes);
     }
+    if constexpr (kLone) {
+        for (std::size_t k = 0; k < kCorners; ++k) {
+            const LoneFans& fans = frame.mesh->lone_fans[block.first_lone + k];
+            const Points<D> back = minus<D>({zero, zero, zero}, edges[(k + kCorners - 1) % kCorners]);
+            const auto along_first = rounded_dot<D>(edges[k], normal);
+            const auto along_last = rounded_dot<D>(back, normal);
+            const auto angles = hn::Add(polynomial_angle(d, along_first), polynomial_angle(d, along_last));
+            const auto mean = hn::Div(angles, hn::Set(d, 2.0f));
+            const Points<D> normals = custom_normals<D>(
+                d, normal, {edges[k], back, along_first, along_last, mean},
+                hn::Load(d, fans.tilt.lane.data() + lane), hn::Load(d, fans.turn.lane.data() + lane));
+            store_interleaved(d, normals.x, normals.y, normals.z, zero,
+                              numbers_of(frame.lone_normals + kLanes * (block.first_lone + k) + lane));
+        }
+    }
 }
 
-template <std::size_t kCorners, bool kAngles, bool kIsLast>
+template <std::size_t kCorners, bool kAngles, bool kIsLast, bool kLone = false>
 HWY_INLINE void compute_block(const NormalFrame& frame, const FaceBlock& block) {
-    if (block.lanes == 1) return compute_lanes<kCorners, kAngles, kIsLast>(One(), frame, block, 0);
+    if (block.lanes == 1) return compute_lanes<kCorners, kAngles, kIsLast, kLone>(One(), frame, block, 0);
     const Full d;
     for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-        compute_lanes<kCorners, kAngles, kIsLast>(d, frame, block, lane);
+        compute_lanes<kCorners, kAngles, kIsLast, kLone>(d, frame, block, lane);
     }
 }
 
@@ -167,12 +278,20 @@ HWY_NOINLINE void compute_any_block(const NormalFrame& frame, const FaceBlock& b
     compute_block<0, kAngles, true>(frame, block);
 }
 
+template <std::size_t kCorners>
+HWY_NOINLINE void compute_block_with_lone_fans(const NormalFrame& frame, const FaceBlock& block) {
+    compute_block<kCorners, true, false, true>(frame, block);
+}
+
 template <bool kAngles>
 HWY_INLINE void compute_blocks(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
         const FaceBlock& block = frame.mesh->blocks[b];
         if (block.reads_last_point || block.corners < 3 || block.corners > 4) {
             compute_any_block<kAngles>(frame, block);
+        } else if (kAngles && block.first_lone != FaceBlock::kNoLoneFans && frame.lone_normals != nullptr) {
+            block.corners == 3 ? compute_block_with_lone_fans<3>(frame, block)
+                               : compute_block_with_lone_fans<4>(frame, block);
         } else if (block.corners == 3) {
             compute_block<3, kAngles, false>(frame, block);
         } else {
@@ -250,61 +369,11 @@ void sum_groups(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     });
 }
 
-// --- Custom normals
+// --- Custom normals of other fans
 
-template <class D>
-struct SineCosine {
-    Vec<D> sine;
-    Vec<D> cosine;
-};
-
-/// Of angles of at most a turn or so, to 1e-7: by Taylor series, made to fit by Moshier (Cephes), of an eighth of a turn.
-template <class D>
-HWY_INLINE SineCosine<D> sine_cosine(D d, Vec<D> angle) {
-    const auto set = [d](float value) HWY_ATTR { return hn::Set(d, value); };
-    const auto quarters = hn::Round(hn::Mul(angle, set(0.636619772367581f)));
-    // A quarter of a turn in two parts, the first of few digits.
-    auto r = hn::Sub(angle, hn::Mul(quarters, set(1.5703125f)));
-    r = hn::Sub(r, hn::Mul(quarters, set(4.83826794896619e-4f)));
-    const auto r2 = hn::Mul(r, r);
-    auto sine = hn::Add(hn::Mul(r2, set(-1.9515295891e-4f)), set(8.3321608736e-3f));
-    sine = hn::Add(hn::Mul(r2, sine), set(-1.6666654611e-1f));
-    sine = hn::Add(r, hn::Mul(hn::Mul(r, r2), sine));
-    auto cosine = hn::Add(hn::Mul(r2, set(2.443315711809948e-5f)), set(-1.388731625493765e-3f));
-    cosine = hn::Add(hn::Mul(r2, cosine), set(4.166664568298827e-2f));
-    cosine = hn::Add(hn::Sub(set(1.0f), hn::Mul(r2, set(0.5f))), hn::Mul(hn::Mul(r2, r2), cosine));
-    const auto quadrant = hn::Sub(quarters, hn::Mul(hn::Floor(hn::Mul(quarters, set(0.25f))), set(4.0f)));
-    const auto is_odd = hn::Or(hn::Eq(quadrant, set(1.0f)), hn::Eq(quadrant, set(3.0f)));
-    const auto a = hn::IfThenElse(is_odd, cosine, sine);
-    const auto b = hn::IfThenElse(is_odd, sine, cosine);
-    const auto is_first_or_last = hn::Or(hn::Eq(quadrant, hn::Zero(d)), hn::Eq(quadrant, set(3.0f)));
-    return {hn::IfThenElse(hn::Lt(quadrant, set(2.0f)), a, hn::Neg(a)),
-            hn::IfThenElse(is_first_or_last, b, hn::Neg(b))};
-}
-
-/// How far `part` turns: by as much of `whole`, or backwards of what is left of a turn.
-template <class D>
-HWY_INLINE Vec<D> turned(D d, Vec<D> part, Vec<D> whole) {
-    const auto rest = hn::Sub(hn::Set(d, 6.28318530717959f), whole);
-    return hn::Mul(part, hn::IfThenElse(hn::Gt(part, hn::Zero(d)), whole, rest));
-}
-
-template <class D>
-HWY_INLINE Points<D> rounded_cross(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
-
-/// The direction of what is perpendicular to `n`, of cosine `along`.
-template <class D>
-HWY_INLINE Points<D> perpendicular(D d, const Points<D>& v, const Points<D>& n, Vec<D> along) {
-    const Points<D> of_n{hn::Mul(n.x, along), hn::Mul(n.y, along), hn::Mul(n.z, along)};
-    return direction(d, minus<D>(v, of_n));
-}
-
-/// The custom normals of the lanes of a block from `lane` on.
+/// Those of the lanes of a block from `lane` on.
 template <bool kIsLast, class D>
-HWY_INLINE Points<D> custom_normals(D d, const NormalFrame& frame, const FanBlock& block, std::size_t lane) {
+HWY_INLINE Points<D> fan_normals(D d, const NormalFrame& frame, const FanBlock& block, std::size_t lane) {
     const std::int32_t* const vertices = frame.mesh->fan_vertices.data() + block.first_vertex + lane;
     // All normals are in one array.
     const Points<D> n =
@@ -322,30 +391,10 @@ HWY_INLINE Points<D> custom_normals(D d, const NormalFrame& frame, const FanBloc
     for (std::size_t k = 1; k < block.edges; ++k) {
         angles = hn::Add(angles, polynomial_angle(d, rounded_dot<D>(edge(1 + k), n)));
     }
-    const auto alpha = hn::Div(angles, hn::Set(d, static_cast<float>(block.edges)));
-    const Points<D> x = perpendicular<D>(d, first, n, along_first);
-    const Points<D> y = direction(d, rounded_cross<D>(n, x));
-    const Points<D> to_last = perpendicular<D>(d, last, n, along_last);
-    const auto steep = hn::Set(d, kTooSteep);
-    const auto whole = hn::Set(d, 6.28318530717959f);
-    const auto cosine = rounded_dot<D>(x, to_last);
-    const auto acute = polynomial_angle(d, cosine);
-    const auto is_behind = hn::Lt(rounded_dot<D>(y, to_last), hn::Zero(d));
-    const auto beta =
-        hn::IfThenElse(hn::Lt(cosine, steep), hn::IfThenElse(is_behind, hn::Sub(whole, acute), acute), whole);
-    const auto tilt = hn::Load(d, block.tilt.lane.data() + lane);
-    const SineCosine<D> of_tilt = sine_cosine(d, turned(d, tilt, alpha));
-    const SineCosine<D> of_turn = sine_cosine(d, turned(d, hn::Load(d, block.turn.lane.data() + lane), beta));
-    const auto on_x = hn::Mul(of_tilt.sine, of_turn.cosine);
-    const auto on_y = hn::Mul(of_tilt.sine, of_turn.sine);
-    const auto zero = hn::Zero(d);
-    const auto stays = hn::Or(hn::Eq(tilt, zero), hn::Or(hn::Eq(alpha, zero), hn::Eq(beta, zero)));
-    const auto has_space = hn::And(hn::Lt(hn::Abs(along_first), steep), hn::Lt(hn::Abs(along_last), steep));
-    const auto of = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
-        const auto sum = hn::Add(hn::Add(hn::Mul(a, of_tilt.cosine), hn::Mul(b, on_x)), hn::Mul(c, on_y));
-        return hn::IfThenElseZero(has_space, hn::IfThenElse(stays, a, sum));
-    };
-    return {of(n.x, x.x, y.x), of(n.y, x.y, y.y), of(n.z, x.z, y.z)};
+    const auto mean = hn::Div(angles, hn::Set(d, static_cast<float>(block.edges)));
+    return custom_normals<D>(d, n, {first, last, along_first, along_last, mean},
+                             hn::Load(d, block.tilt.lane.data() + lane),
+                             hn::Load(d, block.turn.lane.data() + lane));
 }
 
 void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {
@@ -353,9 +402,8 @@ void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
         for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
             const FanBlock& block = frame.mesh->fan_blocks[b];
-            const Points<Full> normals = block.reads_last_point
-                                             ? custom_normals<true>(d, frame, block, lane)
-                                             : custom_normals<false>(d, frame, block, lane);
+            const Points<Full> normals = block.reads_last_point ? fan_normals<true>(d, frame, block, lane)
+                                                                : fan_normals<false>(d, frame, block, lane);
             store_interleaved(d, normals.x, normals.y, normals.z, hn::Zero(d),
                               numbers_of(frame.block_normals + kLanes * b + lane));
         }

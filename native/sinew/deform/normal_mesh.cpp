@@ -2,6 +2,7 @@
 #include "sinew/deform/normal_mesh.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "sinew/deform/topology.h"
@@ -159,6 +160,8 @@ public:
     }
 
 private:
+    static constexpr std::uint32_t kNoBlock = std::numeric_limits<std::uint32_t>::max();
+
     /// What customise() needs of a fan.
     struct Custom {
         std::size_t first_corner;  // of walked_
@@ -189,7 +192,49 @@ private:
         return topology_.corner_vertices[index(around_.previous[index(corner)])];
     }
 
+    /// Takes those of customs_ that are computed along with faces.
+    void add_lone_fans() {
+        std::vector<std::uint32_t> block_of_slot(mesh_.slot_count, kNoBlock);
+        for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
+            const FaceBlock& block = mesh_.blocks[b];
+            // The others are computed for any number of corners, one lane or one point at a time.
+            if (block.lanes != kLanes || block.reads_last_point || block.corners < 3 || block.corners > 4)
+                continue;
+            std::fill_n(block_of_slot.begin() + block.first_slot, kLanes, static_cast<std::uint32_t>(b));
+        }
+        const auto source_of = [this](const Custom& fan) {
+            return sources_[index(walked_[fan.first_corner])];
+        };
+        const auto block_of = [&](const Custom& fan) {
+            return fan.corners == 1 && fan.edges == 2 ? block_of_slot[source_of(fan) / 8] : kNoBlock;
+        };
+        std::vector<std::uint32_t> counts(mesh_.blocks.size());
+        for (const Custom& fan : customs_) {
+            if (const std::uint32_t block = block_of(fan); block != kNoBlock) ++counts[block];
+        }
+        for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
+            FaceBlock& block = mesh_.blocks[b];
+            // A fan takes half as long here, and so do the lanes without one.
+            if (2 * counts[b] < block.corners * kLanes) continue;
+            block.first_lone = static_cast<std::uint32_t>(mesh_.lone_fans.size());
+            mesh_.lone_fans.resize(mesh_.lone_fans.size() + block.corners);
+        }
+        std::erase_if(customs_, [&](const Custom& fan) {
+            const std::uint32_t b = block_of(fan);
+            if (b == kNoBlock || mesh_.blocks[b].first_lone == FaceBlock::kNoLoneFans) return false;
+            const std::size_t corner = index(walked_[fan.first_corner]);
+            const std::size_t lane = source_of(fan) / 8 - mesh_.blocks[b].first_slot;
+            const std::size_t row = mesh_.blocks[b].first_lone + source_of(fan) % 4;
+            mesh_.lone_fans[row].tilt.lane[lane] = part(sharpness_.custom[2 * corner]);
+            mesh_.lone_fans[row].turn.lane[lane] = part(sharpness_.custom[2 * corner + 1]);
+            mesh_.corner_sources[corner] =
+                static_cast<std::int32_t>(mesh_.first_of_lone_fans() + kLanes * row + lane);
+            return true;
+        });
+    }
+
     void customise() {
+        add_lone_fans();
         for (std::size_t begin = 0; begin < customs_.size(); begin += kFacesTogether) {
             const auto together =
                 std::span(customs_).subspan(begin, std::min(kFacesTogether, customs_.size() - begin));

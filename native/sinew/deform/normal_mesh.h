@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -17,11 +18,14 @@ namespace sinew {
 /// A face has a slot for each four of its corners: two Float4, its normal and their angles, so that they are read
 /// together. Slot s of the face in lane l of a block is number first_slot + s * lanes + l.
 struct FaceBlock {
+    static constexpr std::uint32_t kNoLoneFans = std::numeric_limits<std::uint32_t>::max();
+
     std::size_t first_vertex;  // of NormalMesh::corner_vertices: [corners][lanes]
     std::uint32_t first_slot;
     std::uint32_t corners;
-    std::uint8_t lanes;     // kLanes or 1; those without a face repeat the last
-    bool reads_last_point;  // behind which nothing may be read
+    std::uint8_t lanes;                      // kLanes or 1; those without a face repeat the last
+    bool reads_last_point;                   // behind which nothing may be read
+    std::uint32_t first_lone = kNoLoneFans;  // of NormalMesh::lone_fans: one for each of the corners
 };
 
 /// Corners whose normals are added up: of group g, sources [offsets[g], offsets[g + 1]), in the order of the corners.
@@ -31,6 +35,13 @@ struct CornerGroups {
     std::vector<std::uint32_t> sources;
 
     [[nodiscard]] std::size_t size() const noexcept { return offsets.size() - 1; }
+};
+
+/// One corner of each face of a block, where most of the block's corners are fans by themselves: their custom normals are
+/// computed along with the faces, whose edges these fans have. As of FanBlock; 0 for those of other fans.
+struct LoneFans {
+    Lanes<float> tilt;
+    Lanes<float> turn;
 };
 
 /// Up to kLanes fans of as many edges. Lanes without a fan repeat the last.
@@ -57,12 +68,14 @@ struct NormalMesh {
     std::size_t slot_count = 0;
 
     CornerGroups vertices;
-    CornerGroups fans;                 // of at least two corners; only of the domain `corner`
-    std::vector<FanBlock> fan_blocks;  // of all fans; none without custom normals
+    CornerGroups fans;  // of at least two corners; only of the domain `corner`
+    std::vector<LoneFans> lone_fans;
+    std::vector<FanBlock> fan_blocks;  // of all other fans; none without custom normals
     std::vector<std::int32_t> fan_vertices;
 
-    // [corners] where the normal of each is: among the Float4 of all slots, then of fans, then of lanes of fan blocks.
-    // Empty in the domain `vertex`: corners have the normals of their vertices, which are in the place of the fans'.
+    // [corners] where the normal of each is: among the Float4 of all slots, then of fans, then of lanes of lone fans and of
+    // fan blocks. Empty in the domain `vertex`: corners have the normals of their vertices, which are in the place of the
+    // fans'.
     std::vector<std::int32_t> corner_sources;
 
     /// Float4 of all these, with room for kLanes behind each kind.
@@ -70,8 +83,11 @@ struct NormalMesh {
         return first_of_blocks() + kLanes * fan_blocks.size();
     }
     [[nodiscard]] std::size_t first_of_groups() const noexcept { return 2 * slot_count; }
-    [[nodiscard]] std::size_t first_of_blocks() const noexcept {
+    [[nodiscard]] std::size_t first_of_lone_fans() const noexcept {
         return first_of_groups() + (corner_sources.empty() ? vertices : fans).size() + kLanes;
+    }
+    [[nodiscard]] std::size_t first_of_blocks() const noexcept {
+        return first_of_lone_fans() + kLanes * lone_fans.size();
     }
 };
 
@@ -87,6 +103,7 @@ struct NormalFrame {
     Float4* slots;               // [slots][2]
     const CornerGroups* groups;  // to be added up
     Float4* group_normals;       // [groups], and room for kLanes
+    Float4* lone_normals;        // [lone fans][kLanes], written along with angles; null for none
     Float4* block_normals;       // [fan blocks][kLanes]
     Vec3<float>* normals;        // [groups] the caller's
 };
@@ -95,7 +112,7 @@ struct NormalFrame {
 struct NormalKernel {
     /// The normals of the faces of blocks [begin, end).
     void (*faces)(const NormalFrame& frame, std::size_t begin, std::size_t end);
-    /// And the angles.
+    /// And the angles, and the custom normals of lone fans.
     void (*corners)(const NormalFrame& frame, std::size_t begin, std::size_t end);
     /// Groups [begin, end), to `normals`.
     void (*sum)(const NormalFrame& frame, std::size_t begin, std::size_t end);

@@ -176,6 +176,7 @@ void Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
                             all,
                             is_of_vertices ? &mesh.vertices : &state.corner_groups(),
                             all + mesh.first_of_groups(),
+                            domain == NormalDomain::corner ? all + mesh.first_of_lone_fans() : nullptr,
                             all + mesh.first_of_blocks(),
                             normals.data()};
     // The corners of a mesh that is all flat have the normals of their faces.
