@@ -12,7 +12,7 @@ from ..attach import attach, properties, stage_settings
 from ..core import parameters
 from ..core.errors import SinewError
 from ..core.scale_rule import BLENDER_4
-from ..core.session import SkinStageFrame
+from ..core.session import NO_STAGES, SkinStageFrame
 from ..core.stages import ORDER, StageValues
 from ..io import armature_io
 from .bound import Bound
@@ -110,10 +110,10 @@ def stage_values(settings: properties.SinewSettings) -> StageValues:
     settings  the object's, evaluated
     Raises SinewError where a driver sets a choice that there is not.
     """
-    values = {
-        name: stage_settings.values_of(settings, name)
-        for name in stage_settings.names_on(settings, among=ORDER)
-    }
+    names = stage_settings.names_on(settings, among=ORDER)
+    if not names:
+        return NO_STAGES
+    values = {name: stage_settings.values_of(settings, name) for name in names}
     for name, of_stage in values.items():
         for parameter, value in of_stage.items():
             if value == "":
