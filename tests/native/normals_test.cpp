@@ -210,13 +210,15 @@ TEST_P(NormalKernels, agree_with_the_definition_in_double) {
 
 TEST_P(NormalKernels, have_the_bits_of_any_other) {
     const Mesh mesh = mesh_with_large_faces();
-    const Flags flags = with_custom(random_flags(mesh, 0.2, 0.1), mesh);
-    const Normals normals = normals_of(mesh, flags);
-    for (const NormalDomain domain : kDomains) {
-        use_simd_target(simd_targets().back());
-        const auto expected = computed(normals, domain, mesh.rest_points);
-        use_simd_target(GetParam());
-        EXPECT_TRUE(same(computed(normals, domain, mesh.rest_points), expected));
+    // With nearly all edges sharp, most corners are fans by themselves.
+    for (const double sharp : {0.2, 0.95}) {
+        const Normals normals = normals_of(mesh, with_custom(random_flags(mesh, sharp, 0.1), mesh));
+        for (const NormalDomain domain : kDomains) {
+            use_simd_target(simd_targets().back());
+            const auto expected = computed(normals, domain, mesh.rest_points);
+            use_simd_target(GetParam());
+            EXPECT_TRUE(same(computed(normals, domain, mesh.rest_points), expected));
+        }
     }
 }
 

@@ -214,7 +214,7 @@ private:
         }
         for (std::size_t b = 0; b < mesh_.blocks.size(); ++b) {
             FaceBlock& block = mesh_.blocks[b];
-            // A fan takes half as long here, and so do the lanes without one.
+            // Lanes without a fan take as long as those that have one.
             if (2 * counts[b] < block.corners * kLanes) continue;
             block.first_lone = static_cast<std::uint32_t>(mesh_.lone_fans.size());
             mesh_.lone_fans.resize(mesh_.lone_fans.size() + block.corners);
