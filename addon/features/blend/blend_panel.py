@@ -184,9 +184,9 @@ class SINEW_PT_blend(Sidebar, bpy.types.Panel):
         for name in ("method", "space", "changes"):
             column.prop(blend, name)
         if blend.changes:
-            row = column.row(align=True)
-            row.prop(blend, "change_start", text="")
-            row.prop(blend, "change_end", text="")
+            times = column.column(align=True)
+            times.prop(blend, "change_start")
+            times.prop(blend, "change_end")
             column.prop(blend, "smooth")
         column.prop(blend, "align")
         if blend.align:
