@@ -8,6 +8,8 @@
 #endif
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 
 #include "hwy/highway.h"
 #include "sinew/deform/kernels.h"
@@ -237,19 +239,32 @@ HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
     hn::StoreInterleaved3(p.x, p.y, p.z, d, to);
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
 /// Apart from store_points, so that its stack is not that of every block.
 template <class D>
 HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>* points, Vec<D> x, Vec<D> y,
                                  Vec<D> z) {
-    // Numbers one by one: transposing lanes to points first costs a fifth more of the whole.
-    alignas(64) float xs[hn::MaxLanes(D())];
-    alignas(64) float ys[hn::MaxLanes(D())];
-    alignas(64) float zs[hn::MaxLanes(D())];
-    hn::Store(x, d, xs);
-    hn::Store(y, d, ys);
+    // x and y go together, so that a point takes two moves, and these are of integers: a processor stores two of them
+    // at once, but one vector.
+    constexpr std::size_t kMax = hn::MaxLanes(D());
+    alignas(64) float pairs[2][kMax];
+    alignas(64) float zs[kMax];
+    hn::Store(hn::InterleaveLower(d, x, y), d, pairs[0]);
+    hn::Store(hn::InterleaveUpper(d, x, y), d, pairs[1]);
     hn::Store(z, d, zs);
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) points[vertices[i]] = {xs[i], ys[i], zs[i]};
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+        std::uint64_t pair;
+        std::uint32_t third;
+        std::memcpy(&pair, pairs[i % 4 / 2] + i / 4 * 4 + i % 2 * 2, sizeof(pair));
+        std::memcpy(&third, zs + i, sizeof(third));
+        float* const to = &points[vertices[i]].x;
+        std::memcpy(to, &pair, sizeof(pair));
+        std::memcpy(to + 2, &third, sizeof(third));
+    }
 }
+
+#endif
 
 #endif
 

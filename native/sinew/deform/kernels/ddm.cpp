@@ -527,8 +527,8 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
 template <std::size_t kCount, class D>
 HWY_INLINE Motion<D> blend_weights(D d, const MomentBones& bones, const MomentRows& rows,
                                    const Points<D>& centroid) {
-    const Sum<D, kDdmNumbers> sum = blend_rows<kDdmNumbers, kCount, false>(
-        d, bones.rows(), bones.count, nullptr, rows.weight + kLanes * 4);
+    const Sum<D, kDdmNumbers> sum = blend_rows<kDdmNumbers, kCount, false>(d, bones.rows(), bones.count,
+                                                                           nullptr, rows.weight + kLanes * 4);
     const auto moved = [&](std::size_t row) HWY_ATTR {
         const Vec<D>* const m = sum.value + row;
         return hn::MulAdd(m[0], centroid.x, hn::MulAdd(m[1], centroid.y, hn::MulAdd(m[2], centroid.z, m[3])));
@@ -549,8 +549,8 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
             blend_moments<kVariant != Variant::weights, kPlain, kResolved, kCount>(d, bones, rows, centroid);
     }
     if constexpr (kVariant == Variant::nearest) {
-        const Rows3<D> matrix =
-            correlation<kPlain, kCount>(d, bones, rows, centroid, motion.displacement, spaces.bones_from_model);
+        const Rows3<D> matrix = correlation<kPlain, kCount>(d, bones, rows, centroid, motion.displacement,
+                                                            spaces.bones_from_model);
         to_nearest(d, matrix, is_point_at(d, rows.second, centroid), spaces.bones_from_model,
                    motion.rotation);
     }
