@@ -66,6 +66,7 @@ ENTRIES: tuple[Entry | None, ...] = (
     Entry("sinew.blend_actions"),
     Entry("sinew.blend_import_clip", "Add Clip to the Blend\u2026"),
     *_over("sinew.bake_ik", "Bake Sinew IK"),
+    Entry("sinew.live_ik", "Live Sinew IK"),
     Entry("sinew.remove_ik"),
     Entry("sinew.corrective_key", icon="SHAPEKEY_DATA"),
     Entry("sinew.corrective_key", "Corrective Shape Key Driven by the Bone", values={"driven": True}),

@@ -543,6 +543,7 @@ TEXTS = {
     ),
     # Inverse kinematics
     "Inverse Kinematics": "Inverse Kinematik",
+    "Live Sinew IK": "Sinew-IK live",
     "Bake Sinew IK": "Sinew-IK backen",
     "Bake Sinew IK over the Scene's Frames": "Sinew-IK über die Einzelbilder der Szene backen",
     "Bake Sinew IK over the Action's Frames": "Sinew-IK über die Einzelbilder der Aktion backen",
