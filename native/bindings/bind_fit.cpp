@@ -15,16 +15,18 @@ template <class T, class Value>
 struct Rows {
     Input<T> input;
     py::ssize_t count;
-
-    [[nodiscard]] std::vector<Value> at(py::ssize_t index, const Shape& common) const {
-        const auto size = input.item_size / std::max<py::ssize_t>(count, 1);
-        const T* from = input.at(index, common);
-        std::vector<Value> values;
-        values.reserve(static_cast<std::size_t>(count));
-        for (py::ssize_t i = 0; i < count; ++i) values.push_back(Item<Value>::read(from + i * size));
-        return values;
-    }
 };
+
+// Those of one item. An input is never copied here: it counts references of Python's, and this runs without the GIL.
+template <class Value, class T>
+std::vector<Value> rows_of(const Input<T>& input, py::ssize_t count, py::ssize_t index, const Shape& common) {
+    const auto size = input.item_size / std::max<py::ssize_t>(count, 1);
+    const T* from = input.at(index, common);
+    std::vector<Value> values;
+    values.reserve(static_cast<std::size_t>(count));
+    for (py::ssize_t i = 0; i < count; ++i) values.push_back(Item<Value>::read(from + i * size));
+    return values;
+}
 
 // `like`: how many rows another argument has, which this one must have as well.
 template <class T, class Value>
@@ -98,7 +100,7 @@ py::object fit_items(const std::array<py::object, 6>& values) {
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         const auto rows = [&]<class Value>(const Rows<T, Value>& of, std::size_t index, py::ssize_t item) {
-            return Rows<T, Value>{inputs[index], of.count}.at(item, common);
+            return rows_of<Value>(inputs[index], of.count, item, common);
         };
         for (py::ssize_t i = 0; i < count; ++i) {
             const auto a = rows(source, 0, i);
@@ -156,11 +158,9 @@ py::object hand_eye_items(const std::array<py::object, 3>& values) {
     const py::ssize_t count = count_of(common);
     without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
-            const auto from =
-                as_dual_quats<Transform, T>(Rows<T, Transform>{inputs[0], a.count}.at(i, common));
-            const auto onto =
-                as_dual_quats<Transform, T>(Rows<T, Transform>{inputs[1], a.count}.at(i, common));
-            const auto w = Rows<T, T>{inputs[2], weights.count}.at(i, common);
+            const auto from = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[0], a.count, i, common));
+            const auto onto = as_dual_quats<Transform, T>(rows_of<Transform>(inputs[1], a.count, i, common));
+            const auto w = rows_of<T>(inputs[2], weights.count, i, common);
             const auto found = hand_eye<T>(from, onto, w);
             output.write(i, {in_layout<Transform>(found.transform), found.error.angle,
                              found.error.translation, found.is_defined});
@@ -193,8 +193,8 @@ py::object average_items(const std::array<py::object, 2>& values, bool is_robust
     without_gil([&] {
         for (py::ssize_t i = 0; i < count; ++i) {
             const auto of =
-                as_dual_quats<Transform, T>(Rows<T, Transform>{inputs[0], poses.count}.at(i, common));
-            const auto w = Rows<T, T>{inputs[1], weights.count}.at(i, common);
+                as_dual_quats<Transform, T>(rows_of<Transform>(inputs[0], poses.count, i, common));
+            const auto w = rows_of<T>(inputs[1], weights.count, i, common);
             const std::span<T> kept(parts.data + i * poses.count, of.size());
             std::fill(kept.begin(), kept.end(), T(1));
             const auto found = is_robust ? robust_average<T>(of, w, kept) : average<T>(of, w);
