@@ -446,6 +446,7 @@ class BlenderSide:
                 self.unkey_method(obj, self.method(obj))
             self._set(obj, DRIVEN, claim is not None)
             self._set(obj, ON, claim is not None and claim["on"])
+            self._set(obj, OWN, claim is not None and claim["own"])
             if claim is not None:
                 self.set_method(obj, claim["method"])
             self.set_stages(obj, 0 if claim is None else number_of(claim["stages"]))
@@ -796,6 +797,7 @@ class SinewSide:
         return {
             obj.name_full: {
                 "on": obj.sinew.enabled,
+                "own": obj.sinew.is_own,
                 "method": obj.sinew.method,
                 "rule": obj.sinew.scale_rule,
                 "stages": self._stages(obj),
