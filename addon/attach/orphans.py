@@ -8,16 +8,17 @@ import bpy
 from . import node_group, properties, upstream_proxy
 
 
-def remove(of_copies: bool = False) -> None:
+def remove() -> None:
     """Takes away what nothing in the file uses any more.
 
-    of_copies  also what a comparison's copies had: Blender does not lower its counts of users when it deletes
-               several of them at once
+    Blender's own counts of users are too high where it has deleted several copies at once, and in 5.2 where
+    a modifier was removed whose inputs name an object.
     """
+    used = _used_by_settings()
     helpers = {
         obj
         for obj in bpy.data.objects
-        if properties.is_helper(obj) and obj.library is None and (of_copies or obj.users == 0)
+        if properties.is_helper(obj) and obj.library is None and obj not in used
     }
     if helpers:
         for helper in [h for h, users in bpy.data.user_map(subset=helpers).items() if not users]:
@@ -27,3 +28,8 @@ def remove(of_copies: bool = False) -> None:
             if mesh is not None and mesh.users == 0:
                 bpy.data.meshes.remove(mesh)
     node_group.remove_unused()
+
+
+def _used_by_settings() -> set[bpy.types.Object | None]:
+    settings = [properties.of(obj) for obj in bpy.data.objects if properties.has_sinew(obj)]
+    return {helper for each in settings for helper in (each.point_buffer, each.upstream_proxy)}

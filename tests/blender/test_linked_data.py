@@ -12,6 +12,7 @@ import scenes
 from sinew_addon.attach import attach, properties, stack
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.scale_rule import BLENDER_3
+from sinew_addon.deform import session
 
 FRAMES = [1, 4, 11]
 
@@ -148,3 +149,25 @@ def test_an_override_keeps_its_own_stages_and_parameters(tmp_path):
     )
     assert (settings.delta_mush.iterations, settings.delta_mush.enabled) == (9, True)
     assert_shapes(expected)
+
+
+def test_a_duplicate_leaves_nothing_where_the_object_is_deleted_that_it_was_made_of():
+    """While Sinew is off, its modifier goes on naming the other's point buffer. Blender 5.2 counts the buffer
+    as used when that modifier is gone."""
+    obj, _armature = scenes.make_arm()
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    other.modifiers.clear()
+    scenes.add_sinew(obj, "dq")
+    assert properties.of(obj).point_buffer is not None
+    properties.of(obj).enabled = False
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    bpy.data.objects.remove(obj)
+    bpy.context.view_layer.update()
+    attach.remove(copy)
+    session.forget()
+    session.refresh(bpy.context)
+    assert not [each.name for each in bpy.data.objects if properties.is_helper(each)]
+    assert not [each.name for each in bpy.data.meshes if "Sinew" in each.name]

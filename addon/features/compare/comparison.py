@@ -169,7 +169,7 @@ def _remove_left_over() -> None:
     for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
         bpy.data.actions.remove(action)
     offset_nodes.remove_unused()
-    orphans.remove(of_copies=True)
+    orphans.remove()
 
 
 def corners(evaluated: bpy.types.Object) -> np.ndarray:
