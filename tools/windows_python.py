@@ -108,6 +108,7 @@ def main() -> None:
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     folder = BUILD / f"windows-python{version}"
     if not (folder / "python.exe").exists():
+        BUILD.mkdir(parents=True, exist_ok=True)
         unfinished = Path(tempfile.mkdtemp(dir=BUILD))
         make(version, unfinished)
         shutil.rmtree(folder, ignore_errors=True)

@@ -23,6 +23,13 @@
 
 #include "sinew/deform/forks.h"
 
+// Where there is no futex, as under mingw, std::atomic::wait of these sleeps on condition variables that the end of the
+// process destroys, which waits for our sleeping workers for ever; and as it compares before it takes the mutex it can
+// miss a wake-up (tests/python/test_pool_model.py).
+#if defined(_GLIBCXX_RELEASE) && _GLIBCXX_RELEASE <= 12 && !defined(_GLIBCXX_HAVE_LINUX_FUTEX)
+#error "std::atomic::wait of this libstdc++ can hang: use one of LLVM's libc++, such as zig's, or MSVC."
+#endif
+
 namespace sinew {
 namespace {
 
