@@ -7,8 +7,8 @@ falls asleep in one step, as C++ defines std::atomic::wait. With that of libstdc
 such as under mingw, it can: it compares, and only then takes the mutex of the condition variable that it
 sleeps on (docs/install.md has what else is at fault there).
 
-One step is one access to what threads share. That each sees what others wrote before (memory orders) is not in
-the model: the thread sanitizer looks at that, in ./dev test.
+One step is one access to what threads share. That each sees what others wrote before (memory orders) is not
+in the model: the thread sanitizer looks at that, in ./dev test.
 """
 
 from __future__ import annotations
