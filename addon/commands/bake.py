@@ -73,7 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> argparse.ArgumentParse
         "--motion",
         choices=MOTIONS,
         default=KEYS,
-        help="bones: helper bones have keys (default), or follow the pose by constraints",
+        help="bones: helper bones have keys (default), of scale too, or follow the pose by constraints",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with the errors of bones")
     add_set(parser)

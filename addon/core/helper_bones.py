@@ -96,7 +96,7 @@ class Blend:
 @dataclass(frozen=True)
 class Solution:
     """
-    motions  float64 [frames, helpers, 3, 4]: rigid but for the scale of the parent
+    motions  float64 [frames, helpers, 3, 4]: rigid but for scale, the parent's or their own
     parents  int [helpers], bones
     heads    float64 [helpers, 3]: the middle of what each moves
     bones    int [vertices, influences]: helpers follow the rig's bones; -1 for none
@@ -117,8 +117,8 @@ class Solution:
     blends: tuple[Blend, ...] = ()
 
 
-KEYS, POSE = "keys", "pose"
-MOTIONS = (KEYS, POSE)
+KEYS, SCALED_KEYS, POSE = "keys", "scaled-keys", "pose"
+MOTIONS = (KEYS, SCALED_KEYS, POSE)
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ def _rounds(helpers: int) -> list[int]:
 class Helper:
     """
     motion    float64 [frames, 3, 4]
-    scale     float64 [frames], of its parent
+    scale     float64 [frames], of its parent; one that scales has its own
     may_move  bool [vertices]
     blend     of the rig's bones that moves it; None for a motion of its own
     """
@@ -374,6 +374,7 @@ class Solver:
     def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
         """Moves a helper bone on from what it was, by that much more of its way."""
         ahead = helper.motion + further * (helper.motion - old.motion)
+        helper.scale = np.maximum(helper.scale + further * (helper.scale - old.scale), _SMALLEST_SCALE)
         helper.motion = np.concatenate(
             [helper.scale[:, None, None] * _rotation_near(ahead[:, :, :3]), ahead[:, :, 3:]], axis=2
         )
@@ -460,10 +461,21 @@ class Solver:
             cross = np.einsum("vfi,vfk->fik", aside, from_middle)
         # As its motion was, where the vertices leave it open.
         linear = helper.motion[:, :, :3] / helper.scale[:, None, None]
+        spread = np.square(from_middle).sum(axis=(0, 2))
         cross += 1e-7 * np.square(from_middle).sum() * linear
-        linear = helper.scale[:, None, None] * _rotation_near(cross)
+        rotation = _rotation_near(cross)
+        helper.scale = self._scale_of(helper, np.einsum("fik,fik->f", rotation, cross), spread)
+        linear = helper.scale[:, None, None] * rotation
         translation = middle - np.einsum("fik,fk->fi", linear, np.broadcast_to(rest_middle, (frames, 3)))
         return np.concatenate([linear, translation[:, :, None]], axis=2)
+
+    def _scale_of(self, helper: Helper, along: np.ndarray, spread: np.ndarray) -> np.ndarray:
+        """float64 [frames]: the size of a helper bone that has been rotated.
+
+        along, spread  [frames]: products of what is wanted and of the vertices as they are rotated, and of
+                       these alone; their ratio is the best size
+        """
+        return helper.scale
 
     def _moved(self, motion: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         """float64 [vertices, frames * 3]: by one bone's motion [frames, 3, 4]."""
@@ -590,6 +602,26 @@ class Solver:
             return blend.head
         vertices, slots = np.nonzero(self.bones == bone)
         return np.average(self.middle[vertices], axis=0, weights=self.weights[vertices, slots])
+
+
+@dataclass
+class ScalingSolver(Solver):
+    """Of helper bones that grow and shrink from frame to frame, too; from where rigid ones end: those that
+    scale from the beginning have up to twice the error.
+
+    scales  whether they do by now
+    """
+
+    scales: bool = False
+
+    def refine(self) -> Generator[float, None, None]:
+        self.scales = True
+        return super().refine()
+
+    def _scale_of(self, helper: Helper, along: np.ndarray, spread: np.ndarray) -> np.ndarray:
+        if not self.scales:
+            return helper.scale
+        return np.maximum(along / np.maximum(spread, 1e-30), _SMALLEST_SCALE)
 
 
 def _rotation_near(matrices: np.ndarray) -> np.ndarray:

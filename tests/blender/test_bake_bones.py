@@ -89,6 +89,22 @@ def test_a_blend_file_plays_elsewhere_to_the_stated_error(arm, tmp_path):
     assert [bone.name for bone in bpy.data.armatures["Arm Rig"].bones] == list(bones)
 
 
+def test_helper_bones_that_scale_play_to_the_stated_error(arm, tmp_path):
+    """Under a bone that is scaled itself."""
+    obj, path = arm
+    rig = obj.modifiers["Armature"].object
+    for size, frame in (((1.0, 1.0, 1.0), 1), ((1.2, 1.5, 1.3), 11)):
+        rig.pose.bones["bone.0"].scale = size
+        rig.pose.bones["bone.0"].keyframe_insert("scale", frame=frame)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], FRAMES)[0]
+    file, (report,) = baked(path, tmp_path / "out", "--motion", "scaled-keys")
+    assert_states(report, read_elsewhere(file, FRAMES, tmp_path)["Arm"], expected)
+    _file, (rigid,) = baked(path, tmp_path / "rigid")
+    assert report["after"]["rms"] < 0.9 * rigid["after"]["rms"]
+
+
 def pose_anew(rig):
     """Another action than the one that was baked, with rotations that this one has not."""
     rig.animation_data_clear()
@@ -240,7 +256,9 @@ def skinned_by_gltf(glb, frames, rate):
     return points
 
 
-@pytest.mark.parametrize(("motion", "method"), [("keys", METHOD), ("pose", METHOD), ("pose", "cor")])
+@pytest.mark.parametrize(
+    ("motion", "method"), [("keys", METHOD), ("scaled-keys", METHOD), ("pose", METHOD), ("pose", "cor")]
+)
 def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     """The exporter makes keys of constraints."""
     obj, path = arm

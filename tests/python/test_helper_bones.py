@@ -21,8 +21,8 @@ SEGMENTS = np.array([[[0, 0, 0], [0, 0, 2]], [[0, 0, 2], [0, 0, 4]]], dtype=np.f
 DIAMETER = 1.0
 
 
-def solved(motion, wanted):
-    steps = helper_bones.solve(motion, wanted)
+def solved(motion, wanted, solver=helper_bones.Solver):
+    steps = helper_bones.solve(motion, wanted, solver)
     shares = []
     while True:
         try:
@@ -75,6 +75,24 @@ def test_two_helper_bones_a_joint_play_the_method(method):
     assert rms <= 0.008 * DIAMETER
     assert worst <= 0.1 * DIAMETER
     assert rms <= 0.16 * solution.before.rms
+
+
+@pytest.mark.parametrize("method", ["dq", "cor"])
+def test_helper_bones_that_scale_are_nearer(method):
+    """Two of them have .7 % of the limb's diameter at most, which is out of the reach of rigid ones."""
+    motion = motion_by(method)
+    solution = solved(motion, Wanted(2), helper_bones.ScalingSolver)
+    rms, worst = errors_of(played(motion, solution), motion.targets)
+    assert np.allclose((solution.after.rms, solution.after.worst), (rms, worst), rtol=1e-3)
+    assert rms <= 0.007 * DIAMETER
+    assert rms <= 0.7 * solved(motion, Wanted(2)).after.rms
+    linear = solution.motions[..., :3]
+    squares = linear @ linear.swapaxes(-1, -2)
+    sizes = np.sqrt(squares[..., 0, 0])
+    # The same along all axes, which any engine's bones can have.
+    assert np.allclose(squares, np.square(sizes)[..., None, None] * np.identity(3), atol=1e-9)
+    assert sizes.max() > 1.1
+    assert sizes.min() > 0.5
 
 
 def test_the_error_never_grows_with_more_helper_bones():

@@ -18,7 +18,7 @@ import numpy as np
 from ...attach import properties, stack, upstream_proxy
 from ...core import helper_bones, pose_helpers, pose_samples
 from ...core.errors import SinewError
-from ...core.helper_bones import POSE, HelperOptions, Motion, Report
+from ...core.helper_bones import POSE, SCALED_KEYS, HelperOptions, Motion, Report
 from ...core.influences import Influences, joined
 from ...core.session import SkinStack, SkinStageFrame
 from ...core.spaces import transformed
@@ -164,7 +164,8 @@ class _Rig:
         diagonal = self._unit * at_frames.diagonal
         if options.motion != POSE:
             self._targets.clear()
-            self._solution = yield from helper_bones.solve(at_frames, options.of(at_frames))
+            solver = helper_bones.ScalingSolver if options.motion == SCALED_KEYS else helper_bones.Solver
+            self._solution = yield from helper_bones.solve(at_frames, options.of(at_frames), solver)
             self.report = Report.of(self.rig.name, self._solution, self._unit, diagonal)
             return
         rest = self._bones.rest

@@ -11,7 +11,7 @@ import bpy
 from ...core.bake import BONES, EXPORTS
 from ...core.errors import SinewError
 from ...core.frames import parse_frames
-from ...core.helper_bones import KEYS, POSE, HelperOptions
+from ...core.helper_bones import KEYS, POSE, SCALED_KEYS, HelperOptions
 from ...deform import evaluate
 from ...ui import stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
@@ -87,7 +87,12 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         name="Motion",
         description="What moves helper bones",
         items=[
-            (KEYS, "Keys", "Plain keys over these frames, the nearest that there are: for engines"),
+            (KEYS, "Keys", "Plain keys over these frames, of bones that do not change size: for any engine"),
+            (
+                SCALED_KEYS,
+                "Keys with Scale",
+                "Helper bones also grow and shrink, and come nearer: for engines that play scale",
+            ),
             (POSE, "Pose", "Constraints by which they follow the pose: other animation has them, too"),
         ],
     )

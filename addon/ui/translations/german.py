@@ -921,8 +921,12 @@ TEXTS = {
     "Keys": "Schlüsselbilder",
     "Pose": "Pose",
     "What moves helper bones": "Was Hilfsknochen bewegt",
-    "Plain keys over these frames, the nearest that there are: for engines": (
-        "Schlüsselbilder über diese Einzelbilder, so nah es geht: für Spiele"
+    "Plain keys over these frames, of bones that do not change size: for any engine": (
+        "Schlüsselbilder über diese Einzelbilder, von Knochen gleicher Größe: für jedes Spiel"
+    ),
+    "Keys with Scale": "Schlüsselbilder mit Skalierung",
+    "Helper bones also grow and shrink, and come nearer: for engines that play scale": (
+        "Hilfsknochen wachsen und schrumpfen auch, und kommen näher: für Spiele, die Skalierung abspielen"
     ),
     "Constraints by which they follow the pose: other animation has them, too": (
         "Beschränkungen, durch die sie der Pose folgen: auch andere Animation hat sie"
