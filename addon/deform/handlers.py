@@ -9,7 +9,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import note, overrides, point_store, properties, references
+from ..attach import note, overrides, point_store, pose_driver, properties, references, stack
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_main_thread, is_playing_in_window, is_rendering_in_window, reaction
 from ..core.precompute import precomputations
@@ -25,6 +25,21 @@ from .session import current
 def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     _subscribe_behind_others("depsgraph_update_post", on_depsgraph_update)
     _begin_evaluation()
+    _take_off_drivers_without_modifier()
+
+
+def _take_off_drivers_without_modifier() -> None:
+    """Where Sinew's modifier was applied or deleted: of a driver on an input of it, Blender would warn on its
+    console. The evaluation that comes next is the first without the modifier."""
+    with reaction() as may_react:
+        if not may_react or current.is_saving or is_rendering_in_window():
+            return
+        for obj, state in current.pairs:
+            with contextlib.suppress(ReferenceError):
+                is_missing = state.plan.is_in_depsgraph and obj.modifiers.get(state.modifier) is None
+                # It may have been renamed.
+                if is_missing and obj.is_editable and stack.sinew_modifier(obj) is None:
+                    pose_driver.remove(obj)
 
 
 @persistent

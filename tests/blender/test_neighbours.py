@@ -234,7 +234,7 @@ def test_an_edit_behind_something_in_front_before_a_frame_is_seen():
 
 
 @pytest.mark.parametrize("frame", [1, 6])
-def test_applied(arm, frame):
+def test_applied(arm, frame, capfd):
     """Also at rest, where a deleted one has the same shape."""
     shown = scenes.shapes(arm, [frame])[0]
     bpy.ops.object.modifier_apply(modifier=stack.sinew_modifier(arm).name)
@@ -246,6 +246,8 @@ def test_applied(arm, frame):
     assert arm.animation_data is None
     assert not [each.name for each in arm.data.attributes if "sinew" in each.name]
     assert not [other.name for other in bpy.data.objects if properties.is_helper(other)]
+    # Blender warns of a driver whose modifier is gone.
+    assert "nvalid driver" not in "".join(capfd.readouterr())
 
 
 def test_converted_to_a_mesh(arm):
@@ -260,7 +262,7 @@ def test_converted_to_a_mesh(arm):
 
 @pytest.mark.parametrize("frame", [1, 6])
 @pytest.mark.parametrize("enabled", [True, False])
-def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame):
+def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame, capfd):
     """Also at rest, where an applied one has the same shape."""
     expected = scenes.shapes(arm, FRAMES)
     bpy.context.scene.frame_set(frame)
@@ -272,6 +274,7 @@ def test_a_deleted_modifier_gives_the_mesh_back(arm, enabled, frame):
     arm.modifiers["Armature"].use_deform_preserve_volume = True
     got = scenes.shapes(arm, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(arm)
+    assert "nvalid driver" not in "".join(capfd.readouterr())
 
 
 def test_copied_modifiers_work(arm):
