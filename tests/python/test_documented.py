@@ -58,8 +58,10 @@ class Command(NamedTuple):
 
 def commands_in(path: Path) -> list[Command]:
     found = []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        block = re.match(r" {4}(?:find .*\| )?((?:sinew|\./dev|dask) .*)", line)
+    # A line that ends with a backslash goes on.
+    text = re.sub(r" *\\\n *", " ", path.read_text(encoding="utf-8"))
+    for line in text.splitlines():
+        block = re.match(r" {4,}(?:find .*\| )?((?:sinew|\./dev|dask) .*)", line)
         if block:
             # What is said of it stands behind two spaces.
             text = re.split(r"\s{2,}", block[1])[0]
