@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -18,35 +18,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 import window
 
 ZIP, PICTURE = window.arguments()
-TICK, PATIENCE = 0.1, 60.0
+TICK = 0.1
 # Long enough to be stopped.
 LONG = 20_000
-
-
-def open_panel() -> None:
-    """Has it open, and the others closed, when they are first drawn."""
-    names = [name for name in dir(bpy.types) if name.startswith("SINEW_PT_")]
-    panels = sorted((getattr(bpy.types, name) for name in names), key=lambda p: hasattr(p, "bl_parent_id"))
-    for panel in reversed(panels):
-        bpy.utils.unregister_class(panel)
-    panels.sort(key=lambda panel: panel.__name__ != "SINEW_PT_blend")
-    panels.sort(key=lambda panel: hasattr(panel, "bl_parent_id"))
-    for panel in panels:
-        panel.bl_options = set() if panel.__name__ == "SINEW_PT_blend" else {"DEFAULT_CLOSED"}
-        bpy.utils.register_class(panel)
 
 
 def is_blending() -> bool:
     running = bpy.context.window_manager.windows[0].modal_operators
     return any(operator.bl_idname == "SINEW_OT_blend_actions" for operator in running)
-
-
-def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
-    for _tick in range(round(PATIENCE / TICK)):
-        if wanted():
-            return
-        yield
-    raise AssertionError(f"{what} did not come")
 
 
 def state() -> dict[str, object]:
@@ -72,7 +51,7 @@ def steps() -> Iterator[None]:
     window.install(ZIP)
     armature = rig()
     window.select_only(armature)
-    open_panel()
+    window.open_panel("SINEW_PT_blend")
     strain = armature.animation_data.action
     strain.name = "STRAIN"
     other = strain.copy()
@@ -103,19 +82,19 @@ def steps() -> Iterator[None]:
     bpy.ops.ed.undo_push(message="Before")
     before = state()
     blend_by_button()
-    yield from until(is_blending, "the blend")
+    yield from window.until(is_blending, "the blend")
     yield
     middle = bpy.context.window_manager.windows[0]
     window.press("ESC", (middle.width // 2, middle.height // 2))
-    yield from until(lambda: not is_blending(), "the end of the blend")
+    yield from window.until(lambda: not is_blending(), "the end of the blend")
     facts["stopped"] = [before, state()]
     other.frame_end = 40
     bpy.ops.ed.undo_push(message="Shorter")
     blend_by_button()
-    yield from until(lambda: not is_blending() and len(bpy.data.actions) == 3, "the new action")
+    yield from window.until(lambda: not is_blending() and len(bpy.data.actions) == 3, "the new action")
     facts["ended"] = state()
     window.press("Z", (middle.width // 2, middle.height // 2), ctrl=True)
-    yield from until(lambda: len(bpy.data.actions) == 2, "undo")
+    yield from window.until(lambda: len(bpy.data.actions) == 2, "undo")
     facts["undone"] = state()
     print("FACTS " + json.dumps(facts), flush=True)
 

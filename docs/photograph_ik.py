@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -20,30 +20,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 import window
 
 ZIP, PICTURE, RENDER = window.arguments()
-TICK, PATIENCE = 0.1, 60.0
+TICK = 0.1
 FRAME = 16
 BALL = (0.02, -0.42, 0.34)
-
-
-def open_panel() -> None:
-    """Has it open, and the others closed, when they are first drawn."""
-    names = [name for name in dir(bpy.types) if name.startswith("SINEW_PT_")]
-    panels = sorted((getattr(bpy.types, name) for name in names), key=lambda p: hasattr(p, "bl_parent_id"))
-    for panel in reversed(panels):
-        bpy.utils.unregister_class(panel)
-    panels.sort(key=lambda panel: panel.__name__ != "SINEW_PT_ik")
-    panels.sort(key=lambda panel: hasattr(panel, "bl_parent_id"))
-    for panel in panels:
-        panel.bl_options = set() if panel.__name__ == "SINEW_PT_ik" else {"DEFAULT_CLOSED"}
-        bpy.utils.register_class(panel)
-
-
-def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
-    for _tick in range(round(PATIENCE / TICK)):
-        if wanted():
-            return
-        yield
-    raise AssertionError(f"{what} did not come")
 
 
 def hold_a_ball() -> None:
@@ -84,7 +63,7 @@ def steps() -> Iterator[None]:
     scene = bpy.context.scene
     scene.frame_set(FRAME)
     hold_a_ball()
-    open_panel()
+    window.open_panel("SINEW_PT_ik")
     facts["blender"] = reach()
     window.open_sidebar()
     yield
@@ -120,7 +99,7 @@ def steps() -> Iterator[None]:
     facts["moved"] = reach()
     middle = bpy.context.window_manager.windows[0]
     window.press("Z", (middle.width // 3, middle.height // 2), ctrl=True)
-    yield from until(lambda: abs(bpy.data.objects["Ball"].location.z - BALL[2]) < 1e-4, "undo")
+    yield from window.until(lambda: abs(bpy.data.objects["Ball"].location.z - BALL[2]) < 1e-4, "undo")
     yield
     facts["undone"] = reach()
     yield from render(facts)
@@ -152,7 +131,7 @@ def render(facts: dict[str, object]) -> Iterator[None]:
     bpy.app.handlers.render_complete.append(lambda *_args: ended.append(True))
     with window.in_view3d():
         bpy.ops.render.render("INVOKE_DEFAULT")
-    yield from until(lambda: bool(ended) and not bpy.app.is_job_running("RENDER"), "the render")
+    yield from window.until(lambda: bool(ended) and not bpy.app.is_job_running("RENDER"), "the render")
     bpy.data.images["Render Result"].save_render(str(RENDER))
     yield
     facts["rendered"] = reach()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import addon_utils
@@ -61,6 +61,28 @@ def choose_tab() -> None:
     """Only once the sidebar was drawn: before, it has no tabs."""
     with in_view3d():
         bpy.context.region.active_panel_category = "Sinew"
+
+
+def open_panel(name: str) -> None:
+    """Has it open, and the others of Sinew closed, when they are first drawn."""
+    names = [each for each in dir(bpy.types) if each.startswith("SINEW_PT_")]
+    panels = sorted((getattr(bpy.types, each) for each in names), key=lambda p: hasattr(p, "bl_parent_id"))
+    for panel in reversed(panels):
+        bpy.utils.unregister_class(panel)
+    panels.sort(key=lambda panel: panel.__name__ != name)
+    panels.sort(key=lambda panel: hasattr(panel, "bl_parent_id"))
+    for panel in panels:
+        panel.bl_options = set() if panel.__name__ == name else {"DEFAULT_CLOSED"}
+        bpy.utils.register_class(panel)
+
+
+def until(wanted: Callable[[], bool], what: str, tick: float = 0.1, patience: float = 60.0) -> Iterator[None]:
+    """Steps of run(), each `tick` seconds, until it is so."""
+    for _tick in range(round(patience / tick)):
+        if wanted():
+            return
+        yield
+    raise AssertionError(f"{what} did not come")
 
 
 def move(place: tuple[int, int]) -> None:

@@ -27,7 +27,16 @@ def _selected(armature: bpy.types.Object) -> list[str] | None:
     return [b.name for b in armature.pose.bones if (b if hasattr(b, "select") else b.bone).select] or None
 
 
-class SINEW_OT_bake_ik(stepped.Stepped, bpy.types.Operator):
+class _OnArmature:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if operators.armatures(context):
+            return operators.can_change(cls)
+        cls.poll_message_set(tr("Select an armature"))
+        return False
+
+
+class SINEW_OT_bake_ik(_OnArmature, stepped.Stepped, bpy.types.Operator):
     bl_idname = "sinew.bake_ik"
     bl_label = "Bake Sinew IK"
     bl_description = (
@@ -44,13 +53,6 @@ class SINEW_OT_bake_ik(stepped.Stepped, bpy.types.Operator):
         items=[(name, label, text) for name, (label, text) in core.LABELS.items()],
     )
     over: bpy.props.EnumProperty(**stepped.OVER_WHICH)
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if operators.armatures(context):
-            return operators.can_change(cls)
-        cls.poll_message_set(tr("Select an armature"))
-        return False
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         armature = operators.armatures(context)[0]
@@ -74,7 +76,7 @@ class SINEW_OT_bake_ik(stepped.Stepped, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SINEW_OT_live_ik(bpy.types.Operator):
+class SINEW_OT_live_ik(_OnArmature, bpy.types.Operator):
     bl_idname = "sinew.live_ik"
     bl_label = "Live"
     bl_description = (
@@ -83,13 +85,6 @@ class SINEW_OT_live_ik(bpy.types.Operator):
         "settings go on counting"
     )
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if operators.armatures(context):
-            return operators.can_change(cls)
-        cls.poll_message_set(tr("Select an armature"))
-        return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         armature = operators.armatures(context)[0]
