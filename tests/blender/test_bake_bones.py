@@ -9,10 +9,13 @@ import sys
 
 import bpy
 import numpy as np
+import other_gltf
 import pytest
 import read_glb
 import scenes
 from program import run_sinew
+from pygltflib import GLTF2
+from scipy.spatial import cKDTree
 from sinew_addon.core.errors import SinewError
 from sinew_addon.core.helper_bones import HelperOptions
 from sinew_addon.features.bake import bake
@@ -31,6 +34,13 @@ bpy.ops.export_scene.gltf(filepath=sys.argv[2])
 sys.stdout.flush()
 __import__("os")._exit(0)
 """
+
+
+def run_blender(script, *files):
+    """In a process without Sinew, which writes the last of the files."""
+    command = [sys.executable, "-c", script, *map(str, files)]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert files[-1].exists(), ran.stdout + ran.stderr
 
 
 def baked(path, out, *options, method=METHOD):
@@ -266,9 +276,7 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     expected = world_shapes([obj], FRAMES)[0]
     file, (report,) = baked(path, tmp_path / "out", "--motion", motion, method=method)
     glb = tmp_path / "arm.glb"
-    command = [sys.executable, "-c", EXPORT, str(file), str(glb)]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert glb.exists(), ran.stdout + ran.stderr
+    run_blender(EXPORT, file, glb)
     played = skinned_by_gltf(glb, FRAMES, bpy.context.scene.render.fps)
     # Vertices are split at seams.
     nearest = np.linalg.norm(played[0][:, None] - expected[0][None], axis=2).argmin(axis=1)
@@ -278,6 +286,64 @@ def test_gltf_plays_to_the_stated_error(arm, tmp_path, motion, method):
     assert worst <= 1.001 * report["after"]["worst"] + 1e-5 * report["diagonal"]
     assert rms <= 1.2 * report["after"]["rms"]
     assert scenes.worst(played[0], played[-1]) > 0.5
+
+
+@pytest.mark.once
+def test_a_character_plays_in_a_reader_of_others(real_rig, tmp_path):
+    """Of a glTF of human.blend: as in a Blender without Sinew, and as Sinew shows it to the stated error."""
+    path, frames = real_rig("human.blend"), (1, 16, 31, 46)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Human"]
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], frames)[0]
+    rest = np.array([obj.matrix_world @ vertex.co for vertex in obj.data.vertices])
+    out, options = tmp_path / "out", ("--frames", ",".join(map(str, frames)), "--helpers", "8", "--json")
+    said = run_sinew("bake", path, "--method", METHOD, "--to", "bones", *options, "--out", out).stdout
+    (report,) = json.loads(said)[0]["bones"]
+    glb = tmp_path / "human.glb"
+    run_blender(EXPORT, out / path.name, glb)
+    rate = bpy.context.scene.render.fps
+    (name,) = (each.name for each in GLTF2().load(str(glb)).animations if each.name.endswith("Helpers"))
+    read_rest, played = other_gltf.points_at(glb, np.array(frames) / rate, name)
+    # Vertices are split at seams.
+    distances, vertices = cKDTree(rest).query(read_rest)
+    assert distances.max() <= 1e-6
+    assert set(vertices) == set(range(len(rest)))
+    blender = read_elsewhere(out / path.name, frames, tmp_path)["Human"]
+    assert scenes.worst(played, blender[:, vertices]) <= 1e-5 * report["diagonal"]
+    distances = np.linalg.norm(played - expected[:, vertices], axis=2)
+    # Each vertex once.
+    once = np.unique(vertices, return_index=True)[1]
+    assert np.isclose(distances.max(), report["after"]["worst"], rtol=0.01)
+    assert np.isclose(np.sqrt(np.square(distances[:, once]).mean()), report["after"]["rms"], rtol=0.01)
+    assert report["after"]["rms"] < 0.7 * report["before"]["rms"]
+
+
+FBX = """
+import sys, bpy
+path, fbx = sys.argv[1:]
+bpy.ops.wm.open_mainfile(filepath=path)
+assert not hasattr(bpy.types.Object, "sinew")
+bpy.ops.export_scene.fbx(filepath=fbx, bake_anim_simplify_factor=0.0, add_leaf_bones=False)
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+bpy.ops.import_scene.fbx(filepath=fbx)
+rig = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+rig.animation_data.action = next(action for action in bpy.data.actions if "Helpers" in action.name)
+bpy.ops.wm.save_as_mainfile(filepath=fbx + ".blend")
+sys.stdout.flush()
+__import__("os")._exit(0)
+"""
+
+
+def test_fbx_plays_to_the_stated_error_once_it_is_imported(arm, tmp_path):
+    obj, path = arm
+    scenes.add_sinew(obj, METHOD)
+    expected = world_shapes([obj], FRAMES)[0]
+    file, (report,) = baked(path, tmp_path / "out")
+    fbx = tmp_path / "arm.fbx"
+    run_blender(FBX, file, fbx)
+    played = read_elsewhere(f"{fbx}.blend", FRAMES, tmp_path)["Arm"]
+    assert_states(report, played, expected)
 
 
 @pytest.mark.parametrize("of", ["two modifiers", "in front", "bendy", "linked"])
