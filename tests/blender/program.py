@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,10 +23,11 @@ def start_sinew(*args: object, env_more: dict[str, str] | None = None, **options
 
 
 def run_sinew(
-    *args: object, status: int = 0, env_more: dict[str, str] | None = None
+    *args: object, status: int = 0, env_more: dict[str, str] | None = None, within: Sequence[str] = ()
 ) -> subprocess.CompletedProcess:
+    """within: words in front of the program's own"""
     result = subprocess.run(
-        [*COMMAND, *map(str, args)],
+        [*within, *COMMAND, *map(str, args)],
         capture_output=True,
         text=True,
         encoding="utf-8",

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -45,10 +46,16 @@ def free_port() -> int:
 
 
 @contextmanager
-def running(folder: Path, *arguments: str, environment: dict[str, str] | None = None):
+def running(
+    folder: Path,
+    *arguments: str,
+    environment: dict[str, str] | None = None,
+    within: Sequence[str] = (),
+):
+    """within: words in front of the program's own, such as those of machines()"""
     with (folder / f"{arguments[0]}.log").open("w") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "dask", *arguments],
+            [*within, sys.executable, "-m", "dask", *arguments],
             stdout=log,
             stderr=log,
             cwd=folder,
@@ -167,6 +174,70 @@ def test_tls_as_documented(rig, tmp_path, certificates):
         plain = run_sinew(*arguments(rig, tmp_path / "out 3", address.replace("tls", "tcp")), status=1)
         assert "no dask scheduler answers at this address" in plain.stderr
     assert_done(tmp_path / "out")
+
+
+@contextmanager
+def machines(*hosts: str):
+    """A network of machines with these addresses, as far as one machine can be several: a network namespace
+    for each. Yields for each the words that run a program there."""
+    name, switch = f"sinew{os.getpid()}", f"sn{os.getpid()}"
+    spaces = [f"{name}-{index}" for index in range(len(hosts))]
+
+    def ip(*words: str) -> None:
+        subprocess.run(["ip", *words], check=True, capture_output=True)
+
+    try:
+        try:
+            ip("link", "add", switch, "type", "bridge")
+            ip("link", "set", switch, "up")
+            for index, (space, host) in enumerate(zip(spaces, hosts, strict=True)):
+                ip("netns", "add", space)
+                plug = f"{switch}-{index}"
+                ip("link", "add", plug, "type", "veth", "peer", "name", "eth0", "netns", space)
+                ip("link", "set", plug, "master", switch, "up")
+                ip("-n", space, "address", "add", f"{host}/24", "dev", "eth0")
+                ip("-n", space, "link", "set", "eth0", "up")
+                ip("-n", space, "link", "set", "lo", "up")
+        except (OSError, subprocess.CalledProcessError):
+            pytest.skip("this process may make no networks")
+        yield [["ip", "netns", "exec", space] for space in spaces]
+    finally:
+        # With a namespace goes its cable.
+        for words in (*(("netns", "delete", space) for space in spaces), ("link", "delete", switch)):
+            with suppress(OSError):
+                subprocess.run(["ip", *words], capture_output=True, check=False)
+
+
+def test_a_farm_of_four_machines_as_documented(rig, tmp_path, certificates):
+    """The lines of the documentation as they stand, over a network: a scheduler, two workers, and the machine
+    that starts the batch."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    names = [f"{number}.blend" for number in range(8)]
+    for name in names:
+        shutil.copy(rig, folder / name)
+    with_config = {"DASK_CONFIG": str(certificates)}
+    scheduler = documented("scheduler", "10.0.0.5")
+    worker = documented("worker", "10.0.0.5")
+    other = [word.replace("10.0.0.6", "10.0.0.7") for word in worker]
+    with ExitStack() as stack:
+        first, second, third, client = stack.enter_context(
+            machines("10.0.0.5", "10.0.0.6", "10.0.0.7", "10.0.0.4")
+        )
+        lines = ((first, scheduler, "a"), (second, worker, "b"), (third, other, "c"))
+        for machine, words, place in lines:
+            (tmp_path / place).mkdir()
+            stack.enter_context(running(tmp_path / place, *words, environment=with_config, within=machine))
+        words = arguments(folder, tmp_path / "out", "tls://10.0.0.5:8786")
+        done = run_sinew(*words, env_more=with_config, within=client)
+    assert f"{len(names)} of {len(names)} files" in done.stdout
+    assert "can run programs" not in done.stderr
+    for name in names:
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / name))
+        assert properties.of(bpy.data.objects["Arm"]).method == "dq"
+    # Both are in the scheduler's log, each at its own address.
+    log = (tmp_path / "a" / "scheduler.log").read_text()
+    assert {"tls://10.0.0.6", "tls://10.0.0.7"} <= set(re.findall(r"tls://10\.0\.0\.[67]", log))
 
 
 @pytest.mark.parametrize("address", ["tls://127.0.0.1:1", "http://127.0.0.1:1", "nonsense", "tcp://[::1"])

@@ -23,9 +23,8 @@
 
 #include "sinew/deform/forks.h"
 
-// Where there is no futex, as under mingw, std::atomic::wait of these sleeps on condition variables that the end of the
-// process destroys, which waits for our sleeping workers for ever; and as it compares before it takes the mutex it can
-// miss a wake-up (tests/python/test_pool_model.py).
+// Where there is no futex, as under mingw, std::atomic::wait of these compares before it takes the mutex that it sleeps
+// under: it misses wake-ups (tests/python/test_pool_model.py; docs/install.md).
 #if defined(_GLIBCXX_RELEASE) && _GLIBCXX_RELEASE <= 12 && !defined(_GLIBCXX_HAVE_LINUX_FUTEX)
 #error "std::atomic::wait of this libstdc++ can hang: use one of LLVM's libc++, such as zig's, or MSVC."
 #endif
