@@ -511,6 +511,43 @@ def test_undo_of_what_a_handler_put_on_anew():
             np.testing.assert_allclose(tails(obj, "arm.1", [12]), place, atol=1e-5)
 
 
+def test_undo_brings_no_follower_back_that_was_deleted():
+    """Blender would go on with its evaluated copy in a view layer that was not shown meanwhile, which writes
+    to bones that are gone: a crash, now and then."""
+    arm = with_pole()
+    live(arm)
+    found = poses(arm, ["arm.1"])
+    deleted = {each.session_uid for each in followers()}
+    bpy.ops.ed.undo_push(message="live")
+    bpy.context.window.view_layer = bpy.context.scene.view_layers.new("Second")
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="second layer")
+    live(arm)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="given back")
+    bpy.ops.ed.undo()
+    arm = bpy.data.objects["Arm"]
+    assert ik_live.is_live(arm)
+    assert len(followers()) == 1
+    assert deleted.isdisjoint(each.session_uid for each in followers())
+    for layer in bpy.context.scene.view_layers:
+        bpy.context.window.view_layer = layer
+        np.testing.assert_allclose(poses(arm, ["arm.1"]), found, atol=1e-6)
+
+
+def test_a_saved_file_has_no_bones_of_a_follower_that_is_left(tmp_path):
+    """Its constraint was deleted, and so it follows nothing any more."""
+    arm = with_pole()
+    live(arm)
+    constraints = arm.pose.bones["arm.1"].constraints
+    constraints.remove(constraints["IK"])
+    bpy.context.view_layer.update()
+    assert not ik_live.is_live(arm)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert [each.name for each in bpy.data.armatures] == [bpy.data.objects["Arm"].data.name]
+
+
 WITHOUT_SINEW = """
 import bpy, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[-1])

@@ -82,6 +82,12 @@ def on_data_new(*_args: object) -> None:
 
 
 @persistent
+def on_undone(*_args: object) -> None:
+    ik_live.remove_returned()
+    on_data_new()
+
+
+@persistent
 def on_loaded(*_args: object) -> None:
     on_data_new()
     # Blender makes the file's first step of undo after this.
@@ -106,8 +112,8 @@ _HANDLERS = {
     "frame_change_post": on_frame_change,
     "undo_pre": before_undo,
     "redo_pre": before_undo,
-    "undo_post": on_data_new,
-    "redo_post": on_data_new,
+    "undo_post": on_undone,
+    "redo_post": on_undone,
     "load_post": on_loaded,
     "save_pre": on_save,
     "save_post": on_saved,

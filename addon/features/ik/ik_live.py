@@ -45,8 +45,10 @@ class _Session:
         self.problems: dict[int, str] = {}
         self.failed: set[int] = set()
         self.suspended: set[int] = set()
-        # Whose follower was made since Blender's last step of undo, and is in none.
+        # Whose follower was made or changed since Blender's last step of undo, and is so in none.
         self.in_no_step: set[int] = set()
+        # The followers that there were before a step of undo.
+        self.before_step: set[int] = set()
 
 
 _session = _Session()
@@ -126,7 +128,16 @@ def let_go() -> None:
     for armature in [obj for obj in bpy.data.objects if obj.session_uid in _session.in_no_step]:
         detach(armature)
         remove_followers(armature)
+    _session.before_step = {obj.session_uid for obj in bpy.data.objects if obj.sinew_ik_is_follower}
     note_step()
+
+
+def remove_returned() -> None:
+    """After undo: those that it brought back. A view layer that was not shown goes on with its evaluated copy
+    of the one that was deleted, which writes to bones that are gone (4.2 to 5.2). sync() makes others."""
+    for obj in [each for each in bpy.data.objects if each.type == "ARMATURE" and each.sinew_ik_is_follower]:
+        if obj.session_uid not in _session.before_step:
+            _remove(obj)
 
 
 def note_step() -> None:
@@ -224,10 +235,14 @@ def detach(armature: bpy.types.Object) -> None:
 def remove_followers(armature: bpy.types.Object | None, but: Collection[bpy.types.Object] = ()) -> None:
     """Of an armature; None: those whose armature is gone."""
     for follower in [each for each in _followers(armature) if each not in but]:
-        data = follower.data
-        bpy.data.objects.remove(follower)
-        if data is not None and not data.users:
-            bpy.data.armatures.remove(data)
+        _remove(follower)
+
+
+def _remove(follower: bpy.types.Object) -> None:
+    data = follower.data
+    bpy.data.objects.remove(follower)
+    if data is not None and not data.users:
+        bpy.data.armatures.remove(data)
 
 
 @contextmanager
@@ -236,8 +251,9 @@ def out_of_the_file() -> Iterator[None]:
     user."""
     remove_followers(None)
     bones = {}
-    for armature in filter(is_live, bpy.data.objects):
-        detach(armature)
+    for armature in [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]:
+        if is_live(armature):
+            detach(armature)
         for follower in _followers(armature):
             bones[follower], follower.data = follower.data, armature.data
     try:
@@ -286,6 +302,8 @@ def _state(armature: bpy.types.Object, trees: list[core.Tree]) -> list:
 
 def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
     detach(armature)
+    if references.are_between_steps():
+        _session.in_no_step.add(armature.session_uid)
     followers = []
     for tree in trees:
         follower = _follower_of(armature, tree)
@@ -350,12 +368,12 @@ def _follower_of(armature: bpy.types.Object, tree: core.Tree) -> bpy.types.Objec
             if follower.sinew_ik_follower.root == root:
                 return follower
             data = follower.data
-    if references.are_between_steps():
-        _session.in_no_step.add(armature.session_uid)
-    follower = bpy.data.objects.new(f"{armature.name} {root} {ik_io.FOLLOWS}", armature.data)
+    name = f"{armature.name} {root} {ik_io.FOLLOWS}"
+    follower = bpy.data.objects.new(name, armature.data)
     if data is None:
         # The artist's own would have a second user.
         data = armature.data.copy()
+        data.name = name
         data.animation_data_clear()
     # By an assignment, which makes bones to be posed.
     follower.data = data
