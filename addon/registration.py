@@ -11,6 +11,7 @@ import bpy
 from . import native
 
 _registered: list[type] = []
+_has_ended = False
 
 
 def register() -> None:
@@ -76,6 +77,9 @@ def register() -> None:
 
 
 def unregister() -> None:
+    if _has_ended:
+        # Blender as a module unregisters its extensions only after _end().
+        return
     if hasattr(bpy.types.Object, "sinew"):
         from .attach import note, properties, stored_vertex_data
         from .deform import exporters, handlers, session
@@ -113,9 +117,11 @@ def unregister() -> None:
 def _end() -> None:
     """At the end of Python. Blender unregisters its extensions before; with bpy as a module nobody does, and
     a Python handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5."""
+    global _has_ended
     # Where Blender did, its types are gone by now.
     if _registered:
         unregister()
+    _has_ended = True
     # Blender 4.2 keeps a reference to each class of property groups that was registered, which keeps the
     # names of its module. Blender as a module ends when `bpy` is freed, and crashes where it never is.
     for name, module in list(sys.modules.items()):

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 import five_meshes
@@ -26,6 +27,9 @@ ZIP, FOLDER = window.arguments()
 VIEW = (400, 500)
 # In the sidebar.
 ADD, METHOD, SWITCH = (880, 151), (893, 197), (812, 151)
+# Panels' headers while all are closed; what Diagnostics has below its own.
+HEADER, DIAGNOSTICS = (850, 97), (850, 293)
+CHECK, MEND = (830, 350), (835, 501)
 # In the menu of methods.
 DUAL_QUATERNION = (483, 276)
 # In the dialog of a comparison, which opens at this place.
@@ -186,6 +190,98 @@ def comparison_by_clicks() -> Iterator[None]:
     yield
 
 
+def brightest(picture: str, place: tuple[int, int]) -> float:
+    """Of the letters about a place of a photograph, 0 to 1."""
+    image = bpy.data.images.load(str(FOLDER / f"{picture}.png"))
+    width, height = image.size
+    pixels = np.empty(width * height * 4, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    rows = height - place[1]
+    letters = pixels.reshape(height, width, 4)[rows - 8 : rows + 8, place[0] - 60 : place[0] + 60, :3]
+    return float(letters.mean(axis=2).max())
+
+
+def off_greys() -> Iterator[None]:
+    """What does not count while Sinew is off."""
+    yield from window.click(ADD)
+    scene().sinew_character.method = "dq"
+    yield
+    window.photograph(FOLDER / "on.png")
+    yield from window.click(SWITCH)
+    window.photograph(FOLDER / "off.png")
+    facts["letters"] = [brightest(picture, METHOD) for picture in ("on", "off")]
+    yield from window.click(SWITCH)
+    facts["ways on"] = [obj.sinew.enabled for obj in meshes()]
+
+
+def without_weights() -> int:
+    return sum(not vertex.groups for vertex in bpy.data.objects["Body"].data.vertices)
+
+
+def mends_by_clicks() -> Iterator[None]:
+    """Opened with Ctrl, a panel closes all others."""
+    for held in ({}, {"ctrl": True}, {}):
+        yield from window.click(HEADER, **held)
+    yield from window.click(DIAGNOSTICS)
+    for group in bpy.data.objects["Body"].vertex_groups:
+        group.remove(list(range(300, 320)))
+    bpy.ops.ed.undo_push(message="removed")
+    facts["weights lost"] = without_weights()
+    yield from window.click(CHECK)
+    window.photograph(FOLDER / "check.png")
+    yield from window.click(MEND)
+    window.photograph(FOLDER / "mended.png")
+    facts["weights mended"] = without_weights()
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["mending undone"] = without_weights()
+    yield from window.click(DIAGNOSTICS)
+    yield from window.click(HEADER)
+
+
+def key_blocks() -> list[tuple[str, bool, bool]]:
+    """Of the body: each corrective key's name, whether it is muted and whether a driver moves it."""
+    keys = bpy.data.objects["Body"].data.shape_keys
+    if keys is None:
+        return []
+    driven = {curve.data_path for curve in keys.animation_data.drivers} if keys.animation_data else set()
+    return [(key.name, key.mute, f'key_blocks["{key.name}"].value' in driven) for key in keys.key_blocks[1:]]
+
+
+def corrective_keys() -> Iterator[None]:
+    """By F3, and driven by a bone; with it the Armature modifier alone has Sinew's shape."""
+    yield from search("corrective shape key")
+    facts["corrective"] = key_blocks()
+    window.press("Z", VIEW, ctrl=True)
+    yield
+    yield
+    facts["corrective undone"] = key_blocks()
+    rig, body = bpy.data.objects["Hero Rig"], bpy.data.objects["Body"]
+    window.select_only(rig)
+    rig.data.bones.active = rig.data.bones["bone.1"]
+    with window.in_view3d("WINDOW"):
+        bpy.ops.object.mode_set(mode="POSE")
+        bpy.ops.sinew.corrective_key("EXEC_DEFAULT", driven=True)
+    yield
+    facts["corrective driven"] = key_blocks()
+    window.photograph(FOLDER / "corrective.png")
+    shown = window.final_points(body)
+    for obj in meshes():
+        obj.sinew.enabled = False
+    yield
+    without = window.final_points(body)
+    body.data.shape_keys.key_blocks[1].mute = False
+    yield
+    distances = [np.linalg.norm(points - shown, axis=1) for points in (without, window.final_points(body))]
+    facts["off by"] = [float(each.max()) for each in distances]
+    with window.in_view3d("WINDOW"):
+        bpy.ops.object.mode_set(mode="OBJECT")
+    five_meshes.select(body)
+    yield
+
+
 def menus() -> Iterator[None]:
     with window.in_view3d("WINDOW"):
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")
@@ -244,6 +340,9 @@ def steps() -> Iterator[None]:
     yield from by_search_and_keys()
     yield from comparison_by_clicks()
     yield from menus()
+    yield from off_greys()
+    yield from mends_by_clicks()
+    yield from corrective_keys()
     yield from modifiers()
     yield from goes_without_a_trace()
     print("FACTS " + json.dumps(facts), flush=True)

@@ -54,6 +54,7 @@ addon_utils.enable(module)
 bpy.context.scene.frame_set(10)
 assert not obj.sinew.error
 addon_utils.disable(module)
+addon_utils.enable(module)
 """
 
 
@@ -92,6 +93,8 @@ def test_installs_and_works_in_the_same_session(package, bare_site, tmp_path):
         | {"BLENDER_USER_RESOURCES": str(user)},
     )
     assert result.returncode == 0, result.stdout + result.stderr
+    # At its end Blender as a module unregisters it after all else.
+    assert "Traceback" not in result.stderr
     facts = json.loads(next(line for line in result.stdout.splitlines() if line.startswith("FACTS "))[6:])
     assert Path(facts["library"]).is_relative_to(user), "another sinew than the zip's was loaded"
     assert facts["error"] == ""

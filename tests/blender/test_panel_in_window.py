@@ -56,3 +56,24 @@ def test_the_button_above_the_modifiers_opens_the_tab(facts):
 
 def test_panels_print_no_errors(facts):
     assert facts["printed"] == []
+
+
+def test_off_greys_the_method(facts):
+    on, off = facts["letters"]
+    assert off < 0.7 * on
+    assert facts["ways on"] == [True] * 5
+
+
+def test_a_click_mends_and_one_step_of_undo_takes_it_back(facts):
+    assert (facts["weights lost"], facts["weights mended"], facts["mending undone"]) == (20, 0, 20)
+
+
+def test_a_corrective_key_is_found_by_f3_and_has_sinews_shape(facts):
+    ((name, muted, driven),) = facts["corrective"]
+    assert name.startswith("Dual Quaternion")
+    assert (muted, driven) == (True, False)
+    assert facts["corrective undone"] == []
+    assert facts["corrective driven"] == [[name, True, True]]
+    without, with_key = facts["off by"]
+    assert without > 0.03
+    assert with_key <= 1e-5
