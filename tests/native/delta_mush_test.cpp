@@ -173,6 +173,23 @@ TEST_P(Mushes, agree_with_the_definition_in_double) {
     }
 }
 
+TEST_P(Mushes, agree_where_an_edge_of_the_smoothed_points_has_no_length) {
+    Mesh mesh;
+    mesh.rest_points = {{0.1f, 0.2f, 0.3f}, {1, 0, 0.1f}, {0.1f, 1, 0}, {-1, 0.2f, 0}, {0, -1, 0.2f}};
+    for (std::int32_t i = 1; i <= 4; ++i) mesh.add_face({0, i, i % 4 + 1});
+    mesh.add_edges_of_faces();
+    // The first alone is smoothed, to where the second is, as the others' sum is 0.
+    const std::vector<float> weights{1, 0, 0, 0, 0};
+    const std::vector<Vec3<float>> points{{0, 0, 0}, {0, 0, 0}, {1, 0, 0.5f}, {-1, 1, 0}, {0, -1, -0.5f}};
+    DeltaMushSettings settings{.iterations = 1, .factor = 1.0f};
+    settings.weights = weights;
+    std::vector<double> angles;
+    const auto expected = Reference(mesh, settings).apply(points, 1.0, angles);
+    const auto result = mushed(DeltaMush(mesh.topology(), mesh.rest_points, settings), points);
+    EXPECT_LT(distance(Vec3<double>(result[0]), expected[0]), 1e-6);
+    EXPECT_GT(glm::length(expected[0]), 0.1);
+}
+
 TEST_P(Mushes, keep_faces_at_rest) {
     Mesh mesh = random_mesh(4, 30);
     const auto result =

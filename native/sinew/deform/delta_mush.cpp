@@ -316,10 +316,14 @@ void DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
         mesh.chunk_count(), threads,
         [&work](std::size_t begin, std::size_t end) {
             const std::vector<std::uint32_t>& vertices = work.state.mesh.vertices;
+            // Read once: the compiler takes any number that is stored for one of these.
+            const std::uint32_t* const of = vertices.data();
+            const Vec3<float>* const from = work.frame.points;
+            Float4* const to = work.state.smoothed[0].data();
             end = std::min(end * MushMesh::kChunk, vertices.size());
             for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
                 // The fourth number is 0 always.
-                std::memcpy(&work.state.smoothed[0][i], &work.frame.points[vertices[i]], sizeof(Vec3<float>));
+                std::memcpy(&to[i], &from[of[i]], sizeof(Vec3<float>));
             }
         },
         1);

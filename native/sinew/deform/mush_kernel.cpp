@@ -23,6 +23,8 @@ HWY_BEFORE_NAMESPACE();
 namespace sinew {
 namespace HWY_NAMESPACE {
 
+constexpr float kRootOfTwo = 1.41421356237f;
+
 // The four numbers of a point at once, or one after the other where vectors have one lane.
 using Four = hn::CappedTag<float, 4>;
 
@@ -224,19 +226,6 @@ HWY_INLINE Points<D> unit(D d, const Points<D>& v) {
     return {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
 }
 
-template <class D>
-HWY_INLINE Vec<D> angle(D d, Vec<D> cosine) {
-    const auto one = hn::Set(d, 1.0f);
-    const auto m = hn::Min(hn::Abs(cosine), one);
-    auto sum = hn::MulAdd(m, hn::Set(d, -0.02164095f), hn::Set(d, 0.077980478f));
-    sum = hn::MulAdd(m, sum, hn::Set(d, -0.213300989f));
-    sum = hn::MulAdd(m, sum, hn::Set(d, 1.5707963267f));
-    const auto rest = hn::Sub(one, m);
-    const auto of_size = hn::Mul(hn::Mul(rest, inverse_length(d, rest)), sum);
-    const auto is_negative = hn::Lt(cosine, hn::Zero(d));
-    return hn::IfThenElse(is_negative, hn::Sub(hn::Set(d, 3.14159265358979f), of_size), of_size);
-}
-
 /// The frame of a corner: axes of any length, and what makes them unit vectors; and how much it counts.
 template <class D>
 struct CornerLanes {
@@ -245,49 +234,81 @@ struct CornerLanes {
     Vec<D> weight;
 };
 
-/// Of the corner between the spokes to the next vertex of the face and to the one before, which are unit vectors.
+/// Of the corner between the spokes to the next vertex of the face and to the one before, which are unit vectors, or 0.
 template <class D>
 HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>& previous) {
-    // The definition's a is `previous`, its b is -next. So y, along (a x b) x (a + b), goes along b - a, and of unit
-    // vectors |a - b| |a + b| is 2 |a x b|.
+    // The definition's a is `previous`, its b is -next. Its y, along (a x b) x (a + b), goes along b - a: here it is a - b,
+    // which adds the same, as details are taken along it, too. Of unit vectors |a + b| |a - b| is 2 |a x b|, and
+    // (a + b)^2 + (a - b)^2 is 4: these two lengths say all.
     CornerLanes<D> corner;
     corner.x = subtract<D>(previous, next);
     corner.y = add<D>(previous, next);
     corner.z = cross<D>(next, previous);
     const auto squared_x = dot_of<D>(corner.x, corner.x);
+    const auto squared_y = dot_of<D>(corner.y, corner.y);
+    const auto are_two = hn::Gt(hn::Add(squared_x, squared_y), hn::Set(d, 3.0f));
+    const auto inverse_y = inverse_length(d, squared_y);
     corner.unit_x = inverse_length(d, squared_x);
-    corner.unit_z = inverse_length(d, dot_of<D>(corner.z, corner.z));
-    corner.unit_y = hn::Mul(hn::Mul(hn::Set(d, -0.5f), corner.unit_z), hn::Mul(squared_x, corner.unit_x));
+    const auto length_x = hn::Mul(squared_x, corner.unit_x);
+    const auto length_y = hn::Mul(squared_y, inverse_y);
+    const auto half_unit_z = hn::IfThenElseZero(are_two, hn::Mul(corner.unit_x, inverse_y));
+    corner.unit_z = hn::Add(half_unit_z, half_unit_z);
+    corner.unit_y = hn::Mul(half_unit_z, length_x);
+
+    // DeltaMushStage::angle() of the cosine c = a b. (a + b)^2 is 2 + 2 c, (a - b)^2 is 2 - 2 c: the smaller is
+    // 2 (1 - |c|), and the polynomial's factor is the root of half of it. Where an edge has no direction, c is 0.
+    const auto least = hn::IfThenElse(are_two, hn::Min(squared_x, squared_y), hn::Set(d, 2.0f));
+    const auto least_length = hn::IfThenElse(are_two, hn::Min(length_x, length_y), hn::Set(d, kRootOfTwo));
+    const auto m = hn::NegMulAdd(least, hn::Set(d, 0.5f), hn::Set(d, 1.0f));
+    auto sum = hn::MulAdd(m, hn::Set(d, -0.02164095f / kRootOfTwo), hn::Set(d, 0.077980478f / kRootOfTwo));
+    sum = hn::MulAdd(m, sum, hn::Set(d, -0.213300989f / kRootOfTwo));
+    sum = hn::MulAdd(m, sum, hn::Set(d, 1.5707963267f / kRootOfTwo));
+    const auto of_size = hn::Mul(least_length, sum);
+    const auto is_negative = hn::Lt(squared_x, squared_y);
+    const auto angle = hn::IfThenElse(is_negative, hn::Sub(hn::Set(d, 3.14159265358979f), of_size), of_size);
     const auto largest = hn::Max(hn::Abs(corner.y.x), hn::Max(hn::Abs(corner.y.y), hn::Abs(corner.y.z)));
     const auto is_bent = hn::Gt(largest, hn::Set(d, static_cast<float>(DeltaMushStage::kStraight)));
-    corner.weight = hn::IfThenElseZero(is_bent, angle(d, hn::Neg(dot_of<D>(previous, next))));
+    corner.weight = hn::IfThenElseZero(is_bent, angle);
     return corner;
+}
+
+/// The direction of the k-th spoke of the vertices of a block from `lane` on.
+template <bool kIsConsecutive, class D>
+HWY_INLINE Points<D> spoke(D d, const MushFrame& frame, const MushBlock& block, std::size_t lane,
+                           const Points<D>& point, std::size_t k) {
+    if constexpr (kIsConsecutive) {
+        const auto first = static_cast<std::size_t>(frame.mesh->first_spokes[block.first_spoke + k]);
+        return unit(d, subtract<D>(consecutive_points(d, frame.from + first, lane), point));
+    } else {
+        const std::int32_t* const ends = frame.mesh->spokes[block.first_spoke + k].lane.data();
+        const auto index_of = [ends](std::size_t vertex) HWY_ATTR { return ends[vertex]; };
+        return unit(d, subtract<D>(collected_points(d, frame.from, index_of, lane), point));
+    }
+}
+
+template <bool kIsConsecutive, class D, class Call>
+HWY_INLINE void for_each_corner_of(D d, const MushFrame& frame, const MushBlock& block, std::size_t lane,
+                                   const Points<D>& point, const Call& call) {
+    const bool is_shared = block.spokes < 2 * block.corners;
+    const Points<D> first = spoke<kIsConsecutive>(d, frame, block, lane, point, 0);
+    Points<D> next = first;
+    for (std::size_t k = 0; k < block.corners; ++k) {
+        if (!is_shared && k > 0) next = spoke<kIsConsecutive>(d, frame, block, lane, point, 2 * k);
+        const std::size_t after = is_shared ? k + 1 : 2 * k + 1;
+        const Points<D> previous =
+            after < block.spokes ? spoke<kIsConsecutive>(d, frame, block, lane, point, after) : first;
+        call(block.first_detail + k, corner_of(d, next, previous));
+        next = previous;
+    }
 }
 
 /// Calls call(index of the details, corner) for each corner of the vertices of a block from `lane` on.
 template <class D, class Call>
 HWY_INLINE void for_each_corner(D d, const MushFrame& frame, const MushBlock& block, std::size_t lane,
                                 const Points<D>& point, const Call& call) {
-    const auto spoke = [&](std::size_t k) HWY_ATTR {
-        if (block.is_consecutive) {
-            const auto first = static_cast<std::size_t>(frame.mesh->first_spokes[block.first_spoke + k]);
-            return unit(d, subtract<D>(consecutive_points(d, frame.from + first, lane), point));
-        }
-        const std::int32_t* const ends = frame.mesh->spokes[block.first_spoke + k].lane.data();
-        const auto index_of = [ends](std::size_t vertex) HWY_ATTR { return ends[vertex]; };
-        return unit(d, subtract<D>(collected_points(d, frame.from, index_of, lane), point));
-    };
     if (block.corners == 0) return;
-    const bool is_shared = block.spokes < 2 * block.corners;
-    const Points<D> first = spoke(0);
-    Points<D> next = first;
-    for (std::size_t k = 0; k < block.corners; ++k) {
-        if (!is_shared && k > 0) next = spoke(2 * k);
-        const std::size_t after = is_shared ? k + 1 : 2 * k + 1;
-        const Points<D> previous = after < block.spokes ? spoke(after) : first;
-        call(block.first_detail + k, corner_of(d, next, previous));
-        next = previous;
-    }
+    if (block.is_consecutive) return for_each_corner_of<true>(d, frame, block, lane, point, call);
+    for_each_corner_of<false>(d, frame, block, lane, point, call);
 }
 
 void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
@@ -318,9 +339,12 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
                 hn::IfThenElseZero(hn::Gt(weights, hn::Zero(d)), hn::Div(hn::Set(d, frame.scale), weights));
             store_lanes(d, add_scaled<D>(point, share, sum), finished, lane);
         }
-        for (std::size_t i = 0; i < block.vertices; ++i) {
-            std::memcpy(&frame.points[mesh.vertices[block.first_vertex + i]], finished + i,
-                        sizeof(Vec3<float>));
+        // Read once: the compiler takes any number that is stored for one of the frame's.
+        const std::uint32_t* const vertices = mesh.vertices.data() + block.first_vertex;
+        Vec3<float>* const points = frame.points;
+        const std::size_t count = block.vertices;
+        for (std::size_t i = 0; i < count; ++i) {
+            std::memcpy(points + vertices[i], finished + i, sizeof(Vec3<float>));
         }
     }
 }
@@ -420,26 +444,36 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
     if (result == rest) std::copy_n(rest, count, frame.to + begin);
 }
 
+/// Calls call(begin, count) for the vertices of a run. The last kLanes overlap those before: to write fewer takes longer.
+template <class Call>
+HWY_INLINE void for_each_lanes(const MushRun& run, const Call& call) {
+    const std::size_t count = HWY_MIN(kLanes, static_cast<std::size_t>(run.end - run.begin));
+    const std::size_t last = run.end - count;
+    for (std::size_t i = run.begin; i < last; i += kLanes) call(i, count);
+    call(last, count);
+}
+
 /// A run that is consecutive.
 template <std::size_t kValence>
 HWY_INLINE void smooth_consecutive_by_length(const MushFrame& frame, const MushRun& run) {
     const std::int32_t* const neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
-    for (std::size_t i = run.begin; i < run.end; i += kLanes) {
+    for_each_lanes(run, [&](std::size_t i, std::size_t count) HWY_ATTR {
         const auto behind = static_cast<std::int32_t>(i - run.begin);
-        smooth_lanes_by_length<kValence, true>(frame, run.valence, i, HWY_MIN(kLanes, run.end - i),
+        smooth_lanes_by_length<kValence, true>(frame, run.valence, i, count,
                                                [&](std::size_t, std::size_t k)
                                                    HWY_ATTR { return neighbours[k] + behind; });
-    }
+    });
 }
 
 HWY_INLINE void smooth_others_by_length(const MushFrame& frame, const MushRun& run) {
     const std::size_t valence = run.valence;
-    const std::int32_t* neighbours = frame.mesh->neighbours.data() + run.first_neighbour;
-    for (std::size_t i = run.begin; i < run.end; i += kLanes, neighbours += kLanes * valence) {
-        smooth_lanes_by_length<0, false>(frame, valence, i, HWY_MIN(kLanes, run.end - i),
+    for_each_lanes(run, [&](std::size_t i, std::size_t count) HWY_ATTR {
+        const std::int32_t* const neighbours =
+            frame.mesh->neighbours.data() + run.first_neighbour + (i - run.begin) * valence;
+        smooth_lanes_by_length<0, false>(frame, valence, i, count,
                                          [&](std::size_t vertex, std::size_t k)
                                              HWY_ATTR { return neighbours[vertex * valence + k]; });
-    }
+    });
 }
 
 /// An iteration by length.
