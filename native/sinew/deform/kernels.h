@@ -31,9 +31,9 @@ struct Frame {
 struct TargetKernel {
     /// Deforms the blocks [begin, end). The meaning of each method is in skinning/; its kernel agrees with it.
     ///
-    /// A vertex's result depends on its own rest point and influences and on the pose alone: not on its lane,
-    /// its block or on other vertices; of a method that keeps moments, but for rounding. On other instruction sets it may differ by rounding, as only some of
-    /// them multiply and add in one step.
+    /// A vertex's result depends on its own rest point and influences and on the pose alone, not on its lane, its block or
+    /// other vertices; of a method that keeps moments, but for rounding. On other instruction sets it may differ by
+    /// rounding, as only some of them multiply and add in one step.
     void (*deform)(const Frame& frame, std::size_t begin, std::size_t end);
 
     /// Writes the rows of the bones `used` to `palette.bones`, and their sizes. Under a rigid method as if each
