@@ -39,7 +39,7 @@ CHECKOUT_TESTS = (
     *("test_sbom", "test_site", "test_wheel", "test_workflows"),
 )
 # Shapes as Blender's, Sinew added and removed, files saved and read, bakes, commands. Without batches, which
-# have not been tried there.
+# take long there: docs/install.md has what was tried.
 BLENDER_TESTS = (
     *("test_against_armature_modifier", "test_changes", "test_restore", "test_saved_files"),
     *("test_bake", "test_command_line"),

@@ -445,6 +445,7 @@ def test_a_blender_keeps_to_its_share_of_the_processors(tmp_path):
 
 
 @newest_only
+@pytest.mark.skipif(os.name == "nt", reason="Python sends no interrupt to one process of Windows")
 def test_ctrl_c_stops_cleanly(tmp_path):
     folder = tmp_path / "in"
     make_rigs(folder, 4)
