@@ -32,7 +32,12 @@ STAGES, MESHES = (790, 252), (790, 278)
 # Panels' headers while all are closed.
 HEADERS = {
     name: (850, 97 + 28 * number)
-    for number, name in enumerate(("Sinew", "Suggest", "In-betweens", "Compare", "Heat Map", "Diagnostics"))
+    for number, name in enumerate(
+        (
+            *("Sinew", "Suggest", "In-betweens", "Blend Actions", "Inverse Kinematics"),
+            *("Compare", "Heat Map", "Diagnostics"),
+        )
+    )
 }
 
 
