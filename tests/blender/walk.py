@@ -272,7 +272,7 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
         sinew.send(what="start")
         blender.send(what="start")
         outcome.fault = compare(outcome, -1, sinew.receive(), blender.receive(), blender)
-        claims: dict = {}
+        claims, poses = {}, {}
         is_ahead = False
         for at, step in enumerate(steps):
             if outcome.fault is not None:
@@ -284,9 +284,15 @@ def walk(pair: Pair, seed: int, steps: Sequence[Step]) -> Outcome:
             is_ahead = at + 1 < len(steps) and step.operation not in SAVED
             if is_ahead:
                 sinew.send(**request_of(steps[at + 1]))
-            blender.send(**request_of(step), claims_before=claims, claims_after=ours["claims"])
+            blender.send(
+                **request_of(step),
+                claims_before=claims,
+                claims_after=ours["claims"],
+                poses_before=poses,
+                poses_after=ours["poses"],
+            )
             theirs = blender.receive()
-            claims = ours["claims"]
+            claims, poses = ours["claims"], ours["poses"]
             outcome.said.append(f"{step.operation}: {ours['said']}")
             outcome.copies_follow &= step.operation in FOLLOWED
             outcome.copies_follow |= step.operation == "compare" and ours["outcome"] == "done"
@@ -321,7 +327,7 @@ def compare(outcome: Outcome, at: int, ours: dict, theirs: dict, blender: Side) 
     if fault is not None:
         return fault
     outcome.unanswered += ours["unanswered"]
-    skipped = {*ours["skipped"], *theirs["skipped"]}
+    skipped = {*ours["skipped"], *theirs["skipped"], *theirs["follows"]}
     return (
         compare_shapes(outcome, at, ours, theirs, skipped)
         or compare_renders(outcome, at, ours, theirs, skipped)
@@ -376,6 +382,8 @@ def compare_files(at: int, ours: dict, theirs: dict) -> Fault | None:
 def compare_shapes(outcome: Outcome, at: int, ours: dict, theirs: dict, skipped: set[str]) -> Fault | None:
     for name, (points, matrix) in ours["shapes"].items():
         other_points, other_matrix = theirs["shapes"][name]
+        if name in theirs["moved"]:
+            continue
         if not np.allclose(matrix, other_matrix, atol=1e-5):
             return Fault("place", f"{name} is elsewhere", at)
         if name not in skipped:
@@ -415,6 +423,7 @@ def compare_copies(
     if not ours.get("copies") or not outcome.copies_follow:
         return None
     wanted = [key for key in ours["copies"] if key[0] not in skipped or key[0] in theirs["shapes"]]
+    wanted = [key for key in wanted if key[0] not in theirs["follows"]]
     blender.send(what="shapes by", copies=wanted)
     for key, other in blender.receive().items():
         points, other = ours["copies"][key].astype(np.float64), other.astype(np.float64)
@@ -433,6 +442,7 @@ def compare_saved(outcome: Outcome, at: int, saved: dict, ours: dict, theirs: di
     """What differs between a file that Sinew's side saved, opened without Sinew, and the other side."""
     if "shapes" not in ours:
         return None
+    # Where inverse kinematics is live, the file plays by Blender's constraints.
     skipped = {*ours["skipped"], *theirs["skipped"]}
     for name, (other, _matrix) in theirs["shapes"].items():
         if name in skipped:

@@ -66,13 +66,15 @@ class Child:
         self.walker.expect_rendered = self.expect_rendered
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
+        # Of Sinew's side, while inverse kinematics is live: the bones of all armatures, as evaluated there.
+        self.poses: dict = {}
         self.wrong: list[str] = []
         walk_operations.make_library(self.walker)
 
     # --- Requests
 
     def start(self, _request: dict) -> dict:
-        self.claims, self.wrong = {}, []
+        self.claims, self.poses, self.wrong = {}, {}, []
         self.side.set_safe(False)
         self.side.compute_beside(False)
         self.operations.start(self.walker)
@@ -87,6 +89,7 @@ class Child:
         self.claims = request.get("claims_before") or {}
         self.wrong = []
         if not self.side.is_sinew:
+            self.poses = request["poses_before"]
             # Which objects an operation can choose depends on it.
             self.side.adopt(self.claims)
         numbers = random.Random(seed)
@@ -94,7 +97,9 @@ class Child:
         self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome, said = "done", None
         try:
-            said = operation.act(self.walker, numbers)
+            # What would keep a pose that is not the same on both sides.
+            if not (self.poses and name in self.operations.NOT_WHILE_LIVE):
+                said = operation.act(self.walker, numbers)
             if said is None:
                 outcome = "nothing"
         except Exception as error:
@@ -107,7 +112,7 @@ class Child:
                 self.walker.push_undo()
         self.claims = request.get("claims_after") or {}
         if not self.side.is_sinew:
-            self.wrong = []
+            self.wrong, self.poses = [], request["poses_after"]
         result = {"outcome": outcome, "said": said, **self.look(request["check"])}
         result["rendered"] = self.walker.rendered
         result["rendered by library"] = self.walker.rendered_by_library
@@ -148,7 +153,10 @@ class Child:
     def look(self, check: bool) -> dict:
         """What can be said of the file: how Sinew is set, and after an evaluation the shapes."""
         if not check:
-            return {"claims": self.side.claims()} if self.side.is_sinew else {}
+            if not self.side.is_sinew:
+                return {}
+            self.poses = self.side.live_poses(None)
+            return {"claims": self.side.claims(), "poses": self.poses}
         found: dict = {}
         if not self.side.is_sinew:
             self.wrong += self.side.bring_in_line(self.claims)
@@ -161,19 +169,31 @@ class Child:
         found["state"] = self.state()
         if self.side.is_sinew:
             found["claims"] = self.side.claims()
+            found["poses"] = self.poses = self.side.live_poses(depsgraph)
             found["copies"] = self.copies(depsgraph)
             found["unanswered"] = self.side.records.unanswered
             self.side.records.unanswered = 0
         else:
             found["wrong"] = self.wrong
-            found["expected"] = self.all_expected()
+            follows, moved = self.sides.what_follows({name for name, is_live in self.live() if is_live})
+            found["follows"] = [obj.name_full for obj in (*follows, *moved)]
+            found["moved"] = [obj.name_full for obj in moved]
+            found["expected"] = self.all_expected(follows)
         return found
 
-    def all_expected(self) -> dict:
-        """Points of objects that are shown, and whose shape is none of Blender's own."""
+    def live(self):
+        return [(name, is_live) for name, (is_live, _bones) in self.poses.items()]
+
+    def all_expected(self, follows) -> dict:
+        """Points of objects that are shown, and whose shape is none of Blender's own.
+
+        follows  those that follow what is solved live
+        """
         found = {}
         for obj in self.bpy.context.view_layer.objects:
-            if obj.type == "MESH" and obj.visible_get() and self.side.has_other_shape(obj):
+            if obj.type != "MESH" or not obj.visible_get():
+                continue
+            if obj in follows or self.side.has_other_shape(obj):
                 points = self.expected(obj)
                 if points is not None:
                     found[obj.name_full] = points
@@ -231,7 +251,7 @@ class Child:
         return side.has_other_shape(obj) or self.has_other_scale(obj)
 
     def expect_rendered(self, name: str, obj, depsgraph) -> None:
-        if not self.side.is_sinew and self.side.has_other_shape(obj):
+        if not self.side.is_sinew and self.side.has_other_shape(obj) and not self.poses:
             points = self.expected(obj, depsgraph)
             if points is not None:
                 self.walker.rendered_by_library[name] = points
@@ -243,8 +263,9 @@ class Child:
             return None
         if claim is None or not side.is_on(obj) or obj.data.is_editmode:
             return None
+        bones = {name: bones for name, (_is_live, bones) in self.poses.items()}
         return self.shapes_of.expected(
-            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render
+            obj, claim["run"], claim["method"], claim["stages"], claim["parameters"], render, bones
         )
 
     def has_other_scale(self, obj) -> bool:
@@ -309,7 +330,13 @@ class Child:
         }
         there = [o for o in self.walker.objects("MESH") if o.library is None and o.users_collection]
         found["meshes"] = sorted({obj.data.name_full for obj in there})
-        found["armatures"] = sorted(a.name_full for a in bpy.data.armatures if not a.library)
+        of_helpers = {o.data for o in bpy.data.objects if self.side.may_react(o)}
+        found["armatures"] = sorted(
+            a.name_full
+            for a in bpy.data.armatures
+            # Of a follower that was purged its bones are left, without a user: no file has them.
+            if not (a.library or a in of_helpers or (a.users == 0 and "Sinew IK" in a.name))
+        )
         found["collections"] = [c.name for c in self.walker.collections()]
         for obj in self.walker.objects("MESH"):
             if obj.library is None and obj.users_collection:

@@ -30,6 +30,13 @@ from walk_sides import (
 )
 
 FRAMES = (1, 11)
+# What inverse kinematics follows.
+TARGET = "target"
+# While it is live, poses differ between the sides, and these would keep them.
+NOT_WHILE_LIVE = {
+    *("parent", "parent_as_artists_do", "join", "remesh", "replace_mesh", "apply_transform", "apply_pose"),
+    *("apply_modifier", "convert_to_mesh", "mend", "compare"),
+}
 # No turn of a bone against another by as much as half a turn, where dual quaternions meet a discontinuity.
 TURN = 0.8
 
@@ -358,6 +365,7 @@ def remove(w: Walker, r: random.Random) -> str | None:
 def remove_all(w: Walker, r: random.Random) -> str | None:
     w.object_mode()
     w.side.end_comparison()
+    w.side.end_live()
     # What the current view layer does not have, too.
     for obj in [o for o in w.objects("MESH") if w.side.has_sinew(o) and o.library is None]:
         # What comes from a library with Sinew has it again when the file is loaded.
@@ -840,8 +848,9 @@ def constrain_bone(w: Walker, r: random.Random) -> str | None:
         or any(c.type == "COPY_ROTATION" for b in target.pose.bones for c in b.constraints)
     ):
         return None
-    if bone.constraints:
-        bone.constraints.remove(bone.constraints[0])
+    of_artist = [c for c in bone.constraints if c.type in ("COPY_ROTATION", "IK")]
+    if of_artist:
+        bone.constraints.remove(of_artist[0])
         return f"take the constraint off {bone.name} of {rig.name}"
     other = w.one(r, target.pose.bones)
     if other is None:
@@ -849,6 +858,61 @@ def constrain_bone(w: Walker, r: random.Random) -> str | None:
     constraint = bone.constraints.new("COPY_ROTATION")
     constraint.target, constraint.subtarget, constraint.influence = target, other.name, 0.5
     return f"{bone.name} of {rig.name} copies half the rotation of {other.name} of {target.name}"
+
+
+# --- Inverse kinematics
+
+
+@operation(1.5)
+def ik_chain(w: Walker, r: random.Random) -> str | None:
+    """A chain of bones that follows a target, or no longer does."""
+    rig = w.armature(r)
+    if rig is None or rig.override_library is not None or rig.data.is_editmode:
+        return None
+    bone, length = w.one(r, [bone for bone in rig.pose.bones if bone.parent is not None]), r.choice((0, 2))
+    place = [r.uniform(-1, 2) for _axis in range(3)]
+    if bone is None:
+        return None
+    there = next((c for c in bone.constraints if c.type == "IK"), None)
+    if there is not None:
+        bone.constraints.remove(there)
+        return f"{bone.name} of {rig.name} follows no target"
+    target = bpy.data.objects.new(w.new_name(TARGET), None)
+    bpy.context.scene.collection.objects.link(target)
+    target.location = place
+    constraint = bone.constraints.new("IK")
+    constraint.target, constraint.chain_count = target, length
+    return f"{bone.name} of {rig.name} follows {target.name}"
+
+
+@operation(2.5)
+def live_ik(w: Walker, r: random.Random) -> str | None:
+    """Sinew solves an armature's chains, or gives them back."""
+
+    def has_chain(rig: bpy.types.Object) -> bool:
+        return rig.mode == "OBJECT" and any(
+            c.type == "IK" for bone in rig.pose.bones for c in bone.constraints
+        )
+
+    rig = w.one(r, [rig for rig in w.armatures() if has_chain(rig)])
+    if rig is None:
+        return None
+    return f"{rig.name} solved live, or no longer {w.side.switch_live(rig)}"
+
+
+@operation(2)
+def move_target(w: Walker, r: random.Random) -> str | None:
+    target = w.one(r, [o for o in w.objects("EMPTY") if o.name.startswith(TARGET) and o.library is None])
+    frame = r.choice((None, r.randint(*FRAMES)))
+    place = [r.uniform(-1, 2) for _axis in range(3)]
+    if target is None:
+        return None
+    target.location = place
+    if frame is None:
+        return f"{target.name} moves"
+    target.keyframe_insert("location", frame=frame)
+    w.this_frame()
+    return f"{target.name} moves by a key at {frame}"
 
 
 # --- Places
