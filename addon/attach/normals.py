@@ -80,7 +80,7 @@ def are_given(settings: properties.SinewSettings) -> bool:
 
 def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
     """domain  as domain_of()"""
-    if domain and mesh_io.CUSTOM_NORMALS in mesh.attributes:
+    if domain and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is not None:
         return Kind.CUSTOM
     return {"POINT": Kind.VERTEX, "CORNER": Kind.CORNER}.get(domain)
 
@@ -90,7 +90,7 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
     which takes it no longer than to be given them, and where custom normals are free already."""
     if not ARE_SUPPORTED or mesh.is_editmode:
         return ""
-    attribute = mesh.attributes.get(mesh_io.CUSTOM_NORMALS)
+    attribute = mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS)
     if attribute is not None and (attribute.data_type, attribute.domain) != ("INT16_2D", "CORNER"):
         return ""
     domain = mesh.normals_domain
@@ -122,7 +122,8 @@ def _known_in_front(obj: bpy.types.Object) -> set[str]:
     if upstream_proxy.changes_weights(obj):
         # Then all is read again with each frame that changes it.
         return _KEEPS_SHADING | _KEEPS_FACES | upstream_proxy.WEIGHT_CHANGERS
-    return _KEEPS_SHADING if mesh_io.CUSTOM_NORMALS in obj.data.attributes else _KEEPS_SHADING | _KEEPS_FACES
+    has_custom = mesh_io.find_attribute(obj.data, mesh_io.CUSTOM_NORMALS) is not None
+    return _KEEPS_SHADING if has_custom else _KEEPS_SHADING | _KEEPS_FACES
 
 
 def _needing(obj: bpy.types.Object, in_renders: bool) -> list[bpy.types.Modifier]:

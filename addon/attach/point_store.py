@@ -133,7 +133,7 @@ def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarra
     if not settings.replaces_modifiers:
         return False
     if settings.point_buffer is None:
-        is_gone = bool(settings.attribute) and settings.attribute not in obj.data.attributes
+        is_gone = bool(settings.attribute) and mesh_io.find_attribute(obj.data, settings.attribute) is None
         return is_gone and (shown is None or np.array_equal(shown, own))
     if rest is None or shown is None or rest.shape != own.shape or np.array_equal(rest, own):
         return False
@@ -206,7 +206,7 @@ def unshare(objects: list[bpy.types.Object]) -> None:
 
 def _free_attribute_name(mesh: bpy.types.Mesh, start: str) -> str:
     name, number = start, 0
-    while name in mesh.attributes:
+    while mesh_io.find_attribute(mesh, name) is not None:
         number += 1
         name = f"{start}.{number:03d}"
     return name

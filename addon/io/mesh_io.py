@@ -28,11 +28,22 @@ SHARP_EDGES, SHARP_FACES, CUSTOM_NORMALS = "sharp_edge", "sharp_face", "custom_n
 _VECTOR_BYTES = 3 * np.dtype(np.float32).itemsize
 
 
+def find_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
+    """The attribute to read; None where the mesh has none of that name.
+
+    Where one is looked up by its name, in whatever way, Blender expects it to be written, and gives the mesh
+    a copy of an array that it shares with the evaluated mesh and with steps of undo. Each undo would then
+    list the mesh as changed.
+    """
+    index = mesh.attributes.find(name)
+    return None if index < 0 else mesh.attributes[index]
+
+
 def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
     """Vertex positions in object space, float32 [vertices, 3]; a copy."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     # In edit mode a mesh has no attributes, and without vertices it need not.
-    attribute = None if mesh.is_editmode else mesh.attributes.get(POSITION)
+    attribute = None if mesh.is_editmode else find_attribute(mesh, POSITION)
     if attribute is not None and len(attribute.data) == len(points):
         attribute.data.foreach_get("vector", points.ravel())
     else:
@@ -82,7 +93,7 @@ def read_topology(mesh: bpy.types.Mesh) -> Topology:
     offsets[-1] = len(corners)
     # As whole attributes a hundredth of the time.
     of_corners, of_edges = (
-        None if mesh.is_editmode else mesh.attributes.get(name) for name in (".corner_vert", ".edge_verts")
+        None if mesh.is_editmode else find_attribute(mesh, name) for name in (".corner_vert", ".edge_verts")
     )
     if of_corners is not None and of_edges is not None:
         of_corners.data.foreach_get("value", corners)
@@ -118,7 +129,7 @@ def _read_flags(
         elements.foreach_get(property_name, flags)
         flags = flags == shown_as
     else:
-        attribute = mesh.attributes.get(name)
+        attribute = find_attribute(mesh, name)
         if attribute is None or attribute.data_type != "BOOLEAN":
             return None
         flags = np.empty(len(attribute.data), dtype=bool)
@@ -129,7 +140,7 @@ def _read_flags(
 def _read_custom_normals(mesh: bpy.types.Mesh) -> np.ndarray | None:
     """int16 [corners, 2], as Blender stores them in relation to the computed ones; None where there are none.
     Blender 4.5 and later."""
-    attribute = None if mesh.is_editmode else mesh.attributes.get(CUSTOM_NORMALS)
+    attribute = None if mesh.is_editmode else find_attribute(mesh, CUSTOM_NORMALS)
     if attribute is None or attribute.data_type != "INT16_2D" or attribute.domain != "CORNER":
         return None
     numbers = np.empty((len(attribute.data), 2), dtype=np.int32)
@@ -143,7 +154,7 @@ def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> N
 
     custom  int16 [corners, 2], as Shading.custom
     """
-    attribute = mesh.attributes.get(CUSTOM_NORMALS)
+    attribute = find_attribute(mesh, CUSTOM_NORMALS)
     if attribute is None or attribute.data_type != "FLOAT_VECTOR":
         return
     remove_attribute(mesh, CUSTOM_NORMALS)
@@ -264,6 +275,7 @@ def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
 
 def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: str = "POINT") -> None:
     """Stores float32 [vertices or corners, 3] in the attribute `name`, made where it is missing."""
+    # By its name, so that it is the mesh's own (find_attribute).
     attribute = mesh.attributes.get(name)
     if not _is_of_vectors(attribute, domain):
         if attribute is not None:
@@ -287,7 +299,7 @@ def _add_attribute(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str)
 
 
 def has_vectors(mesh: bpy.types.Mesh, name: str, domain: str) -> bool:
-    return _is_of_vectors(mesh.attributes.get(name), domain)
+    return _is_of_vectors(find_attribute(mesh, name), domain)
 
 
 def _is_of_vectors(attribute: bpy.types.Attribute | None, domain: str) -> bool:
@@ -306,6 +318,7 @@ def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT")
     None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not in
     one piece.
     """
+    # By its name, so that it is the mesh's own (find_attribute).
     attribute = evaluated_mesh.attributes.get(name)
     if not _is_of_vectors(attribute, domain):
         return None
@@ -327,7 +340,7 @@ def _vectors_at(address: int, count: int) -> np.ndarray:
 
 
 def remove_attribute(mesh: bpy.types.Mesh, name: str) -> None:
-    attribute = mesh.attributes.get(name)
+    attribute = find_attribute(mesh, name)
     if attribute is not None:
         active = mesh.attributes.active_index
         mesh.attributes.remove(attribute)

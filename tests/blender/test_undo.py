@@ -224,6 +224,14 @@ def _hidden_and_edited(arm):
     _weights(arm)
 
 
+def _added_object(_arm):
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Empty", None))
+
+
+def _added_modifier(arm):
+    arm.modifiers.new("Behind", "SMOOTH").show_viewport = False
+
+
 _EDITS = [
     *(_weights, _weights_of_one_vertex, _points, _points_in_edit_mode, _fewer_vertices, _other_mesh),
     *(_keys, _key_value, _bones, _bone_name, _bone_option, _pose, _group_name, _group_order),
@@ -307,7 +315,10 @@ def test_shapes_after_undo_and_redo(route, edit, tmp_path):
     _assert_same(_shapes(), _shapes(_of_modifier), near)
 
 
-@pytest.mark.parametrize("edit", [_weights, _points, _key_value, _bone_option, _pose])
+_LEAVE_ALONE = [_weights, _points, _key_value, _bone_option, _pose, _added_object, _added_modifier]
+
+
+@pytest.mark.parametrize("edit", _LEAVE_ALONE, ids=lambda each: each.__name__)
 def test_what_a_step_leaves_alone_is_not_read_again(edit, tmp_path):
     routes.force(routes.EVALUATION)
     _opened_again(tmp_path, edit)
@@ -317,14 +328,19 @@ def test_what_a_step_leaves_alone_is_not_read_again(edit, tmp_path):
         bpy.context.view_layer.update()
         bpy.ops.ed.undo_push(message=each.__name__)
     known = session.state_of(bpy.data.objects["Other"])
-    bound, number = known.bound, known.shown.number
-    bpy.ops.ed.undo()
-    other = bpy.data.objects["Other"]
-    assert session.state_of(other) is known
-    assert known.bound is bound
-    # Blender itself evaluates what has an armature after each step: once.
-    assert known.shown.number <= number + 1
-    assert session.state_of(bpy.data.objects["Arm"]) is not None
+    bound = known.bound
+    # Also a second time: what is done in answer to undo is part of the next step.
+    for _time in range(2):
+        number = known.shown.number
+        bpy.ops.ed.undo()
+        other = bpy.data.objects["Other"]
+        assert session.state_of(other) is known
+        assert known.bound is bound
+        # Blender itself evaluates what has an armature after each step: once.
+        assert known.shown.number <= number + 1
+        assert session.state_of(bpy.data.objects["Arm"]) is not None
+        bpy.ops.ed.redo()
+        bpy.context.view_layer.update()
 
 
 @pytest.mark.parametrize("edit", [_weights, _points, _bones, _options, _method, _pose])

@@ -161,7 +161,7 @@ TEST(Sdef, vertices_without_data_or_of_other_numbers_of_bones_are_blended_linear
     std::size_t spherical = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
         const bool has_two = scene.offsets[i + 1] - scene.offsets[i] == 2;
-        const bool is_used = scene.numbers_of<float>(i, Sdef::info)[9] != 0.0f;
+        const bool is_used = scene.vertex_numbers[Scene::kVertexNumbers * i + 9] != 0.0f;
         const double difference = distance(Vec3<double>(points[i]), linear[i]);
         if (has_two && is_used) {
             spherical += difference > 0.01 ? 1 : 0;

@@ -47,7 +47,7 @@ def write_colours(obj: bpy.types.Object, colours: np.ndarray) -> None:
 
 def has_colours(obj: bpy.types.Object) -> bool:
     point_buffer = properties.of(obj).point_buffer
-    return point_buffer is not None and COLOURS in point_buffer.data.attributes
+    return point_buffer is not None and mesh_io.find_attribute(point_buffer.data, COLOURS) is not None
 
 
 def remove_colours(obj: bpy.types.Object) -> None:
