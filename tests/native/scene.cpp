@@ -61,7 +61,8 @@ std::vector<T> moments_at(const Scene& scene, std::size_t vertex) {
 template <class T>
 std::vector<T> numbers_of(const Scene& scene, std::size_t vertex, const MethodInfo& method) {
     if (method.keeps_moments) return moments_at<T>(scene, vertex);
-    const auto first = scene.vertex_numbers.begin() + static_cast<std::ptrdiff_t>(Scene::kVertexNumbers * vertex);
+    const auto first =
+        scene.vertex_numbers.begin() + static_cast<std::ptrdiff_t>(Scene::kVertexNumbers * vertex);
     return {first, first + static_cast<std::ptrdiff_t>(method.vertex_floats)};
 }
 
@@ -166,14 +167,16 @@ Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent) {
     return scene;
 }
 
-std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene, const DeformOptions& options) {
+std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
+                                  const DeformOptions& options) {
     std::vector<Vec3<float>> points(deformer.vertex_count(), Vec3<float>(-1e9f));
     deformer.deform(scene.posed_from_rest, options, points);
     return points;
 }
 
 template <class T>
-std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene, std::span<const double> parameters) {
+std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene,
+                                 std::span<const double> parameters) {
     std::vector<Vec3<T>> points;
     for_each_method([&]<class Method>(Method) {
         if (Method::info == method) points = by_method<T, Method>(scene, parameters);
@@ -181,7 +184,9 @@ std::vector<Vec3<T>> by_skinning(const MethodInfo& method, const Scene& scene, s
     return points;
 }
 
-template std::vector<Vec3<float>> by_skinning<float>(const MethodInfo&, const Scene&, std::span<const double>);
-template std::vector<Vec3<double>> by_skinning<double>(const MethodInfo&, const Scene&, std::span<const double>);
+template std::vector<Vec3<float>> by_skinning<float>(const MethodInfo&, const Scene&,
+                                                     std::span<const double>);
+template std::vector<Vec3<double>> by_skinning<double>(const MethodInfo&, const Scene&,
+                                                       std::span<const double>);
 
 }  // namespace sinew::test
