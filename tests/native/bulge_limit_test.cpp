@@ -70,14 +70,7 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<Bo
     }
     std::vector<Vec3<double>> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        const auto begin = static_cast<std::size_t>(scene.offsets[vertex]);
-        const auto end = static_cast<std::size_t>(scene.offsets[vertex + 1]);
-        double sum = 0.0;
-        for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(scene.weights[i]);
-        std::vector<Influence<double>> influences;
-        for (std::size_t i = begin; i < end; ++i) {
-            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i]) / sum});
-        }
+        const auto influences = test::normalised_influences_of<double>(scene, vertex);
         const double apart = BulgeLimitStage::rest_distance<double>(form, rest_segments, influences,
                                                                     Vec3<double>(scene.rest_points[vertex]));
         result.push_back(BulgeLimitStage::deform_vertex<double>(form, bones, influences, apart, strength,

@@ -100,14 +100,7 @@ double largest_error(const Bound& bound, double variant, const DeformOptions& sp
     }
     double largest = 0.0;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
-        std::vector<Influence<double>> influences;
-        double sum = 0.0;
-        for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
-             i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
-            influences.push_back({scene.bones[i], static_cast<double>(scene.weights[i])});
-            sum += influences.back().weight;
-        }
-        for (auto& influence : influences) influence.weight /= sum;
+        const auto influences = test::normalised_influences_of<double>(scene, vertex);
         const std::vector<double> own(
             bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex]),
             bound.rows.begin() + static_cast<std::ptrdiff_t>(bound.starts[vertex + 1]));

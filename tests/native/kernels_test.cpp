@@ -18,6 +18,7 @@ using test::about;
 using test::deformed;
 using test::distance;
 using test::in_double;
+using test::influences_of;
 using test::kTolerance;
 using test::Random;
 using test::random_scene;
@@ -50,15 +51,6 @@ Scene scene_of_sets(std::uint32_t seed, std::size_t sets, std::size_t vertices, 
         scene.add_vertex(Vec3<float>(random.vector(1.0)), influences);
     }
     return scene;
-}
-
-std::vector<Influence<float>> influences_of(const Scene& scene, std::size_t vertex) {
-    std::vector<Influence<float>> influences;
-    for (auto i = static_cast<std::size_t>(scene.offsets[vertex]);
-         i < static_cast<std::size_t>(scene.offsets[vertex + 1]); ++i) {
-        influences.push_back({scene.bones[i], scene.weights[i]});
-    }
-    return influences;
 }
 
 /// The same vertices in another order.

@@ -10,7 +10,7 @@ namespace sinew::test {
 namespace {
 
 /// The first of a vertex and the one after its last; none where what a scene holds does not fit, as in tests of that.
-std::pair<std::size_t, std::size_t> influences_of(const Scene& scene, std::size_t vertex) {
+std::pair<std::size_t, std::size_t> range_of(const Scene& scene, std::size_t vertex) {
     if (vertex + 1 >= scene.offsets.size()) return {0, 0};
     const std::int32_t begin = scene.offsets[vertex];
     const std::int32_t end = scene.offsets[vertex + 1];
@@ -21,7 +21,7 @@ std::pair<std::size_t, std::size_t> influences_of(const Scene& scene, std::size_
 }
 
 double total_weight(const Scene& scene, std::size_t vertex) {
-    const auto [begin, end] = influences_of(scene, vertex);
+    const auto [begin, end] = range_of(scene, vertex);
     double sum = 0.0;
     for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(scene.weights[i]);
     return sum;
@@ -32,7 +32,7 @@ double total_weight(const Scene& scene, std::size_t vertex) {
 template <class T>
 std::vector<T> moments_at(const Scene& scene, std::size_t vertex) {
     std::map<std::int32_t, double> shares;
-    const auto [begin, end] = influences_of(scene, vertex);
+    const auto [begin, end] = range_of(scene, vertex);
     for (std::size_t i = begin; i < end; ++i) {
         shares[scene.bones[i]] += static_cast<double>(scene.weights[i]) / total_weight(scene, vertex);
     }
@@ -75,15 +75,7 @@ std::vector<Vec3<T>> by_method(const Scene& scene, std::span<const double> param
     }
     std::vector<Vec3<T>> points;
     for (std::size_t vertex = 0; vertex < scene.rest_points.size(); ++vertex) {
-        const auto begin = static_cast<std::size_t>(scene.offsets[vertex]);
-        const auto end = static_cast<std::size_t>(scene.offsets[vertex + 1]);
-        double sum = 0.0;
-        for (std::size_t i = begin; i < end; ++i) sum += static_cast<double>(scene.weights[i]);
-        std::vector<Influence<T>> influences;
-        for (std::size_t i = begin; i < end; ++i) {
-            influences.push_back(
-                {scene.bones[i], static_cast<T>(static_cast<double>(scene.weights[i]) / sum)});
-        }
+        const auto influences = normalised_influences_of<T>(scene, vertex);
         const Vec3<T> rest(scene.rest_points[vertex]);
         if constexpr (!Method::info.parameters.empty()) {
             static_assert(Method::info.vertex_floats > 0);
@@ -166,6 +158,26 @@ Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent) {
     }
     return scene;
 }
+
+std::vector<Influence<float>> influences_of(const Scene& scene, std::size_t vertex) {
+    std::vector<Influence<float>> influences;
+    const auto [begin, end] = range_of(scene, vertex);
+    for (std::size_t i = begin; i < end; ++i) influences.push_back({scene.bones[i], scene.weights[i]});
+    return influences;
+}
+
+template <class T>
+std::vector<Influence<T>> normalised_influences_of(const Scene& scene, std::size_t vertex) {
+    std::vector<Influence<T>> influences;
+    const double sum = total_weight(scene, vertex);
+    for (const auto& [bone, weight] : influences_of(scene, vertex)) {
+        influences.push_back({bone, static_cast<T>(static_cast<double>(weight) / sum)});
+    }
+    return influences;
+}
+
+template std::vector<Influence<float>> normalised_influences_of<float>(const Scene&, std::size_t);
+template std::vector<Influence<double>> normalised_influences_of<double>(const Scene&, std::size_t);
 
 std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
                                   const DeformOptions& options) {

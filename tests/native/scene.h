@@ -48,6 +48,13 @@ private:
 /// Bones 2, 5, ... are stretched along their own axes, every second of those mirrored; 1 to 8 influences.
 Scene random_scene(std::uint32_t seed, std::size_t vertices, double extent);
 
+/// Weights as they are.
+std::vector<Influence<float>> influences_of(const Scene& scene, std::size_t vertex);
+
+/// Weights of sum 1, divided in double; T is float or double.
+template <class T>
+std::vector<Influence<T>> normalised_influences_of(const Scene& scene, std::size_t vertex);
+
 std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
                                   const DeformOptions& options = {});
 
