@@ -33,7 +33,7 @@ def write(point_buffer: bpy.types.Object, points: np.ndarray) -> None:
         mesh.clear_geometry()
         mesh.vertices.add(len(points))
     if len(points):
-        mesh.attributes[mesh_io.POSITION].data.foreach_set("vector", points.ravel())
+        mesh_io.attribute_to_write(mesh, mesh_io.POSITION).data.foreach_set("vector", points.ravel())
     mesh.update_tag()
 
 

@@ -445,7 +445,7 @@ class Solver:
         self, helper: Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
         """float64 [frames, 3, 4]: the motion whose share of the vertices, `weights` times it, is nearest to
-        `wanted` [vertices, frames * 3]; Le and Deng's equation 9, with the scale given."""
+        `wanted` [vertices, frames * 3]; Le and Deng's equation 9, with the scale of _scale_of()."""
         rest = self.rest[vertices]
         frames = len(helper.scale)
         wanted = wanted.reshape(len(vertices), frames, 3)
@@ -461,19 +461,19 @@ class Solver:
             cross = np.einsum("vfi,vfk->fik", aside, from_middle)
         # As its motion was, where the vertices leave it open.
         linear = helper.motion[:, :, :3] / helper.scale[:, None, None]
-        spread = np.square(from_middle).sum(axis=(0, 2))
         cross += 1e-7 * np.square(from_middle).sum() * linear
         rotation = _rotation_near(cross)
-        helper.scale = self._scale_of(helper, np.einsum("fik,fik->f", rotation, cross), spread)
+        helper.scale = self._scale_of(helper, rotation, cross, from_middle)
         linear = helper.scale[:, None, None] * rotation
         translation = middle - np.einsum("fik,fk->fi", linear, np.broadcast_to(rest_middle, (frames, 3)))
         return np.concatenate([linear, translation[:, :, None]], axis=2)
 
-    def _scale_of(self, helper: Helper, along: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    def _scale_of(
+        self, helper: Helper, rotation: np.ndarray, cross: np.ndarray, from_middle: np.ndarray
+    ) -> np.ndarray:
         """float64 [frames]: the size of a helper bone that has been rotated.
 
-        along, spread  [frames]: products of what is wanted and of the vertices as they are rotated, and of
-                       these alone; their ratio is the best size
+        rotation, cross, from_middle  as in _fitted()
         """
         return helper.scale
 
@@ -618,9 +618,14 @@ class ScalingSolver(Solver):
         self.scales = True
         return super().refine()
 
-    def _scale_of(self, helper: Helper, along: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    def _scale_of(
+        self, helper: Helper, rotation: np.ndarray, cross: np.ndarray, from_middle: np.ndarray
+    ) -> np.ndarray:
         if not self.scales:
             return helper.scale
+        # What is wanted along the vertices as they are rotated, by what these are.
+        along = np.einsum("fik,fik->f", rotation, cross)
+        spread = np.square(from_middle).sum(axis=(0, 2))
         return np.maximum(along / np.maximum(spread, 1e-30), _SMALLEST_SCALE)
 
 

@@ -29,14 +29,20 @@ _VECTOR_BYTES = 3 * np.dtype(np.float32).itemsize
 
 
 def find_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """The attribute to read; None where the mesh has none of that name.
-
-    Where one is looked up by its name, in whatever way, Blender expects it to be written, and gives the mesh
-    a copy of an array that it shares with the evaluated mesh and with steps of undo. Each undo would then
-    list the mesh as changed.
-    """
+    """The attribute to read; None where the mesh has none of that name. What is written is looked up by
+    attribute_to_write()."""
     index = mesh.attributes.find(name)
     return None if index < 0 else mesh.attributes[index]
+
+
+def attribute_to_write(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
+    """The attribute, with an array that is the mesh's own; None where it has none of that name.
+
+    Where one is looked up by its name, in whatever way, Blender expects it to be written, and gives the mesh
+    a copy of an array that it shares with the evaluated mesh and with steps of undo. Each undo then lists the
+    mesh as changed.
+    """
+    return mesh.attributes.get(name)
 
 
 def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -275,8 +281,7 @@ def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
 
 def write_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, domain: str = "POINT") -> None:
     """Stores float32 [vertices or corners, 3] in the attribute `name`, made where it is missing."""
-    # By its name, so that it is the mesh's own (find_attribute).
-    attribute = mesh.attributes.get(name)
+    attribute = attribute_to_write(mesh, name)
     if not _is_of_vectors(attribute, domain):
         if attribute is not None:
             mesh.attributes.remove(attribute)
@@ -318,8 +323,7 @@ def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT")
     None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not in
     one piece.
     """
-    # By its name, so that it is the mesh's own (find_attribute).
-    attribute = evaluated_mesh.attributes.get(name)
+    attribute = attribute_to_write(evaluated_mesh, name)
     if not _is_of_vectors(attribute, domain):
         return None
     values = attribute.data

@@ -128,16 +128,16 @@ def let_go() -> None:
     for armature in [obj for obj in bpy.data.objects if obj.session_uid in _session.in_no_step]:
         detach(armature)
         remove_followers(armature)
-    _session.before_step = {obj.session_uid for obj in bpy.data.objects if obj.sinew_ik_is_follower}
+    _session.before_step = {follower.session_uid for follower in _all_followers()}
     note_step()
 
 
 def remove_returned() -> None:
     """After undo: those that it brought back. A view layer that was not shown goes on with its evaluated copy
     of the one that was deleted, which writes to bones that are gone (4.2 to 5.2). sync() makes others."""
-    for obj in [each for each in bpy.data.objects if each.type == "ARMATURE" and each.sinew_ik_is_follower]:
-        if obj.session_uid not in _session.before_step:
-            _remove(obj)
+    for follower in _all_followers():
+        if follower.session_uid not in _session.before_step:
+            _remove(follower)
 
 
 def note_step() -> None:
@@ -384,11 +384,11 @@ def _follower_of(armature: bpy.types.Object, tree: core.Tree) -> bpy.types.Objec
 
 def _followers(armature: bpy.types.Object | None) -> list[bpy.types.Object]:
     """Of an armature; None: of those that are gone."""
-    return [
-        obj
-        for obj in bpy.data.objects
-        if obj.type == "ARMATURE" and obj.sinew_ik_is_follower and _followed_by(obj) == armature
-    ]
+    return [follower for follower in _all_followers() if _followed_by(follower) == armature]
+
+
+def _all_followers() -> list[bpy.types.Object]:
+    return [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.sinew_ik_is_follower]
 
 
 def _followed_by(follower: bpy.types.Object) -> bpy.types.Object | None:
