@@ -175,14 +175,12 @@ class Child:
             self.side.records.unanswered = 0
         else:
             found["wrong"] = self.wrong
-            follows, moved = self.sides.what_follows({name for name, is_live in self.live() if is_live})
+            live = {name for name, (is_live, _bones) in self.poses.items() if is_live}
+            follows, moved = self.sides.what_follows(live)
             found["follows"] = [obj.name_full for obj in (*follows, *moved)]
             found["moved"] = [obj.name_full for obj in moved]
             found["expected"] = self.all_expected(follows)
         return found
-
-    def live(self):
-        return [(name, is_live) for name, (is_live, _bones) in self.poses.items()]
 
     def all_expected(self, follows) -> dict:
         """Points of objects that are shown, and whose shape is none of Blender's own.
