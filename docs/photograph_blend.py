@@ -51,7 +51,7 @@ def steps() -> Iterator[None]:
     window.install(ZIP)
     armature = rig()
     window.select_only(armature)
-    window.open_panel("SINEW_PT_blend")
+    window.open_panels("SINEW_PT_blend")
     strain = armature.animation_data.action
     strain.name = "STRAIN"
     other = strain.copy()

@@ -19,22 +19,10 @@ import window
 
 ZIP, HEAT_MAP, DIAGNOSTICS = window.arguments()
 FRAME = 16
+# Panels in this order, then the others.
+ORDER = ("SINEW_PT_main", "SINEW_PT_measures", "SINEW_PT_numbers")
 # Planted: a patch of the chest without weights, one whose weights are next to nothing, one of five bones.
 UNWEIGHTED, SMALL, MANY = (0.05, 0.0, 0.42), (-0.08, 0.0, 0.3), (0.06, 0.0, 0.15)
-
-
-def open_panels(opened: set[str]) -> None:
-    """Has these of Sinew's panels open, and the others closed, when they are first drawn."""
-    names = [name for name in dir(bpy.types) if name.startswith("SINEW_PT_")]
-    panels = [getattr(bpy.types, name) for name in names]
-    panels.sort(key=lambda panel: hasattr(panel, "bl_parent_id"))
-    for panel in reversed(panels):
-        bpy.utils.unregister_class(panel)
-    order = ["SINEW_PT_main", "SINEW_PT_measures", "SINEW_PT_numbers"]
-    panels.sort(key=lambda panel: order.index(panel.__name__) if panel.__name__ in order else len(order))
-    for panel in panels:
-        panel.bl_options = set() if panel.__name__ in opened else {"DEFAULT_CLOSED"}
-        bpy.utils.register_class(panel)
 
 
 def look_at(place: tuple[float, float, float], distance: float) -> None:
@@ -72,7 +60,7 @@ def steps() -> Iterator[None]:
     window.install(ZIP)
     scene, obj = bpy.context.scene, bpy.data.objects["Human"]
     window.select_only(obj)
-    open_panels({"SINEW_PT_measures", "SINEW_PT_numbers", "SINEW_PT_worst_frames"})
+    window.open_panels("SINEW_PT_measures", "SINEW_PT_numbers", "SINEW_PT_worst_frames", first=ORDER)
     with window.in_view3d():
         assert bpy.ops.sinew.add("INVOKE_DEFAULT") == {"FINISHED"}
     obj.sinew.method = "dq"
@@ -110,7 +98,7 @@ def steps() -> Iterator[None]:
     plant_faults(obj)
     # Another window layout, whose sidebar was never drawn: which panels are open stays as it was otherwise.
     bpy.context.window_manager.windows[0].workspace = bpy.data.workspaces["Modeling"]
-    open_panels({"SINEW_PT_diagnostics"})
+    window.open_panels("SINEW_PT_diagnostics", first=ORDER)
     yield
     window.open_sidebar()
     look_at((0.06, 0.0, 0.28), 0.75)

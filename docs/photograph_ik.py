@@ -63,7 +63,7 @@ def steps() -> Iterator[None]:
     scene = bpy.context.scene
     scene.frame_set(FRAME)
     hold_a_ball()
-    window.open_panel("SINEW_PT_ik")
+    window.open_panels("SINEW_PT_ik")
     facts["blender"] = reach()
     window.open_sidebar()
     yield

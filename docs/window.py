@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import addon_utils
@@ -63,26 +64,30 @@ def choose_tab() -> None:
         bpy.context.region.active_panel_category = "Sinew"
 
 
-def open_panel(name: str) -> None:
-    """Has it open, and the others of Sinew closed, when they are first drawn."""
-    names = [each for each in dir(bpy.types) if each.startswith("SINEW_PT_")]
-    panels = sorted((getattr(bpy.types, each) for each in names), key=lambda p: hasattr(p, "bl_parent_id"))
+def open_panels(*opened: str, first: Sequence[str] = ()) -> None:
+    """Has these open, and the others of Sinew closed, when they are first drawn.
+
+    first  what stands before all others, or before the others of its parent; those that are open, if not said
+    """
+    names = [name for name in dir(bpy.types) if name.startswith("SINEW_PT_")]
+    panels = sorted((getattr(bpy.types, name) for name in names), key=lambda p: hasattr(p, "bl_parent_id"))
     for panel in reversed(panels):
         bpy.utils.unregister_class(panel)
-    panels.sort(key=lambda panel: panel.__name__ != name)
-    panels.sort(key=lambda panel: hasattr(panel, "bl_parent_id"))
+    first = first or opened
+    place = {name: number for number, name in enumerate(first)}
+    panels.sort(key=lambda p: (hasattr(p, "bl_parent_id"), place.get(p.__name__, len(place))))
     for panel in panels:
-        panel.bl_options = set() if panel.__name__ == name else {"DEFAULT_CLOSED"}
+        panel.bl_options = set() if panel.__name__ in opened else {"DEFAULT_CLOSED"}
         bpy.utils.register_class(panel)
 
 
-def until(wanted: Callable[[], bool], what: str, tick: float = 0.1, patience: float = 60.0) -> Iterator[None]:
-    """Steps of run(), each `tick` seconds, until it is so."""
-    for _tick in range(round(patience / tick)):
-        if wanted():
-            return
+def until(wanted: Callable[[], object], what: str, patience: float = 60.0) -> Iterator[None]:
+    """Steps of run() until it is so, for as many seconds at most."""
+    end = time.monotonic() + patience
+    while not wanted():
+        if time.monotonic() > end:
+            raise AssertionError(f"{what} did not come")
         yield
-    raise AssertionError(f"{what} did not come")
 
 
 def move(place: tuple[int, int]) -> None:

@@ -85,14 +85,6 @@ def state() -> dict[str, object]:
     }
 
 
-def until(wanted: Callable[[], bool], what: str) -> Iterator[None]:
-    for _tick in range(round(PATIENCE / TICK)):
-        if wanted():
-            return
-        yield
-    raise AssertionError(f"{what} did not come")
-
-
 def start(kind: str, frames: str) -> Iterator[None]:
     """By the dialog that the panel's button opens."""
     with window.in_view3d():
@@ -117,7 +109,7 @@ def steps() -> Iterator[None]:
     before = state()
     for kind in KINDS:
         yield from start(kind, f"1-{LONG[kind]}")
-        yield from until(is_baking, f"a bake to {kind}")
+        yield from window.until(is_baking, f"a bake to {kind}", PATIENCE)
         for _tick in range(20 if kind in ("alembic", "usd", "gltf") else 1):
             yield
         middle = state()
@@ -125,7 +117,7 @@ def steps() -> Iterator[None]:
             window.photograph(PICTURE)
         assert is_baking(), kind
         press("ESC")
-        yield from until(lambda: not is_baking(), "the end")
+        yield from window.until(lambda: not is_baking(), "the end", PATIENCE)
         after = state()
         facts["stopped"][kind] = {
             "files meanwhile": [name for name in middle["files"] if name not in before["files"]],
@@ -135,7 +127,7 @@ def steps() -> Iterator[None]:
     for kind in KINDS:
         is_done = is_done_since(state()["files"], state()["bones"])
         yield from start(kind, "1-24")
-        yield from until(is_done, f"the end of a bake to {kind}")
+        yield from window.until(is_done, f"the end of a bake to {kind}", PATIENCE)
         ended = state()
         press("Z", ctrl=True)
         for _tick in range(10):

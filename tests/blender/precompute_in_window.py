@@ -11,7 +11,7 @@ import importlib
 import json
 import sys
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import bpy
@@ -38,14 +38,6 @@ def hero() -> bpy.types.Object:
 def plan() -> str:
     state = sinew("deform.session").state_of(hero())
     return "none" if state is None else state.plan.state.value
-
-
-def until(wanted: Callable[[], bool], seconds: float = 60.0) -> Iterator[None]:
-    end = time.monotonic() + seconds
-    while not wanted():
-        if time.monotonic() > end:
-            raise AssertionError(f"it did not come: {plan()}")
-        yield
 
 
 def press(key: str) -> None:
@@ -143,9 +135,11 @@ def see_it_found() -> Generator[None, None, np.ndarray]:
 
 def stop_and_go_on() -> Iterator[None]:
     forget()
-    yield from until(lambda: any(bpy.context.window_manager.windows[0].modal_operators))
+    yield from window.until(
+        lambda: any(bpy.context.window_manager.windows[0].modal_operators), "the precomputation"
+    )
     press("ESC")
-    yield from until(lambda: not sinew("core.precompute").precomputations.running)
+    yield from window.until(lambda: not sinew("core.precompute").precomputations.running, "its end")
     yield
     yield
     facts["plan_stopped"] = plan()
@@ -153,7 +147,7 @@ def stop_and_go_on() -> Iterator[None]:
     window.photograph(FOLDER / "stopped.png")
     with window.in_view3d():
         bpy.ops.sinew.precompute("INVOKE_DEFAULT")
-    yield from until(lambda: plan() == "in depsgraph")
+    yield from window.until(lambda: plan() == "in depsgraph", "its shape")
     facts["plan_after_button"] = plan()
 
 
@@ -173,10 +167,10 @@ def render(found: np.ndarray) -> Iterator[None]:
         facts.setdefault("plan_before_render", []).append(plan())
         with window.in_view3d():
             bpy.ops.render.render("INVOKE_DEFAULT")
-        yield from until(lambda: KeepingEngine.points is not None)
-        yield from until(lambda: not bpy.app.is_job_running("RENDER"))
+        yield from window.until(lambda: KeepingEngine.points is not None, "the render")
+        yield from window.until(lambda: not bpy.app.is_job_running("RENDER"), "the end of the render")
         facts.setdefault("render_off", []).append(window_scene.worst(KeepingEngine.points, found))
-        yield from until(lambda: plan() == "in depsgraph")
+        yield from window.until(lambda: plan() == "in depsgraph", "its shape")
 
 
 def end_while_it_runs() -> Iterator[None]:

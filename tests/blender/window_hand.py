@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import time
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
@@ -118,14 +117,6 @@ class Run:
 def wait(ticks: int = 2) -> Steps:
     """Blender redraws meanwhile."""
     for _tick in range(ticks):
-        yield
-
-
-def until(wanted: Callable[[], object], what: str) -> Steps:
-    end = time.monotonic() + PATIENCE
-    while not wanted():
-        if time.monotonic() > end:
-            raise AssertionError(f"{what} did not come")
         yield
 
 

@@ -13,6 +13,7 @@ import window
 import window_scene
 from window_hand import (
     FOLDER,
+    PATIENCE,
     Run,
     Steps,
     choose,
@@ -23,7 +24,6 @@ from window_hand import (
     rig,
     set_frame,
     step,
-    until,
     wait,
 )
 from window_scene import blender_points, shown_points, worst
@@ -115,7 +115,7 @@ def _is_rendering() -> bool:
 
 def _end_of_render() -> Steps:
     """Sinew sees it within a twentieth of a second, and then shows the window's frame again."""
-    yield from until(lambda: not _is_rendering(), "the end of the render")
+    yield from window.until(lambda: not _is_rendering(), "the end of the render", PATIENCE)
     yield from wait(5)
 
 
@@ -381,7 +381,7 @@ def weights_changed_behind_sinew(run: Run) -> Steps:
 
     with Hostile(change, "depsgraph_update_post", ahead=False):
         window_scene.pose(rig(), 40.0)
-        yield from until(lambda: changed, "a change of weights")
+        yield from window.until(lambda: changed, "a change of weights", PATIENCE)
         yield from wait(20)
     run.check_shapes("after the change")
     yield from run.check_frames()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 import window
-from window_hand import FOLDER, Run, Steps, click, execute, hero, push, rig, set_frame, step, until, wait
+from window_hand import FOLDER, PATIENCE, Run, Steps, click, execute, hero, push, rig, set_frame, step, wait
 from window_scene import pose
 
 
@@ -192,7 +192,7 @@ def autosave(run: Run) -> Steps:
     def newest() -> list[Path]:
         return [path for path in FOLDER.glob("*_autosave.blend") if path.stat().st_mtime > started]
 
-    yield from until(newest, "an autosave")
+    yield from window.until(newest, "an autosave", PATIENCE)
     yield from wait()
     run.note_saved(newest()[0], in_memory=True)
 
