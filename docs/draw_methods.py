@@ -200,7 +200,7 @@ def write_grid(case: Case, titles: Sequence[str], pictures: Sequence[Path], path
 
 def table_of(found: dict[str, Measured]) -> list[str]:
     lines = [
-        "| | volume | longest edge | bulge | faces turned over |",
+        "| | volume | longest edge | bulge | flipped faces |",
         "|---|---:|---:|---:|---:|",
     ]
     for title, measured in found.items():
@@ -258,19 +258,20 @@ def tube_table() -> list[str]:
 
 HEAD = """# Methods and stages in pictures
 
-Written by `./dev pictures`; what to see in them is in [methods.md](methods.md). First come the methods, then
-stages behind some of them: the mix is half `lbs`, half `dq`; Limit Bulge and Delta Mush have their defaults,
-but for 20 iterations. `sdef` is left out: none of these files has what MMD's models mark, and without it
-`sdef` is `lbs`. The character is MakeHuman's base mesh with its game engine rig, CC0.
+These pictures show the methods on ten limbs, then stages after some of the methods; [methods.md](methods.md)
+says what to see in them. `./dev pictures` draws them. The mix is half `lbs`, half `dq`. Limit Bulge and Delta
+Mush have their default settings, except for 20 iterations. `sdef` is left out: without the marks of MMD's
+models, which none of these files has, it equals `lbs`. The character is MakeHuman's base mesh with its game
+engine rig, CC0.
 
-Volume is that of the rest pose; the longest edge is over its length at rest; the bulge is how much farther a
+Volume is relative to the rest pose, the longest edge to its length at rest. The bulge is how much farther a
 vertex is from its bones than at rest, in units of the file ([metrics.md](metrics.md)).
 
 ## A tube
 
-Of length 4 and radius 0.5, 81 rings of 32 vertices, two bones, weights that change over 1 unit; bulge and
-radius are over the radius at rest; the radius of `ddm` is 0.26. In brackets: the same, computed apart from
-the library.
+The tube has length 4, radius 0.5, 81 rings of 32 vertices, two bones, and weights that change over 1 unit.
+Bulge and radius are relative to the radius at rest; the radius of `ddm` is 0.26. Numbers in brackets were
+computed separately from the library.
 
 """
 
