@@ -84,7 +84,7 @@ def test_what_keeps_its_radius_is_said_of_the_numbers(content):
     (fact,) = content["figures"]["3.11"]["facts"]
     fact["values"] = {"radius, lbs": 0.99, "radius, dq": 0.4}
     text = section(paper.page(content), 4)
-    assert "with linear matrices; what is left of it with others: dual quaternions 40%" in text
+    assert "with linear matrices; the others keep less: dual quaternions 40%" in text
     assert text.startswith("## 4. What blends of joints keep\n")
 
 

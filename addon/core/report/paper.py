@@ -113,10 +113,10 @@ def page(content: Content) -> str:
                 "<!-- Made by sinew report --results from results.json; edit addon/core/report/paper.py. -->",
                 "M. Smith, *Applications of Dual Quaternions in Three Dimensional Transformation and "
                 "Interpolation* (University of Canterbury, 2013), asks which representation of rigid "
-                "transforms serves animation: matrices, pairs of a quaternion and a vector, or dual "
-                "quaternions. These are the five results of its experiments done again that change or settle "
-                "an answer. "
-                "[The report](report.md) has all of them, and where each is in the library.",
+                "transforms suits animation best: matrices, pairs of a quaternion and a vector, or dual "
+                "quaternions. We repeated its experiments. This page has the five results that change or "
+                "settle an answer. "
+                "[The report](report.md) has all results, and where each is in the library.",
                 _order_section(content),
                 _accuracy_section(content),
                 _drift_section(content),
@@ -126,10 +126,11 @@ def page(content: Content) -> str:
                 f"Sinew {content['version']}, {machine['processor']}, {machine.get('compiler', 'unknown')}, "
                 f"{machine.get('optimised', '')} and {machine.get('without optimisation', '')}; load average "
                 f"{machine.get('load average', 'unknown')}. Times are processor times, medians of "
-                "interleaved runs. Random chains have fixed seeds. Every number on this page is written from "
-                "[the measurements](results.json), none by hand: `./dev report` measures, and `sinew report "
-                "--from build/report/report.json --results docs` writes this page and its plots.",
-                "To cite it, take CITATION.cff of the repository and the version above.",
+                "interleaved runs. Random chains have fixed seeds. Every number on this page comes from "
+                "[the measurements](results.json), none is typed by hand: `./dev report` measures, "
+                "and `sinew report --from build/report/report.json --results docs` writes this page and its "
+                "plots.",
+                "To cite this page, use CITATION.cff of the repository and the version above.",
             ]
         )
         + "\n"
@@ -142,9 +143,9 @@ def _order_section(content: Content) -> str:
     optimised = [number for number, (_first, second) in held.items() if second["agrees"]]
     count = len(TIMES)
     found = (
-        f"The printed order of the three comes out in {len(unoptimised)} of {count} tables where GLM is "
-        f"built without optimisation, and in {len(optimised)} of {count} by the best optimised "
-        "implementation of each."
+        f"We find the printed order of the three in {len(unoptimised)} of {count} tables if GLM is built "
+        f"without optimisation, and in {len(optimised)} of {count} with the best optimised implementation "
+        "of each."
     )
     if len(optimised) < len(unoptimised):
         title = "The order of the times is that of a build without optimisation"
@@ -162,12 +163,12 @@ def _order_section(content: Content) -> str:
     return "\n\n".join(
         [
             f"## 1. {title}",
-            "The report prints matrices as the slowest in all three tables, and asks for better "
-            f"implementations of them. {found} By the best of each, with half the range of the middle "
-            "half of the runs:",
+            "In all three tables of the report, matrices are the slowest. It asks for better "
+            f"implementations of them. {found} The times of the best of each are, plus or minus half the "
+            "interquartile range of the runs:",
             "\n".join(f"- {sentence}" for sentence in sentences),
-            f"ScLERP takes {ratios[0]:.1f} times as long as DLB without optimisation and {ratios[1]:.1f} "
-            "times with it, by the fastest of each; the report says almost twice.",
+            f"The fastest ScLERP takes {ratios[0]:.1f} times as long as the fastest DLB without optimisation "
+            f"and {ratios[1]:.1f} times with it; the report says almost twice.",
             "![Times by representation, without optimisation and with it](results-times.svg)",
         ]
     )
@@ -197,15 +198,15 @@ def _accuracy_section(content: Content) -> str:
         "Pairs are more accurate than dual quaternions in none of these lengths."
         if not pairs_first
         else f"Pairs are more accurate than dual quaternions with {_listed(pairs_first)} links"
-        + ("." if len(pairs_first) == len(of_lengths) else ", and less with the others.")
+        + ("." if len(pairs_first) == len(of_lengths) else ", and less accurate with the others.")
     )
     return "\n\n".join(
         [
             f"## 2. {title}",
-            "From one chain of four, the report has pairs more accurate than dual quaternions. Over random "
-            f"chains of {first} to {last} links in float32, none normalised on the way, the end is off by "
-            f"these parts of the length (root mean square, the most accurate first): "
-            f"{'; '.join(ranks)}. {claim}",
+            "The report finds pairs more accurate than dual quaternions, from one chain of four links. We "
+            f"measured random chains of {first} to {last} links in float32, without normalising on the way. "
+            "These are the errors of the end, relative to the length (root mean square, the most accurate "
+            f"first): {'; '.join(ranks)}. {claim}",
             "![Error by length of the chain](results-accuracy.svg)",
         ]
     )
@@ -225,9 +226,10 @@ def _drift_section(content: Content) -> str:
     return "\n\n".join(
         [
             f"## 3. {title}",
-            "The report wonders whether the difference between DLB and ScLERP adds up in a chain. Over "
-            "random chains whose joints rotate by up to 90 degrees between two keys, their tips are apart by "
-            f"these parts of the length (root mean square): {found}. From {first} to {last} links {claim}.",
+            "The report asks whether the difference between DLB and ScLERP adds up in a chain. We measured "
+            "random chains whose joints rotate by up to 90 degrees between two keys. These are the distances "
+            f"of their tips, relative to the length (root mean square): {found}. From {first} to {last} "
+            f"links {claim}.",
             "![How far DLB is from ScLERP, by length of the chain](results-drift.svg)",
         ]
     )
@@ -255,15 +257,15 @@ def _shape_section(content: Content) -> str:
         else "A joint twisted by 170 degrees (Figure 3.11) keeps its radius with none of them"
     )
     if lost:
-        text += f"; what is left of it with others: {_listed(lost)}"
+        text += f"; the others keep less: {_listed(lost)}"
     return "\n\n".join(
         [
             f"## 4. {title}",
-            f"{text}. A bent joint three links from the origin (Figure 3.10) is by up to {drift:.1f} "
-            "widths of the limb elsewhere with pairs than with dual quaternions. Between two transforms "
+            f"{text}. With pairs, a bent joint three links from the origin (Figure 3.10) is up to "
+            f"{drift:.1f} widths of the limb away from where dual quaternions put it. Between two transforms "
             "(Figure 3.4) the path of the origin leaves the straight line by "
             f"{bends['sclerp']:.2f} with ScLERP, {bends['dlb']:.2f} with DLB and {bends['qv_slerp']:.0e} "
-            "with pairs by slerp: these rotate about the origin, wherever that is.",
+            "with pairs by slerp, which rotate about the origin, wherever that is.",
             "![Radius that a twisted joint keeps](results-radius.svg)",
         ]
     )
@@ -275,15 +277,20 @@ def _axes_section(content: Content) -> str:
     built = max(row["more"]["difference"] for row in rows)
     values = _values(content, "tables", "3.7")
     apart = max(values.values())
-    found = "It is not the representation" if apart < 0.1 * off else "It is not only the rounding of the axes"
+    found = (
+        "The representation is not the cause"
+        if apart < 0.1 * off
+        else "The rounding of the axes is not the only cause"
+    )
     return "\n\n".join(
         [
             "## 5. Why the report's columns differ",
-            "In Table 3.7 a point goes through the same four transforms in three representations, and "
-            f"ends in different places. {found}: with unit axes for all, matrices and dual quaternions are "
-            f"{apart:.0e} apart at most in float32. But the printed axes are rounded, and matrices normalise "
-            "the axis where quaternions normalise the whole. Built in these two ways in float64, every "
-            f"printed coordinate comes out to {built:.0e}; with unit axes they are off by up to {off:.0e}.",
+            "In Table 3.7 the same four transforms move a point in three representations, and "
+            f"the point ends at different positions. {found}: with unit axes for all, matrices and dual "
+            f"quaternions are at most {apart:.0e} apart in float32. But the printed axes are rounded, and "
+            "matrices normalise the axis, while quaternions normalise the whole. Built in these two ways in "
+            f"float64, every printed coordinate agrees to {built:.0e}; with unit axes they differ by up to "
+            f"{off:.0e}.",
         ]
     )
 
