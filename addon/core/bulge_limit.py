@@ -16,10 +16,10 @@ from .stage_mesh import StageMesh
 
 
 def segments(bones: Bones) -> tuple[np.ndarray, np.ndarray]:
-    """Heads and tails at rest, float32 [bones + joints, 3], armature space.
+    """Returns heads and tails at rest, float32 [bones + joints, 3], armature space.
 
-    A joint of a bendy bone has the two segments of the bone beside it, as one: a vertex between two joints is
-    then beside the segments of both.
+    A joint of a bendy bone gets its two adjacent segments as one: so a vertex between two joints is compared
+    with the segments of both.
     """
     heads = bones.rest[:, :3, 3].copy()
     tails = heads.copy()
@@ -34,13 +34,13 @@ def segments(bones: Bones) -> tuple[np.ndarray, np.ndarray]:
 
 
 class BulgeLimit:
-    """See core.stages.Stage. By the bones of the first Armature modifier that takes part."""
+    """See core.stages.Stage. Uses the bones of the first Armature modifier that takes part."""
 
     def __init__(self, mesh: StageMesh, mask: np.ndarray | None) -> None:
         self._mesh = mesh
         self._mask = mask
         self._native: sinew.BulgeLimit | None = None
-        # What it is bound to.
+        # What the native stage is bound to.
         self._link = -1
         self._rest_points: np.ndarray | None = None
         self._space: np.ndarray | None = None
@@ -62,8 +62,8 @@ class BulgeLimit:
         )
 
     def _rest_inverses(self, link: int) -> np.ndarray:
-        """float64 [bones + joints, 4, 4]. Inverted once: numpy does it with threads of its own, for which a
-        frame would wait on a busy machine."""
+        """Returns float64 [bones + joints, 4, 4]. Inverted only once: numpy's inversion uses its own threads,
+        for which a frame would wait on a busy machine."""
         if link not in self._inverses:
             rest = self._mesh.weightings[link].bones.rest
             self._inverses[link] = np.linalg.inv(rest.astype(np.float64))
@@ -102,8 +102,8 @@ class BulgeLimit:
         )
 
     def _weights(self, link: int) -> np.ndarray | None:
-        """The vertex group's; 0 where the Armature modifier's own mask leaves a vertex behind its bones: how
-        far it is from them says nothing."""
+        """Returns the vertex group's weights, with 0 where the Armature modifier's own mask keeps a vertex
+        from following its bones: its distance from them means nothing."""
         follows = self._mesh.link_masks[link] if self._mesh.link_masks else None
         if follows is None:
             return self._mask
