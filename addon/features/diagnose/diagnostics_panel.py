@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar's diagnostics: what is wrong in weights and poses, what to do about it, and where it is."""
+"""The sidebar's diagnostics: faults of weights and poses, what to do about them, and where they are."""
 
 from __future__ import annotations
 
