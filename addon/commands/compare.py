@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare`: a page for each file that shows and measures methods beside each other."""
+"""`sinew compare`: writes a page for each file that shows and measures methods side by side."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _compare(
     args: argparse.Namespace,
     console: Console,
 ) -> bool:
-    """Writes one file's page; false where a mesh was left out."""
+    """Writes one file's page; returns False where a mesh was left out."""
     import bpy
 
     from ..deform import evaluate

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def describe_file(path: Path) -> list[dict[str, object]]:
-    """A dictionary for each mesh that an armature deforms, in any scene of the file."""
+    """Returns a dictionary for each mesh that an armature deforms, in any scene of the file."""
     import bpy
 
     from ..attach import attach
@@ -70,7 +70,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
 
 
 def left_to_blender() -> list[str]:
-    """The open file's objects other than meshes that an armature deforms."""
+    """Returns the objects of the open file, other than meshes, that an armature deforms."""
     import bpy
 
     from ..attach import attach
