@@ -9,7 +9,7 @@ from ..core.phrases import phrase
 from . import stack
 
 
-def misled(obj: bpy.types.Object) -> list[str]:
+def warnings(obj: bpy.types.Object) -> list[str]:
     """Returns a sentence for each downstream Hook with a list of vertices. Behind Geometry Nodes, and all
     other modifiers that do more than deform, Blender uses the first vertices, as many as are in the list,
     instead (seen on 4.2 to 5.2)."""

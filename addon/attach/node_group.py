@@ -50,7 +50,7 @@ def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
 
     normals  the domain of normals that it also takes, POINT or CORNER; empty for none. Needs Blender 4.5
     """
-    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
+    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_buffer
     return find(kind + _WITH_NORMALS[normals]) or make(normals)
 
 
@@ -259,7 +259,7 @@ def _name(name: str, normals: str) -> str:
     return f"{name} with {normals.title()} Normals" if normals else name
 
 
-def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
+def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
     group = new_group(
         _name("Sinew Carrier", normals),
         POINT_BUFFER + _WITH_NORMALS[normals],

@@ -27,7 +27,7 @@ are_used = True
 # The node Set Mesh Normal can set free normals.
 ARE_SUPPORTED = bpy.app.version >= (4, 5)
 # Downstream, these neither read nor change normals, points and faces.
-HARMLESS_BEHIND = {
+HARMLESS_DOWNSTREAM = {
     "COLLISION",
     "UV_PROJECT",
     "UV_WARP",
@@ -101,7 +101,7 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
 def obstacle(obj: bpy.types.Object) -> str:
     """Returns why Blender has to compute the normals of a skinned object, as a clause; empty where it need
     not."""
-    known = _known_in_front(obj)
+    known = _known_upstream(obj)
     for modifier in stack.upstream(obj):
         if modifier.type not in known and stack.can_be_on(obj, modifier):
             return phrase("{name} is in front", name=modifier.name)
@@ -120,7 +120,7 @@ def is_for_viewport_alone(obj: bpy.types.Object) -> bool:
     return bool(_needing(obj, in_renders=True))
 
 
-def _known_in_front(obj: bpy.types.Object) -> set[str]:
+def _known_upstream(obj: bpy.types.Object) -> set[str]:
     """Returns the types of upstream modifiers whose result Sinew reads often enough."""
     if upstream_proxy.changes_weights(obj):
         # Then everything is read again in each frame that changes it.
@@ -134,7 +134,7 @@ def _needing(obj: bpy.types.Object, in_renders: bool) -> list[bpy.types.Modifier
     return [
         modifier
         for modifier in stack.downstream(obj)
-        if modifier.type not in HARMLESS_BEHIND and _can_be_on(obj, modifier, in_renders)
+        if modifier.type not in HARMLESS_DOWNSTREAM and _can_be_on(obj, modifier, in_renders)
     ]
 
 

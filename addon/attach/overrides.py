@@ -12,7 +12,7 @@ import bpy
 from . import node_group, properties, stack
 
 
-def keep(obj: bpy.types.Object) -> None:
+def store(obj: bpy.types.Object) -> None:
     """Copies the settings of a skinned override to its point buffer."""
     settings = properties.of(obj)
     if obj.override_library is not None and settings.point_buffer is not None:
@@ -20,7 +20,7 @@ def keep(obj: bpy.types.Object) -> None:
         properties.of(settings.point_buffer).helper = True
 
 
-def take_back() -> None:
+def restore() -> None:
     """Restores settings that overrides have lost, from their point buffers."""
     for obj in bpy.data.objects:
         if obj.type != "MESH" or obj.override_library is None or properties.has_sinew(obj):

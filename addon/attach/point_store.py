@@ -173,7 +173,7 @@ def remove(obj: bpy.types.Object) -> None:
     remove_point_attributes(obj)
 
 
-def let_go(obj: bpy.types.Object) -> None:
+def clear_references(obj: bpy.types.Object) -> None:
     """Clears all references to what Sinew made (references.py); ensure() makes them again."""
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
     pose_driver.remove(obj)

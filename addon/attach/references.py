@@ -3,7 +3,7 @@
 
 Where an object is the same in two steps, undo keeps it as it is in memory. What Sinew made for it since the
 last step (a helper, a node group) is in neither step and gone afterwards: Blender would read freed memory
-(seen on 4.2 to 5.2). So point_store.let_go() clears these references before undo.
+(seen on 4.2 to 5.2). So point_store.clear_references() clears these references before undo.
 """
 
 from __future__ import annotations

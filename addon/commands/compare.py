@@ -139,7 +139,7 @@ def _compare(
     frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
     evaluate.set_frame(scene, frames[0])
     played = [*methods, args.reference]
-    meshes, left_out = evaluate.drivable_meshes(scene, path, played, args.object)
+    meshes, left_out = evaluate.deformable_meshes(scene, path, played, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = measure.gather(scene, meshes)

@@ -53,7 +53,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
         armature = attach.armature_of(obj)
         if armature is None:
             raise SinewError(f"{path}: {obj.name} was deformed by Sinew, and its armature is missing")
-        facts = survey.describe_undriven(obj)
+        facts = survey.describe_in_file(obj)
         meshes.append(
             {
                 "object": obj.name,

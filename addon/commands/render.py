@@ -131,7 +131,7 @@ def _draw(
     files.open_file(args.file)
     scene = bpy.context.scene
     evaluate.set_frame(scene, frames[0])
-    meshes, left_out = evaluate.drivable_meshes(scene, args.file, [method], args.object)
+    meshes, left_out = evaluate.deformable_meshes(scene, args.file, [method], args.object)
     if left_out:
         raise SinewError(f"{args.file}: {left_out[0]}")
     evaluate.use_method_on(meshes, method)

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     files.open_file(path)
     scene = bpy.context.scene
     evaluate.set_frame(scene, frame)
-    meshes, left_out = evaluate.drivable_meshes(scene, path, methods, args.object)
+    meshes, left_out = evaluate.deformable_meshes(scene, path, methods, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
 

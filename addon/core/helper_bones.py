@@ -356,7 +356,7 @@ class Solver:
             self.move()
             if sweep:
                 for helper, old in zip(self.helpers, before[0], strict=True):
-                    self._go_on(helper, old, further)
+                    self._extrapolate(helper, old, further)
             for share in self.weigh():
                 yield (sweep + share) / _LAST_SWEEPS
             errors.append(self.errors().rms)
@@ -376,7 +376,7 @@ class Solver:
     def _state(self, state: tuple[list[Helper], np.ndarray, np.ndarray, np.ndarray]) -> None:
         self.helpers, self.bones, self.weights, self.residual = state
 
-    def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
+    def _extrapolate(self, helper: Helper, old: Helper, further: float) -> None:
         """Moves a helper bone beyond its new motion, by `further` times its last change."""
         ahead = helper.motion + further * (helper.motion - old.motion)
         helper.scale = np.maximum(helper.scale + further * (helper.scale - old.scale), _SMALLEST_SCALE)

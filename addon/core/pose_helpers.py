@@ -207,7 +207,7 @@ class _PoseSolver(Solver):
             linear += np.square(self._moved(self._linear(own), at) - self.targets[at]).sum()
         return bool(left <= _NEXT_TO_NOTHING * linear)
 
-    def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
+    def _extrapolate(self, helper: Helper, old: Helper, further: float) -> None:
         assert helper.blend is not None
         assert old.blend is not None
         numbers = self._numbers(helper.blend)

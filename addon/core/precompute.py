@@ -41,7 +41,7 @@ class Precomputation:
         self.error: Exception | None = None
         self.seconds = 0.0
         self._make = make
-        self._tell_end = ended
+        self._on_end = ended
         self._cancelled = threading.Event()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="Sinew precomputation", daemon=True)
@@ -82,7 +82,7 @@ class Precomputation:
             raise
         finally:
             self.seconds = time.perf_counter() - started
-            self._tell_end(self)
+            self._on_end(self)
             self._ended.set()
 
     def _note_progress(self, done: float) -> bool:

@@ -36,19 +36,19 @@ class Topology:
 class StageMesh:
     """The mesh of a stage.
 
-    topology     as the first Armature modifier gets it
-    rest_points  float32 [vertices, 3], object space: the mesh's own, without shape keys and modifiers; None
-                 where upstream modifiers change the number of vertices: then each frame's rest points are
-                 used
-    weightings   of the Armature modifiers
-    link_masks   float32 [vertices], the share of each Armature modifier's deformation that each vertex gets,
-                 None for all of it; empty: none has a mask
+    topology        as the first Armature modifier gets it
+    rest_points     float32 [vertices, 3], object space: the mesh's own, without shape keys and modifiers;
+                    None where upstream modifiers change the number of vertices: then each frame's rest points
+                    are used
+    weightings      of the Armature modifiers
+    modifier_masks  float32 [vertices], the share of each Armature modifier's deformation that each vertex
+                    gets, None for all of it; empty: none has a mask
     """
 
     topology: Topology
     rest_points: np.ndarray | None
     weightings: Sequence[Weighting]
-    link_masks: Sequence[np.ndarray | None] = ()
+    modifier_masks: Sequence[np.ndarray | None] = ()
 
     def equals(self, other: StageMesh) -> bool:
         """Whether both have the same points and faces; both belong to the same Armature modifiers."""

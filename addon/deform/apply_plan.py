@@ -20,7 +20,7 @@ from ..attach import (
 )
 from ..core.errors import SinewError
 from . import safe_mode, small_meshes
-from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
+from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State, plan
 
 log = logging.getLogger("sinew")
 
@@ -74,7 +74,7 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
         attach.adopt_pointers(obj)
         if wanted.state is State.OFF:
             point_store.remove_point_attributes(obj)
-        elif obj.mode not in MODES_OF_THE_MODIFIER:
+        elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
         if wanted.state is State.BUILT_IN and _shows_nearest_volume(obj):
             attach.use_nearest_volume(obj)
@@ -95,7 +95,7 @@ def _mode_of(obj: bpy.types.Object) -> str:
 def _shows_nearest_volume(obj: bpy.types.Object) -> bool:
     """Whether its mode uses the Armature modifiers, and these can give the shape that Sinew is set to, by
     Preserve Volume."""
-    return _mode_of(obj) in MODES_OF_THE_MODIFIER and small_meshes.has_builtin_shape(obj)
+    return _mode_of(obj) in ARMATURE_MODIFIER_MODES and small_meshes.has_builtin_shape(obj)
 
 
 def has_lost_modifier(obj: bpy.types.Object) -> bool:

@@ -85,7 +85,7 @@ class Bound:
                      mesh from upstream has normals of another domain
         """
         source = self.source
-        if source.from_front and source.normals_domain != given.domain:
+        if source.from_upstream and source.normals_domain != given.domain:
             out[:] = 0.0
             return
         if given.are_skinned:

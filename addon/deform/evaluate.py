@@ -175,7 +175,7 @@ def use_method_on(meshes: Iterable[bpy.types.Object], method: str) -> None:
             raise error
 
 
-def drivable_meshes(
+def deformable_meshes(
     scene: bpy.types.Scene, path: Path, methods: Iterable[str], name: str | None = None
 ) -> tuple[list[bpy.types.Object], list[str]]:
     """Returns those of deformed_meshes() that all `methods` can deform, and a sentence for each of the

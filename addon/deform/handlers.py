@@ -64,15 +64,15 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
     if is_rendering_in_window():
         return
     if any(state.dirtied_by_frames for state in current.skinned.values()):
-        events.call_last("frame_change_pre", close_gate)
-        events.call_first("frame_change_post", open_gate)
+        events.call_last("frame_change_pre", suspend_modifiers)
+        events.call_first("frame_change_post", restore_modifiers)
     else:
         events.unsubscribe_all(events.GATE_HANDLERS)
 
 
 @persistent
-def close_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
-    """Called last, and open_gate() first, so that other add-ons never see a modifier that Sinew suspends."""
+def suspend_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    """Called last, and restore_modifiers() first, so that other add-ons never see a suspended modifier."""
     if is_rendering_in_window():
         return
     is_playing = is_playing_in_window() and not current.is_rendering
@@ -85,7 +85,7 @@ def close_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None
 
 
 @persistent
-def open_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+def restore_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     with reaction():
         current.gate.restore()
 
@@ -260,7 +260,7 @@ def before_undo(*_args: object) -> None:
         between = list(filter(properties.has_sinew, references.noted()))
         session.forget_for_step({obj.session_uid for obj in between})
         for obj in between:
-            point_store.let_go(obj)
+            point_store.clear_references(obj)
         references.forget()
 
 
@@ -284,7 +284,7 @@ def on_loaded(*_args: object) -> None:
         session.forget()
         # The file's first undo step comes after this.
         references.forget()
-        overrides.take_back()
+        overrides.restore()
         note.remove()
         if not session.objects_with_sinew(Changes()):
             current.all_use_builtin = True
@@ -376,7 +376,7 @@ def _after_render() -> float | None:
 
 _LAST = (after_others, after_others_again)
 events.FRAME_HANDLERS.update(frame_change_pre=before_frame_change, frame_change_post=on_frame_change)
-events.GATE_HANDLERS.update(frame_change_pre=close_gate, frame_change_post=open_gate)
+events.GATE_HANDLERS.update(frame_change_pre=suspend_modifiers, frame_change_post=restore_modifiers)
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_depsgraph_update,
@@ -399,7 +399,7 @@ if events.IMPORTS_ARE_ANNOUNCED:
 
 def register() -> None:
     precomputing.begin()
-    subscribers.precomputation_asked.append(precompute_watch.begin)
+    subscribers.precomputation_requested.append(precompute_watch.begin)
     session.forget()
     properties.listeners.method_changed = session.setting_changed
     properties.listeners.enabled_changed = session.enabled_changed
@@ -424,9 +424,9 @@ def adopt_open_file() -> None:
 
 def unregister() -> None:
     precomputing.end()
-    subscribers.precomputation_asked.remove(precompute_watch.begin)
-    if bpy.app.timers.is_registered(precompute_watch.look):
-        bpy.app.timers.unregister(precompute_watch.look)
+    subscribers.precomputation_requested.remove(precompute_watch.begin)
+    if bpy.app.timers.is_registered(precompute_watch.check):
+        bpy.app.timers.unregister(precompute_watch.check)
     session.forget()
     if bpy.app.timers.is_registered(check_unannounced):
         bpy.app.timers.unregister(check_unannounced)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 # In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
-MODES_OF_THE_MODIFIER = frozenset({"EDIT", "SCULPT"})
+ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
 
 
 class State(Enum):
@@ -116,7 +116,7 @@ def plan(facts: ObjectFacts) -> Plan:
             "Linked from another file: its Armature modifier deforms it; make a library override to use Sinew"
         )
         return Plan(State.BUILT_IN, reason)
-    if facts.mode in MODES_OF_THE_MODIFIER:
+    if facts.mode in ARMATURE_MODIFIER_MODES:
         return Plan(State.BUILT_IN, "In this mode the Armature modifier deforms it")
     # Weight Paint finds bones through an Armature modifier that is on, and here the animation switches it.
     if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:

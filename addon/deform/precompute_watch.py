@@ -22,11 +22,11 @@ _STROKES = ("PAINT_OT_", "SCULPT_OT_")
 
 def begin() -> None:
     """Starts the timer, which runs as long as there is something to watch."""
-    if not bpy.app.background and not bpy.app.timers.is_registered(look):
-        bpy.app.timers.register(look, first_interval=SECONDS, persistent=True)
+    if not bpy.app.background and not bpy.app.timers.is_registered(check):
+        bpy.app.timers.register(check, first_interval=SECONDS, persistent=True)
 
 
-def look() -> float | None:
+def check() -> float | None:
     """Returns the seconds to the next call; None where nothing is left to watch."""
     if current.is_saving or current.is_rendering:
         return SECONDS
@@ -64,12 +64,12 @@ def _is_painting() -> bool:
 
 
 def stop() -> None:
-    """Stops what runs, because the artist does not want it; go_on() starts it again."""
+    """Stops what runs, because the artist does not want it; resume() starts it again."""
     precomputations.stop()
     _refresh()
 
 
-def go_on() -> None:
+def resume() -> None:
     precomputing.forget_stopped()
     _refresh()
 

@@ -40,15 +40,15 @@ MOST_BYTES_IN_FILE = 16 * 2**20
 def request(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:
     """Loads or computes what the object's methods need. Where there is data of the mesh before it changed,
     the watcher has it computed again once the artist pauses."""
-    is_asked = False
+    is_requested = False
     for armature, data, method in _needed(obj, skinned):
         if data.is_current(method):
             continue
-        is_asked = True
+        is_requested = True
         if precomputations.waits or not data.has(method):
             _request(obj, armature, data, method, depsgraph)
-    if is_asked and not precomputations.waits and is_main_thread():
-        notify(subscribers.precomputation_asked)
+    if is_requested and not precomputations.waits and is_main_thread():
+        notify(subscribers.precomputation_requested)
 
 
 def request_outdated(

@@ -97,16 +97,16 @@ def forget() -> None:
     _set_pairs([])
 
 
-def forget_for_step(let_go: set[int]) -> None:
+def forget_for_step(changed: set[int]) -> None:
     """Called before undo and redo, which make every reference invalid.
 
-    let_go  the session_uid of objects that are changed for the step
+    changed  the session_uid of objects that are changed for the step
     """
     known, depsgraph = {}, current.depsgraph
     if current.missed is None and not current.is_after_step:
         known = undo.known_before(current.pairs, depsgraph)
     forget()
-    current.skinned = {uid: state for uid, state in known.items() if uid not in let_go}
+    current.skinned = {uid: state for uid, state in known.items() if uid not in changed}
     current.depsgraph, current.is_after_step = depsgraph, True
 
 
@@ -280,7 +280,7 @@ def prepare_for_save() -> None:
             try:
                 if attach.prepare_for_save(obj):
                     current.on_before_saving.add(obj.session_uid)
-                overrides.keep(obj)
+                overrides.store(obj)
             except Exception as error:
                 # The other objects are in the same file.
                 log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
@@ -433,7 +433,7 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
         if _follow_removal(obj, changes):
             return
         if not properties.of(obj).enabled:
-            _keep_off(obj, changes)
+            _update_switched_off(obj, changes)
         else:
             state = update(obj, state_of(obj), depsgraph, changes)
             if state is None:
@@ -447,7 +447,7 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
         _switch_off(obj, properties.of(obj), error)
 
 
-def _keep_off(obj: bpy.types.Object, changes: Changes) -> None:
+def _update_switched_off(obj: bpy.types.Object, changes: Changes) -> None:
     """Handles an object that is switched off."""
     state = state_of(obj)
     if state is not None:

@@ -33,7 +33,7 @@ class Source:
     mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, without upstream
                       modifiers
     sdef_keys         float32 [4, vertices, 3], as from mesh_io.read_sdef_keys(); None without them
-    from_front        read from the upstream proxy
+    from_upstream     read from the upstream proxy
     normals_domain    the normals that draw the mesh, as from normals.domain_of()
     key_values        of the shape keys that are mixed in mixed_points
     known_key_values  their values when changes were last checked
@@ -48,7 +48,7 @@ class Source:
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     shading: Shading = field(default_factory=Shading)
-    from_front: bool = False
+    from_upstream: bool = False
     normals_domain: str = ""
     stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
@@ -142,12 +142,12 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     with_surface  with the triangles, and with the stored data that was computed from them
     """
     names = [group.name for group in obj.vertex_groups]
-    from_front = properties.of(obj).upstream_proxy is not None
-    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_front else obj.data
+    from_upstream = properties.of(obj).upstream_proxy is not None
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
     weights = mesh_io.read_group_weights(mesh)
     points = mesh_io.read_points(mesh)
-    mesh_points = mesh_io.read_points(obj.data) if from_front else points
-    keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
+    mesh_points = mesh_io.read_points(obj.data) if from_upstream else points
+    keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if len(mesh_points) != len(points):
         sdef_keys = None
@@ -155,13 +155,13 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     shading = mesh_io.read_shading(mesh)
     domain = normals.domain_of(mesh)
     surface = (points, None, topology, mesh_points)
-    source = Source(names, weights, *surface, keys, sdef_keys, shading, from_front, domain)
+    source = Source(names, weights, *surface, keys, sdef_keys, shading, from_upstream, domain)
     return _with_surface(obj, mesh, source) if with_surface else source
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, known: Source) -> Source:
     """Adds to `known` what read() leaves out without `with_surface`. Requires is_ready()."""
-    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_front else obj.data
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_upstream else obj.data
     return _with_surface(obj, mesh, known)
 
 
@@ -187,7 +187,7 @@ def has_changed(
     if touched and [g.name for g in obj.vertex_groups] != source.group_names:
         return True
     helper = properties.of(obj).upstream_proxy
-    if (helper is not None) != source.from_front:
+    if (helper is not None) != source.from_upstream:
         return True
     if helper is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
@@ -209,7 +209,7 @@ def is_slider_moved(
     """Whether the values of shape keys differ from those known. Setting a value touches the mesh as a change
     of weights does, and reading weights at each step of a slider would cost more than the frame."""
     keys = obj.data.shape_keys
-    if keys is None or source.from_front or obj.data.session_uid not in changes.meshes:
+    if keys is None or source.from_upstream or obj.data.session_uid not in changes.meshes:
         return False
     values = mesh_io.read_key_values(keys.evaluated_get(depsgraph))
     known = source.known_key_values
@@ -230,7 +230,7 @@ def evaluated_points(
     evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source
 ) -> np.ndarray | None:
     """The same from evaluated data alone; None where its vertices are not those that were read."""
-    if not source.from_front:
+    if not source.from_upstream:
         return _keyed_points(evaluated, evaluated_mesh, source)
     upstream = evaluated.sinew.upstream_proxy
     if upstream is None or not upstream.is_evaluated or len(upstream.data.vertices) != len(source.points):

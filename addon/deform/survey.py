@@ -37,7 +37,7 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *hooks.misled(obj)]
+    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *hooks.warnings(obj)]
     return facts.with_warnings(found)
 
 
@@ -74,7 +74,7 @@ def _missing_groups(obj: bpy.types.Object) -> list[str]:
     return found
 
 
-def describe_undriven(obj: bpy.types.Object) -> RigFacts:
+def describe_in_file(obj: bpy.types.Object) -> RigFacts:
     """The same for a mesh object as stored in the file, with the reason why Sinew cannot deform it, if there
     is one."""
     depsgraph = bpy.context.evaluated_depsgraph_get()

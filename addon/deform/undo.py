@@ -42,7 +42,7 @@ def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.
     plan, evaluation = state.plan, state.evaluation
     return (
         plan.state is State.IN_DEPSGRAPH
-        and not (plan.in_buffer or state.bound.source.from_front)
+        and not (plan.in_buffer or state.bound.source.from_upstream)
         and not (state.needs_recheck or state.needs_apply)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
         and obj.mode == state.mode == "OBJECT"

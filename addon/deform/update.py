@@ -12,7 +12,7 @@ from ..core.errors import SinewError
 from ..io import armature_io
 from . import after_update, apply_plan, bound, precomputing, source
 from .changes import Changes
-from .plan import MODES_OF_THE_MODIFIER, Plan, State
+from .plan import ARMATURE_MODIFIER_MODES, Plan, State
 from .skinned_object import SkinnedObject, object_state_of
 
 # How often the node group is restored after another add-on removed it.
@@ -32,9 +32,9 @@ def update(
     if obj.library is not None:
         # Its Armature modifier deforms it, as its own file was saved that way.
         return None
-    if skinned is not None and _is_as_it_was(obj, skinned, changes):
+    if skinned is not None and _is_unchanged(obj, skinned, changes):
         return skinned
-    if _is_in_mode_of_modifier(obj):
+    if _is_in_armature_modifier_mode(obj):
         apply_plan.apply(obj, apply_plan.plan_of(obj))
         return None
     inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
@@ -89,10 +89,10 @@ def _may_have_other_bones(skinned: SkinnedObject, changes: Changes) -> bool:
     return skinned.plan.state is State.OFF or changes.after_step
 
 
-def _is_in_mode_of_modifier(obj: bpy.types.Object) -> bool:
+def _is_in_armature_modifier_mode(obj: bpy.types.Object) -> bool:
     """Whether the Armature modifier deforms it because of its mode, and nothing has to be known of it. In
     Weight Paint that is so where the upstream proxy is then not evaluated."""
-    if obj.mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
+    if obj.mode in ARMATURE_MODIFIER_MODES or obj.data.is_editmode:
         return True
     is_painted = obj.mode == "WEIGHT_PAINT" and stack.visibility_is_animated(obj)
     return is_painted and upstream_proxy.is_needed(obj)
@@ -118,7 +118,7 @@ def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
         skinned.name, skinned.evaluation.skip_reason = obj.name, "it has another name"
 
 
-def _is_as_it_was(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
+def _is_unchanged(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
     """Whether nothing has to be read again. A mesh that needs a recheck counts as changed.
 
     Raises SinewError where the user has to fix something first.

@@ -67,7 +67,7 @@ class SINEW_OT_precompute(bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        precompute_watch.go_on()
+        precompute_watch.resume()
         return {"FINISHED"}
 
 

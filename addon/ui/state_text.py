@@ -7,7 +7,7 @@ import bpy
 
 from ..attach import attach, hooks, properties
 from ..deform import session, small_meshes
-from ..deform.plan import MODES_OF_THE_MODIFIER, ObjectFacts, State, plan
+from ..deform.plan import ARMATURE_MODIFIER_MODES, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
 from .translations import tr
 
@@ -70,13 +70,13 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
         )
     found += state.bound.facts.warnings
     # A Hook may have been added since.
-    return [*found, *(sentence for sentence in hooks.misled(obj) if sentence not in found)]
+    return [*found, *(sentence for sentence in hooks.warnings(obj) if sentence not in found)]
 
 
 def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
     """For modes whose tools work through the Armature modifier: draws whether its shape is Sinew's, and the
     switch that makes it so if the artist has changed it."""
-    if obj.mode not in MODES_OF_THE_MODIFIER or not properties.of(obj).enabled or obj.library is not None:
+    if obj.mode not in ARMATURE_MODIFIER_MODES or not properties.of(obj).enabled or obj.library is not None:
         return
     sentence, modifiers = shape_in_mode(obj)
     draw_text(layout, context, sentence, icon="INFO")
@@ -153,4 +153,4 @@ def uses_builtin(obj: bpy.types.Object) -> bool:
     settings, state = properties.of(obj), session.state_of(obj)
     if not settings.enabled or state is None:
         return False
-    return obj.mode in MODES_OF_THE_MODIFIER or state.plan.state is State.BUILT_IN
+    return obj.mode in ARMATURE_MODIFIER_MODES or state.plan.state is State.BUILT_IN

@@ -71,7 +71,7 @@ class Stepped:
             return {"RUNNING_MODAL"}
         share = None
         try:
-            share = self._go_on()
+            share = self._advance()
         except SinewError as error:
             return self._failed(error)
         finally:
@@ -89,7 +89,7 @@ class Stepped:
         self._left.close()
         self._end(context)
 
-    def _go_on(self) -> float | None:
+    def _advance(self) -> float | None:
         """Returns the progress after some steps; None at the end."""
         until, share = time.perf_counter() + SECONDS_BETWEEN_REDRAWS, 0.0
         while share is not None and time.perf_counter() < until:

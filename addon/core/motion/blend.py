@@ -19,7 +19,7 @@ from ..inbetween import Method, Poses, axes_of, in_layout_of, rigid_of
 from . import timing
 from .align import Warp, align, same_pace
 from .clip import Clip, Rig, common_rig
-from .root import Grounded, accumulated, carried, grounded, main_root, stay
+from .root import Grounded, accumulated, as_keyed, carried, grounded, main_root
 
 RELATIVE, ARMATURE = "relative", "armature"
 TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
@@ -157,7 +157,7 @@ def _check(settings: Settings) -> None:
 
 def _in_place(clips: Sequence[Clip], root: int, up: np.ndarray, settings: Settings) -> list[Grounded]:
     """Returns the clips without their travel: all as cycles, or, if that is needed to align them, none."""
-    take_out = stay if settings.root_motion == KEYED else grounded
+    take_out = as_keyed if settings.root_motion == KEYED else grounded
     found = [take_out(clip, root, up, clip.is_cyclic or None) for clip in clips]
     if settings.align and not all(each.clip.is_cyclic for each in found):
         found = [take_out(clip, root, up, False) for clip in clips]

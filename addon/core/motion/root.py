@@ -92,7 +92,7 @@ def grounded(clip: Clip, root: int, up: np.ndarray, is_cyclic: bool | None = Non
     return Grounded(placed, frames[0], None, frames)
 
 
-def stay(clip: Clip, _root: int, _up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
+def as_keyed(clip: Clip, _root: int, _up: np.ndarray, is_cyclic: bool | None = None) -> Grounded:
     """Returns the clip as it is keyed, as one that does not travel; is_cyclic as in grounded()."""
     if is_cyclic is None:
         is_cyclic = closes(clip.rig, clip.poses.rigid[0], clip.poses.rigid[-1])

@@ -21,7 +21,7 @@ from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...deform import evaluate, session
 from ...io import files
 from ...io.animation_paths import curves_of
-from . import bake_export, driven, shape_animation
+from . import bake_export, bake_state, shape_animation
 from .bake_bones import BoneBake
 from .take_off import take_off
 
@@ -31,7 +31,7 @@ SHAPE_KEYS = "shape-keys"
 def points_of(obj: bpy.types.Object) -> np.ndarray:
     """Returns the points that Sinew gives its modifier at the current frame, float32 [vertices, 3]; the array
     belongs to the binding."""
-    return driven.state_of(obj).points
+    return bake_state.state_of(obj).points
 
 
 class ShapeKeys:

@@ -60,9 +60,9 @@ def export(task: dict, report: Callable[..., None]) -> dict:
     window.view_layer = window.scene.view_layers[task["view_layer"]]
     meshes = [bpy.data.objects[name, None] for name in task["objects"]]
     started = bake.start(meshes, task["kind"], task["frames"], Path(task["target"]), overwrite=True)
-    started.told = lambda share: report("exporting it", share=share)
+    started.report_progress = lambda share: report("exporting it", share=share)
     for share in started.sample():
-        started.told(share)
+        started.report_progress(share)
     return {}
 
 

@@ -26,7 +26,7 @@ from ...core.stages import StageValues
 from ...deform import evaluate, session
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io
-from . import driven, shape_animation
+from . import bake_state, shape_animation
 from .take_off import take_off
 
 # Share of the time that reading the frames takes.
@@ -55,7 +55,7 @@ class BoneBake:
         try:
             rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
             for obj in meshes:
-                _check_bones(obj, driven.posed_state_of(obj))
+                _check_bones(obj, bake_state.posed_state_of(obj))
                 rigs.setdefault(_rig_of(obj), []).append(obj)
         finally:
             evaluate.set_frame(scene, before)
@@ -116,7 +116,7 @@ class _Rig:
 
     def take(self) -> None:
         """Records the evaluated frame."""
-        states = [driven.posed_state_of(obj) for obj in self.meshes]
+        states = [bake_state.posed_state_of(obj) for obj in self.meshes]
         frames = [state.shown.frames[0] for state in states]
         bindings = [state.bound.binding for state in states]
         targets, rest = [], []

@@ -22,7 +22,7 @@ from ...core.output import remove, writing
 from ...core.spaces import transformed
 from ...deform import evaluate, session
 from ...io import files
-from . import driven, shape_animation, usd_textures
+from . import bake_state, shape_animation, usd_textures
 
 
 def _alembic(path: str, first: int, last: int) -> None:
@@ -77,7 +77,7 @@ class _Export:
     path: Path
     unfinished: Path
 
-    def told(self, share: float) -> None:
+    def report_progress(self, share: float) -> None:
         """Called with the progress, 0 to 1, where sample() cannot yield: within an exporter's single call.
         Callers may replace it by a function, which must not raise, as Blender ignores exceptions here."""
 
@@ -133,10 +133,10 @@ class SceneExport(_Export):
         try:
             with _selected([*self.meshes, *self.carried]), self.textures.on_disk():
                 scene.frame_start, scene.frame_end = self.first, self.last
-                with _told_frames(self, 0.0):
+                with _reporting_frames(self, 0.0):
                     _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
             for obj in self.meshes:
-                driven.check_on(obj)
+                bake_state.check_on(obj)
             yield 1.0
         except BaseException:
             self.discard()
@@ -177,7 +177,7 @@ class MorphExport(_Export):
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
                 for obj in self.meshes:
-                    driven.check_on(obj)
+                    bake_state.check_on(obj)
                 for obj, samples in self.samples.items():
                     points = self._in_first_space(obj)
                     if samples and len(points) != len(samples[0]):
@@ -194,7 +194,7 @@ class MorphExport(_Export):
                 first, last = scene.frame_start, scene.frame_end
                 scene.frame_start, scene.frame_end = int(self.frames[0]), int(self.frames[-1])
                 try:
-                    with _told_frames(self, SAMPLED):
+                    with _reporting_frames(self, SAMPLED):
                         _export(self._write, self)
                 finally:
                     scene.frame_start, scene.frame_end = first, last
@@ -287,7 +287,7 @@ def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
 def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
     """Returns the temporary path of the export; raises SinewError where the disk has no room for it."""
     for obj in export.meshes:
-        driven.check_on(obj)
+        bake_state.check_on(obj)
     vertices = sum(len(evaluate.final_points(obj)) for obj in (*export.meshes, *export.carried))
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(export.frames))
@@ -314,7 +314,7 @@ def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> Non
 
 
 @contextmanager
-def _told_frames(export: SceneExport | MorphExport, start: float) -> Iterator[None]:
+def _reporting_frames(export: SceneExport | MorphExport, start: float) -> Iterator[None]:
     """Context that reports each frame that an exporter goes to, from the progress `start` on."""
     done = 0
 
@@ -322,7 +322,7 @@ def _told_frames(export: SceneExport | MorphExport, start: float) -> Iterator[No
         nonlocal done
         # At its end an exporter returns to the frame where it started.
         done = min(done + 1, len(export.frames))
-        export.told(start + (1.0 - start) * done / len(export.frames))
+        export.report_progress(start + (1.0 - start) * done / len(export.frames))
 
     bpy.app.handlers.frame_change_post.append(on_frame)
     try:

@@ -14,7 +14,7 @@ from ...attach import properties, upstream_proxy
 from ...core.corrective import NEAR, offsets
 from ...core.errors import SinewError
 from ...deform import pose, session
-from ...deform.plan import MODES_OF_THE_MODIFIER
+from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
 
 # The bone's smallest rotation, in radians: below it, the key would be all or nothing.
@@ -71,7 +71,7 @@ def _check(obj: bpy.types.Object) -> None:
     keys = obj.data.shape_keys
     if not obj.data.is_editable or obj.override_library is not None:
         raise SinewError(f"{obj.name}: its mesh comes from another file, where shape keys have to be made")
-    if obj.mode in MODES_OF_THE_MODIFIER:
+    if obj.mode in ARMATURE_MODIFIER_MODES:
         raise SinewError(f"{obj.name}: leave its mode first, in which the Armature modifier deforms it")
     if keys is not None and not keys.use_relative:
         raise SinewError(f"{obj.name}: its shape keys are absolute; a corrective key is a relative one")

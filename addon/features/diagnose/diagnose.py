@@ -61,7 +61,7 @@ class _Reading:
     points: np.ndarray
     poses: PoseCheck
 
-    def look(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
+    def add_pose(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
         armature = attach.armature_of(self.obj).evaluated_get(depsgraph)
         bones = self.weighting.bones
         pose = armature_io.read_pose(armature, bones).astype(np.float64)
@@ -75,7 +75,7 @@ def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_infl
     depsgraph = bpy.context.evaluated_depsgraph_get()
     readings = [_read(obj, depsgraph) for obj in objects]
     for reading in readings:
-        reading.look(scene.frame_current, depsgraph)
+        reading.add_pose(scene.frame_current, depsgraph)
         poses = tr("pose of frame {frame}", frame=scene.frame_current)
         _keep(reading, most_influences, poses)
 
@@ -93,7 +93,7 @@ def check_frames(
             evaluate.set_frame(scene, frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             for reading in readings:
-                reading.look(frame, depsgraph)
+                reading.add_pose(frame, depsgraph)
             yield (number + 1) / len(frames)
     poses = tr("poses of frames {first} to {last}", first=frames[0], last=frames[-1])
     for reading in readings:
@@ -212,7 +212,7 @@ def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
     if obj.mode == "EDIT":
         return _edited_weights(obj.data).equals(weights)
     state = session.state_of(obj)
-    if state is not None and not state.bound.source.from_front:
+    if state is not None and not state.bound.source.from_upstream:
         # Sinew has read them already.
         return state.bound.source.weights.equals(weights)
     return mesh_io.read_group_weights(obj.data).equals(weights)

@@ -18,7 +18,7 @@ def register() -> None:
 
 def unregister() -> None:
     ik_handlers.unsubscribe()
-    ik_handlers.let_go()
+    ik_handlers.detach_all()
     ik_in_depsgraph.unregister()
     ik_records.unregister()
     ik_bake.unregister()

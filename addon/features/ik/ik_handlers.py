@@ -71,7 +71,7 @@ class _State:
 
 @persistent
 def before_undo(*_args: object) -> None:
-    ik_live.let_go()
+    ik_live.remove_unrecorded()
 
 
 @persistent
@@ -136,7 +136,7 @@ def adopt_open_file() -> None:
         on_data_new()
 
 
-def let_go() -> None:
+def detach_all() -> None:
     """Detaches all live trees: Blender's constraints play, as in a saved file."""
     for armature in list(_armatures()):
         ik_live.detach(armature)

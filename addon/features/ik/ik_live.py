@@ -123,7 +123,7 @@ def forget() -> None:
     _session.failed.clear()
 
 
-def let_go() -> None:
+def remove_unrecorded() -> None:
     """Called before undo: removes references to what is in no undo step (references)."""
     for armature in [obj for obj in bpy.data.objects if obj.session_uid in _session.in_no_step]:
         detach(armature)

@@ -74,11 +74,11 @@ def _times(group: keyed_poses.Group, curves: Sequence[bpy.types.FCurve], step: i
     first, last = group.times[0], group.times[-1]
     frames = np.arange(np.ceil(first), np.floor(last) + 1, step)
     # A curve with linear extrapolation takes its slope from the last two keys.
-    outside = [first - 1.0, last + 1.0] if any(_goes_on(curves[n]) for n in group.curves) else []
+    outside = [first - 1.0, last + 1.0] if any(_extrapolates(curves[n]) for n in group.curves) else []
     return np.unique(np.concatenate([group.times, frames, outside]).astype(np.float32))
 
 
-def _goes_on(curve: bpy.types.FCurve) -> bool:
+def _extrapolates(curve: bpy.types.FCurve) -> bool:
     return curve.extrapolation == "LINEAR" and all(modifier.mute for modifier in curve.modifiers)
 
 
@@ -105,7 +105,7 @@ def _write_keys(
     curve: bpy.types.FCurve, group: keyed_poses.Group, bone: int, times: np.ndarray, values: np.ndarray
 ) -> None:
     inside = (times >= group.times[0]) & (times <= group.times[-1])
-    chosen = inside | _goes_on(curve)
+    chosen = inside | _extrapolates(curve)
     times, values = times[chosen], values[chosen]
     points = curve.keyframe_points
     points.clear()

@@ -102,7 +102,7 @@ def refresh(scene: bpy.types.Scene) -> None:
     _subscribe_to_needed_frames()
 
 
-def let_go() -> None:
+def release_all() -> None:
     """Restores all curves as the artist had them, until the next refresh()."""
     _release()
     session.players = None
@@ -293,7 +293,7 @@ def on_imported(*_args: object) -> None:
 @persistent
 def on_save(*_args: object) -> None:
     """In a saved file the curves are as the artist left them, and play without Sinew."""
-    let_go()
+    release_all()
 
 
 @persistent
@@ -331,7 +331,7 @@ def adopt_open_file() -> None:
 
 
 def unregister() -> None:
-    let_go()
+    release_all()
     session.forget()
     events.unsubscribe_all(_HANDLERS)
     events.unsubscribe(*_BEFORE_FRAMES)

@@ -142,7 +142,7 @@ def measure(
     for index, (rest, pose) in enumerate(zip(rests, poses, strict=True)):
         rig = _frame_of_rig(subject, rest, pose)
         subject.gauge.set_frame(rig)
-        _look_at_pose(subject, rig, frames[index])
+        _check_pose(subject, rig, frames[index])
         for method in methods:
             measured = subject.gauge.measure(shapes[method][index], shapes[reference][index])
             result.summaries[method].append(measured.summary())
@@ -262,7 +262,7 @@ def _frame_of_rig(
     return FrameOfRig(rest[0], *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
 
-def _look_at_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
+def _check_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
     first = 0
     for part in subject.parts:
         count = len(part.weighting.bones.rest)

@@ -45,7 +45,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     off = [obj.name for obj in skinned if not properties.of(obj).enabled]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += [reason for reason in map(inbetween_handlers.problem_of, armatures) if reason is not None]
-    problems += _undrivable(skinned)
+    problems += _not_deformable(skinned)
     notes = [f"{name} is switched off: its Armature modifier deforms it" for name in off]
     notes += [
         f"library {library.filepath} is missing: whether Sinew deforms what it links is not known"
@@ -60,7 +60,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     }
 
 
-def _undrivable(objects: list[bpy.types.Object]) -> Iterator[str]:
+def _not_deformable(objects: list[bpy.types.Object]) -> Iterator[str]:
     """Yields a sentence for each object with settings of Sinew that it cannot deform. Each is evaluated,
     visible in its scene, as Blender does not evaluate hidden objects."""
     left = []

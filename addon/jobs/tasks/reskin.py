@@ -63,7 +63,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         files.open_file(source, load_ui=True)
     notes = _notes_on_file()
     with clock.doing("deforming"):
-        skinned, left_out = _drive(_meant(settings, source), settings)
+        skinned, left_out = _use_sinew(_meant(settings, source), settings)
     if not skinned:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
     with clock.doing("saving"), updates_suspended():
@@ -126,21 +126,21 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
     return {"meshes": meshes, "left_out": left_out, "notes": notes, "seconds": clock.seconds}
 
 
-def _drive(
+def _use_sinew(
     objects: list[bpy.types.Object], settings: dict
 ) -> tuple[list[tuple[bpy.types.Object, dict]], list[str]]:
     """Puts Sinew on meshes. Returns each with its facts for the report, and why others were not changed."""
     before = [(_described(obj), properties.has_sinew(obj)) for obj in objects]
-    wanted = [(obj, _said_of(obj, settings, "method")) for obj in objects]
-    scales = {obj: _said_of(obj, settings, "scale") for obj in objects}
+    wanted = [(obj, _setting_of(obj, settings, "method")) for obj in objects]
+    scales = {obj: _setting_of(obj, settings, "scale") for obj in objects}
     values = {obj: _parameters_of(obj, settings) for obj in objects}
     skinned, left_out = [], []
-    for (obj, method), (way, was_driven), error in zip(
+    for (obj, method), (way, had_sinew), error in zip(
         wanted, before, evaluate.use_methods_for_file(wanted, scales, values), strict=True
     ):
         if error is not None:
             left_out.append(str(error))
-            if properties.has_sinew(obj) and not was_driven:
+            if properties.has_sinew(obj) and not had_sinew:
                 attach.remove(obj)
             continue
         state = session.state_of(obj)
@@ -186,7 +186,7 @@ def _is_meant(obj: bpy.types.Object, settings: dict) -> bool:
     return (not include or is_one_of(include)) and not is_one_of(exclude)
 
 
-def _said_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
+def _setting_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
     """Returns the value in the last rule for the object, or else in the settings for all."""
     rules = settings["objects"]
     said = [rule[key] for rule in rules if key in rule and fits(obj.name, rule["match"])]

@@ -8,7 +8,7 @@ import bpy
 from ...attach import properties
 from ...core.errors import SinewError
 from ...deform import session
-from ...deform.plan import MODES_OF_THE_MODIFIER
+from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
 
 
@@ -23,7 +23,7 @@ def state_of(obj: bpy.types.Object) -> SkinnedObject:
     modifier a shape."""
     # The depsgraph as it was evaluated for the frame: evaluating what Sinew wrote since is not needed.
     pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
-    if not pairs or obj.mode in MODES_OF_THE_MODIFIER:
+    if not pairs or obj.mode in ARMATURE_MODIFIER_MODES:
         raise _off(obj)
     return pairs[0][1]
 
