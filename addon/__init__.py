@@ -16,7 +16,7 @@ def unregister() -> None:
     registration.unregister()
 
 
-# --- What Blender's glTF exporter looks for in an extension
+# --- The functions that Blender's glTF exporter calls in an extension
 
 
 def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802

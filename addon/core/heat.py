@@ -21,8 +21,7 @@ _VIRIDIS = bytes.fromhex(
 # A range of ratios covers at most, and at least, this many doublings or halvings.
 MAX_DOUBLINGS = 2.0
 MIN_DOUBLINGS = 0.1
-# A range of lengths ends at most at this multiple of the largest length of the method with the second
-# largest.
+# A range of lengths ends at most at this multiple of the second largest method's maximum.
 BEYOND_OTHERS = 2.0
 
 

@@ -143,7 +143,7 @@ def states_of(
     return [(obj, state) for obj, state in pairs if state.shown.frames is not None]
 
 
-# --- Which of Blender's changes of frame have to be listened to
+# --- Subscribing to changes of frame
 
 
 def subscribe_to_frames() -> None:

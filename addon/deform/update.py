@@ -187,8 +187,8 @@ def _failure_of(skinned: SkinnedObject | None) -> str:
 def _with_data(
     obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan, depsgraph: bpy.types.Depsgraph
 ) -> Plan:
-    """Requests the data that the methods need and returns the resulting plan. A waiting plan leaves the
-    object's modifiers and storage as the other plan does."""
+    """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
+    same modifiers and storage as one that does not, so it need not be applied again."""
     if plan.uses_builtin:
         return plan
     if plan.normals.domain:

@@ -41,7 +41,8 @@ def _alembic(path: str, first: int, last: int) -> None:
 
 
 def _usd(path: str, _first: int, _last: int) -> None:
-    # The final points, without the armature and the shape keys, which would deform them again.
+    # Exports the final points instead of the armature and the shape keys, which do not include Sinew's
+    # deformation.
     bpy.ops.wm.usd_export(
         filepath=path,
         check_existing=False,

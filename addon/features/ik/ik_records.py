@@ -72,7 +72,7 @@ def live_constraints(armature: bpy.types.Object) -> dict[str, str]:
 
 
 def register() -> None:
-    # Not in the groups below, which reading would add to each object. The first saves reading all bones.
+    # Not in the groups below, which reading would add to each object. This flag saves reading all bones.
     bpy.types.Object.sinew_ik_is_live = bpy.props.BoolProperty(
         description="Whether Sinew solves chains of it live",
         options={"HIDDEN"},
