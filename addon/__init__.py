@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew for Blender: skinning methods to choose from, compared live and computed in native code."""
+"""Sinew for Blender: a choice of skinning methods, compared live and computed in native code."""
 
 
 def register() -> None:
@@ -16,7 +16,7 @@ def unregister() -> None:
     registration.unregister()
 
 
-# --- What Blender's glTF exporter looks for in an extension
+# --- The functions that Blender's glTF exporter calls in an extension
 
 
 def glTF2_pre_export_callback(export_settings: dict) -> None:  # noqa: N802
@@ -35,14 +35,14 @@ def glTF2_post_export_callback(export_settings: dict) -> None:  # noqa: N802
 
 
 def glTF2ExportUserExtension() -> object:  # noqa: N802
-    """Taken for a class, whose object is asked during an export."""
+    """Blender takes this function for a class, and calls the returned object's functions during an export."""
     from .features.gltf import export
 
     return export.GltfExtension()
 
 
 def draw_export(context: object, layout: object) -> None:
-    """Called to draw in the exporter's side bar."""
+    """Called to draw in the exporter's sidebar."""
     from .features.gltf import feature
 
     feature.draw(context, layout)

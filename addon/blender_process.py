@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender in a process of its own that does one task after the other, supervised by this process.
+"""A Blender in a separate process that performs one task after the other, supervised by this process.
 
 Starting Blender takes 0.5 to 2 s, opening a file 10 ms and more: so a process is reused for the next file,
 which replaces the last one. A process that crashes, hangs or grows too large is ended, and the next file gets
@@ -30,7 +30,7 @@ DOING = "doing"
 # Environment variable: the numbers of the processors to start on, if it is set.
 PROCESSORS = "SINEW_PROCESSORS"
 START_LIMIT = 180.0
-# What start_new_session is on Windows, where it is ignored.
+# The equivalent of start_new_session, which Windows ignores.
 NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 # Seconds between two checks of a busy process.
 INTERVAL = 0.1
@@ -66,11 +66,12 @@ class Limits:
 class BlenderProcess:
     """One Blender, for one thread at a time: bpy in this Python, or the Blender program that runs this code.
 
-    wait  until it has started; raises SinewError where it can not be started. Without it, run() does so
+    wait  waits until it has started, and raises SinewError where it cannot be started; otherwise run() does
+          so
     """
 
     def __init__(self, limits: Limits, wait: bool = True) -> None:
-        # Blender's own temporary folder goes in here: it remains when Blender is ended by force.
+        # Blender's own temporary folder is inside: it remains when Blender is killed.
         self._folder = ScratchFolder()
         own = str(self._folder.path)
         try:
@@ -103,7 +104,7 @@ class BlenderProcess:
             self._await_start()
 
     def run(self, task: dict, limits: Limits) -> dict:
-        """The outcome of the task. Raises BlenderLost; the process can not be used any more then."""
+        """Returns the outcome of the task. Raises BlenderLost; the process cannot be used any more then."""
         if not self._has_started:
             self._await_start()
         self._begin(limits)
@@ -116,8 +117,8 @@ class BlenderProcess:
         return self._read_reply()
 
     def follow(self, task: dict, limits: Limits) -> Iterator[dict]:
-        """Its reports on the task, every INTERVAL s, and at last the outcome. Raises as run() does; closing
-        the iterator before the outcome ends the process."""
+        """Yields its reports on the task, every INTERVAL s, and finally the outcome. Raises as run() does;
+        closing the iterator before the outcome ends the process."""
         aside = futures.ThreadPoolExecutor(1)
         outcome = aside.submit(self.run, task, limits)
         aside.shutdown(wait=False)
@@ -130,11 +131,12 @@ class BlenderProcess:
         yield outcome.result()
 
     def is_spent(self, limits: Limits) -> bool:
-        """Whether the next file should get a new process: memory that Blender does not free adds up."""
+        """Whether the next file should get a new process, as memory that Blender does not free
+        accumulates."""
         return self._excess is not None or 0 < limits.memory / 2 < self._size
 
     def end(self) -> None:
-        """Ends the process by force: it has no unsaved work, and would take 0.2 s to end by itself."""
+        """Kills the process: it has no unsaved work, and would take 0.2 s to end by itself."""
         self._process.kill()
         self._clean_up()
 
@@ -162,7 +164,7 @@ class BlenderProcess:
         return json.loads(line)
 
     def _watch(self) -> None:
-        """Ends the process where a file exceeds a limit."""
+        """Ends the process when a file exceeds a limit."""
         while not self._ended.wait(INTERVAL):
             # The lock decides whether the limit or the end of the file came first: a file done in time is
             # kept.
@@ -201,7 +203,7 @@ class BlenderProcess:
         return self._progress_report().get("doing", "starting")
 
     def _progress_report(self) -> dict:
-        """What it is doing, as "doing", and its progress; empty before its first report."""
+        """Returns what it is doing, as "doing", and its progress; empty before its first report."""
         with contextlib.suppress(OSError, ValueError):
             return json.loads((self._folder.path / DOING).read_bytes())
         return {}
@@ -229,7 +231,7 @@ def _command() -> list[str]:
 
 
 def _environment(limits: Limits) -> dict[str, str]:
-    """The environment of this process, with the number of threads of `limits`."""
+    """Returns the environment of this process, with the number of threads of `limits`."""
     if not limits.threads:
         return dict(os.environ)
     # Mesa's software OpenGL has threads, too: 0 of them are faster than 1.
@@ -238,7 +240,8 @@ def _environment(limits: Limits) -> dict[str, str]:
 
 
 def _first_processors(limits: Limits) -> list[int]:
-    """The processors to start a Blender on, different ones for each: it makes a thread for each of them."""
+    """Returns the processors to start a Blender on, different ones for each, as it makes a thread for each of
+    them."""
     if not hasattr(os, "sched_getaffinity"):
         return []
     processors = sorted(os.sched_getaffinity(0))

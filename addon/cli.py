@@ -34,7 +34,7 @@ class Command(Protocol):
 
 
 def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
-    """The parser of the whole command line, and the module of each subcommand."""
+    """Returns the parser of the whole command line, and the module of each subcommand."""
     from .commands import (
         bake,
         blend,
@@ -79,7 +79,7 @@ def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
 
 
 def main(argv: list[str]) -> int:
-    """Runs one command. Exit status: 0 all went well, 1 something did not, 2 wrong use."""
+    """Runs one command. Returns the exit status: 0 all went well, 1 something did not, 2 wrong use."""
     reason = native.load_error()
     if reason is not None:
         print(f"sinew: {reason}", file=sys.stderr)
@@ -97,7 +97,7 @@ def main(argv: list[str]) -> int:
         with interrupt.deferred():
             return modules[args.command].run(args, output)
     except SystemExit as stop:
-        # Raised by the parser: within Blender, an exit would skip Blender's own cleanup.
+        # Raised by the parser: within Blender, exiting would skip Blender's own cleanup.
         return stop.code if isinstance(stop.code, int) else 2
     except SinewError as error:
         output.complain(error)
@@ -116,7 +116,7 @@ def main(argv: list[str]) -> int:
 
 
 def _with_signed_frames(argv: list[str]) -> list[str]:
-    """Joins frames such as -5-3 with --frames: argparse takes them for an option otherwise."""
+    """Joins frames such as -5-3 with --frames, as argparse would take them for an option."""
     joined: list[str] = []
     for argument in argv:
         if joined and joined[-1] in ("--frames", "--frame") and re.fullmatch(r"-[\d.][\d.,\s-]*", argument):
@@ -139,8 +139,8 @@ def register_command() -> None:
     import bpy
 
     _commands.append(bpy.utils.register_cli_command("sinew", main))
-    # As in blender/registration.py: a command still registered at the end of a process with bpy as a module
-    # crashes it.
+    # As in registration.py: with bpy as a module, a command that is still registered at the end of the
+    # process crashes it.
     atexit.register(unregister_command)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the native library loads in this Blender and is that of this extension, and why not."""
+"""Finds out whether the native library loads in this Blender and fits this extension, and if not, why."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from types import ModuleType
 
-# What the extension uses of the library.
+# The parts of the library that the extension uses.
 NAMES = (
     *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Method", "Normals", "Parameter", "Skeleton"),
     *(
@@ -28,7 +28,8 @@ NAMES = (
 
 
 def load_error() -> str | None:
-    """None where `sinew` imports and has what the extension needs, else one sentence for the panel."""
+    """Returns None where `sinew` imports and has what the extension needs, else one sentence for the
+    panel."""
     try:
         import sinew
     except ImportError as error:
@@ -41,7 +42,7 @@ def load_error() -> str | None:
 
 
 def _age_error(library: ModuleType) -> str | None:
-    """One sentence where the library is older than the extension."""
+    """Returns one sentence where the library is older than the extension."""
     own, found = _own_version(), getattr(library, "__version__", "")
     missing = [name for name in NAMES if not hasattr(library, name)]
     if not missing and (not own or _numbers(found) >= _numbers(own)):
@@ -55,7 +56,7 @@ def _age_error(library: ModuleType) -> str | None:
 
 
 def _own_version() -> str:
-    """Of the extension; empty where it lies somewhere without its manifest."""
+    """Returns the version of the extension; empty where its manifest is not beside it."""
     try:
         text = Path(__file__).with_name("blender_manifest.toml").read_text(encoding="utf-8")
         return str(tomllib.loads(text)["version"])
@@ -64,5 +65,5 @@ def _own_version() -> str:
 
 
 def _numbers(version: str) -> tuple[int, ...]:
-    """To compare by: what is no number is less than any."""
+    """Returns numbers for comparison; parts that are not numbers count as less than any number."""
     return tuple(int(part) if part.isdigit() else -1 for part in version.split("."))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .core.errors import SinewError
 
 MARK = "SINEW-STATUS "
-# Runs in the other Blender, in the background, which need not have any of this package.
+# Runs in the other Blender, in the background, which may lack this package.
 _SCRIPT = f"""
 import importlib, json, pathlib, sys, tomllib
 import bpy
@@ -47,7 +47,7 @@ class BlenderStatus:
     program  as given
     blender  its version
     sinew    the extension's version, None without the extension
-    problem  why the extension can not be used there, as the end of a sentence, or None
+    problem  why the extension cannot be used there, as the end of a sentence, or None
     """
 
     program: str
@@ -68,8 +68,8 @@ def blender_status(program: str, limit: float) -> BlenderStatus:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            # A session of its own, so that _end() ends all that it has started, as a script that starts
-            # Blender does.
+            # A separate session, so that _end() ends everything that it has started, such as a Blender
+            # started by a script.
             start_new_session=True,
         )
     except OSError as error:

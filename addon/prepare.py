@@ -25,15 +25,15 @@ def prepare_blender() -> None:
         raise SinewError(reason)
     # Commands compare, save and bake Sinew's own deformation, also of small meshes.
     small_meshes.is_used = False
-    # Most of what they do reads points alone.
+    # Most of what commands do reads points only.
     normals.are_used = False
     if not hasattr(bpy.types.Object, "sinew"):
         registration.register()
 
 
 def leave_blender(status: int) -> NoReturn:
-    """Ends the process without the cleanup of Blender as a module: after an export of glTF, 4.2 crashes in
-    it, and 4.5 can hang."""
+    """Ends the process without Blender's cleanup as a module: after a glTF export, 4.2 crashes in it, and 4.5
+    can hang."""
     import bpy
 
     shutil.rmtree(bpy.app.tempdir, ignore_errors=True)

@@ -32,11 +32,11 @@ def sinew_render(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[...
     """sinew_render(file, golden, method=..., frames=..., tolerance=..., **options) fails where a frame of
     `file` differs from its golden picture.
 
-    file, golden  paths, from the test's own folder
-    method        as of `sinew methods`, or "blender"
+    file, golden  paths, relative to the test's folder
+    method        of `sinew methods`, or "blender"
     frames        such as "1,12,40-48"
     tolerance     percent of the pixels that may differ visibly
-    options       others of `sinew render`: object="Body", size=320, engine="cycles", own_look=True
+    options       other options of `sinew render`: object="Body", size=320, engine="cycles", own_look=True
     """
     here = request.path.parent
     calls = iter(range(1_000_000))
@@ -63,7 +63,7 @@ def sinew_render(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[...
             arguments += ["--against", pictures, "--out", tmp_path / f"render-{next(calls)}"]
             if tolerance is not None:
                 arguments += ["--tolerance", tolerance]
-        # In a process of its own: it opens files, and the test may have one open.
+        # In a separate process: it opens files, and the test may have one open.
         result = subprocess.run(
             [sys.executable, "-c", PROGRAM, *map(str, arguments)],
             stdin=subprocess.DEVNULL,

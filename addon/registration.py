@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers Sinew with Blender, and takes all of it out again."""
+"""Registers Sinew with Blender, and unregisters it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _has_ended = False
 
 def register() -> None:
     if native.load_error() is not None:
-        # Properties would need the list of methods: without the library only the reason is shown, and what
-        # a file has of Sinew stays in it untouched.
+        # Properties need the list of methods: without the library only the reason is shown, and Sinew's data
+        # in files stays untouched.
         from .ui import sidebar
 
         _register_classes((sidebar.SINEW_PT_unavailable,))
@@ -50,7 +50,7 @@ def register() -> None:
         translations,
     )
 
-    # Panels appear in this order.
+    # The order of the panels.
     for owner in (
         *(preferences, properties, stored_vertex_data, character, operators, precomputing),
         *(character_operators, presets, lesson, menus, main_panel, meshes_panel),
@@ -65,7 +65,7 @@ def register() -> None:
     manual.register()
     modifier_panel.register()
     precomputing.register()
-    # Its handlers come first: poses before what they deform.
+    # Its handlers come first: they set poses before these are used to deform.
     inbetween.register()
     handlers.register()
     exporters.register()
@@ -115,15 +115,16 @@ def unregister() -> None:
 
 
 def _end() -> None:
-    """At the end of Python. Blender unregisters its extensions before; with bpy as a module nobody does, and
-    a Python handler, class or command that is still registered then crashes Blender 4.2 and hangs 4.5."""
+    """Called at the end of Python. Blender unregisters its extensions before; with bpy as a module nobody
+    does, and a Python handler, class or command that is still registered then crashes Blender 4.2 and hangs
+    4.5."""
     global _has_ended
-    # Where Blender did, its types are gone by now.
+    # If Blender has unregistered it, its types are gone by now.
     if _registered:
         unregister()
     _has_ended = True
-    # Blender 4.2 keeps a reference to each class of property groups that was registered, which keeps the
-    # names of its module. Blender as a module ends when `bpy` is freed, and crashes where it never is.
+    # Blender 4.2 keeps a reference to each registered property group class, which keeps the names of its
+    # module. Blender as a module ends when `bpy` is freed, and crashes if it never is.
     for name, module in list(sys.modules.items()):
         if name == __package__ or name.startswith(f"{__package__}."):
             vars(module).pop("bpy", None)

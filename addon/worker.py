@@ -22,7 +22,7 @@ Report = Callable[..., None]
 
 
 def run(task: dict, report: Report) -> dict:
-    """Does one task in this process; returns its outcome with the hash of the file that was read."""
+    """Performs one task in this process; returns its outcome with the hash of the file that was read."""
     from .features.bake import bake_apart
     from .jobs.tasks import preflight, reskin
 
@@ -79,7 +79,7 @@ def main() -> None:
 
 @contextmanager
 def _only_on(processors: Collection[int]) -> Iterator[None]:
-    """A context in which this process may use only those processors, if any are given: Blender makes a thread
+    """Context in which this process may use only those processors, if any are given: Blender makes a thread
     for each processor that it finds when it starts."""
     if not processors:
         yield
@@ -95,8 +95,8 @@ def _only_on(processors: Collection[int]) -> Iterator[None]:
 
 
 def _end_with_parent() -> None:
-    """Has the system end this process with its parent, where it can: a Blender that hangs would otherwise
-    outlive a batch that is killed."""
+    """Has the system end this process with its parent, where it can: otherwise a Blender that hangs would
+    outlive a killed batch."""
     if sys.platform == "linux":
         import ctypes
 

@@ -153,7 +153,7 @@ def draw(case: Case, path: Path, out: Path) -> dict[str, Measured]:
     files.open_file(path)
     scene = bpy.context.scene
     evaluate.set_frame(scene, case.frame)
-    meshes, _left_out = evaluate.drivable_meshes(scene, path, ["dq"])
+    meshes, _left_out = evaluate.deformable_meshes(scene, path, ["dq"])
     for obj in meshes:
         obj.vertex_groups.new(name=GROUP).add(range(len(obj.data.vertices)), 0.5, "REPLACE")
     subject = measure.gather(scene, meshes)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts Sinew in the place of an object's Armature modifiers, and takes it away again.
+"""Puts Sinew in the place of an object's Armature modifiers, and takes it off again.
 
-While Sinew is at work, the Armature modifiers stay in the stack, switched off. A saved file is Blender's own:
-there they deform, and Sinew's modifier is off.
+While Sinew deforms, the Armature modifiers stay in the stack, switched off. In a saved file they deform
+instead, and Sinew's modifier is off, so that a Blender without Sinew can play it.
 """
 
 from __future__ import annotations
@@ -28,12 +28,13 @@ from .updates import updates_suspended
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """The armature that deforms a mesh object, by Sinew, by its first Armature modifier or as its parent."""
+    """Returns the armature that deforms a mesh object: by Sinew, by its first Armature modifier or as its
+    parent."""
     if obj.type != "MESH":
         return None
     modifier = armature_modifier(obj)
     if properties.has_sinew(obj) and properties.of(obj).armature is not None:
-        # While Sinew is off, the artist may have chosen another in the modifier.
+        # While Sinew is off, the artist may have chosen another armature in the modifier.
         is_chosen = modifier is not None and modifier.object is not None
         if not (is_chosen and not properties.of(obj).replaces_modifiers):
             return properties.of(obj).armature
@@ -43,8 +44,8 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of `objects` that are meshes deformed by an armature, or that have Sinew; a comparison's copies
-    are none."""
+    """Returns those of `objects` that are meshes deformed by an armature, or that have Sinew, without a
+    comparison's copies."""
     return [
         o
         for o in objects
@@ -56,14 +57,15 @@ def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def not_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of `objects` that an armature deforms and that Sinew leaves to Blender, such as lattices."""
+    """Returns those of `objects` that an armature deforms and that Sinew leaves to Blender, such as
+    lattices."""
     return [
         o for o in objects if o.type != "MESH" and any(m.type == "ARMATURE" and m.object for m in o.modifiers)
     ]
 
 
 def check_can_add(obj: bpy.types.Object) -> None:
-    """Raises SinewError that says why Sinew can not deform a mesh object, and what to do."""
+    """Raises SinewError that says why Sinew cannot deform a mesh object, and what to do."""
     if armature_of(obj) is None:
         raise SinewError(f"{obj.name}: no Armature modifier with an armature; parent the mesh to one first")
     if not obj.is_editable:
@@ -77,10 +79,10 @@ def check_can_add(obj: bpy.types.Object) -> None:
 
 
 def add(obj: bpy.types.Object, method: str | None = None) -> None:
-    """Sinew takes over from the Armature modifiers, each with its method where none is given; with the next
-    session.refresh() it deforms.
+    """Puts Sinew on an object. It deforms after the next session.refresh(). Without `method`, each Armature
+    modifier keeps its own method.
 
-    Raises SinewError, and changes nothing, where that can not be done.
+    Raises SinewError, and changes nothing, where that is not possible.
     """
     if properties.has_sinew(obj):
         if method is not None:
@@ -101,7 +103,7 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
     nodes.show_expanded = False
     nodes.show_in_editmode = False
     _show(nodes, False, False)
-    # Not the last one where the artist pinned others to the end.
+    # Not to the end of the stack, where the artist may have pinned other modifiers.
     modifiers = list(obj.modifiers)
     obj.modifiers.move(modifiers.index(nodes), modifiers.index(run[0]))
     if active is not None:
@@ -116,12 +118,12 @@ def _add(obj: bpy.types.Object, method: str | None) -> None:
 
 
 def method_of(modifier: bpy.types.ArmatureModifier) -> str:
-    """The one that the modifier itself blends by."""
+    """Returns the method of the modifier itself."""
     return "dq" if modifier.use_deform_preserve_volume else "lbs"
 
 
 def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
-    """Turns what the parent type Armature does, which no modifier in the stack shows, into a modifier."""
+    """Makes a modifier of the parent type Armature, which deforms without a modifier in the stack."""
     modifier = obj.modifiers.new("Armature", "ARMATURE")
     obj.modifiers.move(list(obj.modifiers).index(modifier), 0)
     modifier.object = obj.parent
@@ -131,7 +133,7 @@ def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
 
 
 def use_one_method(obj: bpy.types.Object, method: str) -> None:
-    """All Armature modifiers that Sinew replaces blend by `method`."""
+    """Sets `method` for all Armature modifiers that Sinew replaces."""
     settings = properties.of(obj)
     for replaced in settings.replaced_modifiers:
         if replaced.method != properties.SAME_METHOD:
@@ -140,13 +142,14 @@ def use_one_method(obj: bpy.types.Object, method: str) -> None:
 
 
 def remove(obj: bpy.types.Object) -> None:
-    """As take_off(), for the artist.
+    """Takes Sinew off as take_off() does, for the artist.
 
-    Raises SinewError, and changes nothing, where Sinew would be there again once the file is loaded.
+    Raises SinewError, and changes nothing, where Sinew would be back after loading the file.
     """
     nodes = sinew_modifier(obj)
     if obj.override_library is not None and nodes is not None and nodes.is_override_data:
-        # A script can remove it from the override; Blender loads it again, and the Armature modifier twice.
+        # A script can remove it from the override, but then Blender loads it again, and the Armature modifier
+        # twice.
         raise SinewError(
             f"{obj.name}: Sinew comes with it from its library; switch it off here, or remove it there"
         )
@@ -154,7 +157,7 @@ def remove(obj: bpy.types.Object) -> None:
 
 
 def take_off(obj: bpy.types.Object) -> None:
-    """Takes Sinew off: the Armature modifiers are as they were, and nothing of ours stays."""
+    """Takes Sinew off: the Armature modifiers are as before, and nothing of Sinew stays in the file."""
     with updates_suspended():
         _take_off(obj)
     notify(subscribers.after_removal)
@@ -185,7 +188,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def switch(obj: bpy.types.Object, on: bool) -> None:
-    """On: Sinew deforms. Off: the Armature modifiers do, as they were, and Sinew's modifier is off."""
+    """On: Sinew deforms. Off: the Armature modifiers deform as they were, and Sinew's modifier is off."""
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     if on:
         restore_volume(obj)
@@ -208,8 +211,8 @@ def switch(obj: bpy.types.Object, on: bool) -> None:
 
 
 def prepare_for_save(obj: bpy.types.Object) -> bool:
-    """Makes an object as a Blender without Sinew needs it: its Armature modifiers deform, by the shape that
-    is nearest to Sinew's. Whether it was Sinew that deformed it; switch() is the way back."""
+    """Prepares an object for a Blender without Sinew: its Armature modifiers deform, with the shape nearest
+    to Sinew's. Returns whether Sinew deformed it before; switch() reverses this."""
     settings, nodes = properties.of(obj), sinew_modifier(obj)
     was_on = settings.replaces_modifiers
     if not (was_on or settings.enabled):
@@ -217,15 +220,16 @@ def prepare_for_save(obj: bpy.types.Object) -> bool:
     switch(obj, on=False)
     if nodes is not None and nodes.node_group is not None:
         node_group.set_inputs(nodes, {node_group.PRESENT: False})
-    # What was set for a mode can be another than what is nearest.
+    # What was set for a mode may not be the nearest.
     restore_volume(obj)
     use_nearest_volume(obj)
     return was_on
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
-    """While the Armature modifiers deform, in a saved file and in modes whose tools need them, their Preserve
-    Volume is what is nearest to Sinew's method. Set once: what the artist switches meanwhile stays."""
+    """Sets the Armature modifiers' Preserve Volume to what is nearest to Sinew's method, while they deform:
+    in a saved file, and in modes whose tools need them. Set once: what the artist switches meanwhile
+    stays."""
     settings = properties.of(obj)
     pairs = replaced_modifiers(obj)
     nearest = [
@@ -236,7 +240,7 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         before = [replaced.preserve_volume == replaced.was_nearest for _modifier, replaced in pairs]
         if nearest == before:
             return
-        # The method is another now.
+        # The method has changed since.
         restore_volume(obj)
     for (modifier, replaced), wanted in zip(pairs, nearest, strict=True):
         own = modifier.use_deform_preserve_volume
@@ -247,20 +251,20 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
 
 
 def restore_volume(obj: bpy.types.Object) -> None:
-    """The Armature modifiers have the artist's own Preserve Volume again."""
+    """Gives the Armature modifiers the artist's own Preserve Volume again."""
     settings = properties.of(obj)
     if not settings.has_nearest_volume:
         return
     for replaced in settings.replaced_modifiers:
         modifier = stack.modifier_of(obj, replaced)
-        # What the artist has switched since is the artist's own, too.
+        # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
             _preserve_volume(modifier, replaced.preserve_volume)
     properties.store(settings, "is_saved", False)
 
 
 def has_switched_volume(obj: bpy.types.Object) -> bool:
-    """Whether one of the Armature modifiers has another Preserve Volume for now than the artist's."""
+    """Whether one of the Armature modifiers has another Preserve Volume than the artist's at the moment."""
     settings = properties.of(obj)
     return settings.has_nearest_volume and not all(each.was_nearest for each in settings.replaced_modifiers)
 
@@ -271,18 +275,18 @@ def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> No
 
 
 def _switch_off(obj: bpy.types.Object) -> None:
-    """Also those that the artist added or switched on since."""
+    """Switches the Armature modifiers off, also those that the artist added or switched on since."""
     for modifier, replaced in replaced_modifiers(obj):
         ours = ((False, False), (replaced.show_viewport, False))
         flags = (modifier.show_viewport, modifier.show_render)
         if not properties.of(obj).replaces_modifiers or flags not in ours or replaced.visibility_is_keyed:
             properties.store(replaced, "show_viewport", modifier.show_viewport)
             properties.store(replaced, "show_render", modifier.show_render)
-        # What an animation sets, it would set again with the next frame; until then it counts.
+        # An animation would set the flags again at the next frame; until then Sinew's values would stay.
         is_keyed = is_visibility_animated(obj, modifier)
         if is_keyed and properties.of(obj).replaces_modifiers and not replaced.visibility_is_keyed:
             _restore_unkeyed_visibility(obj, modifier, replaced)
-        # While the object is hidden, no animation sets what Sinew has switched off.
+        # While the object is hidden, no animation sets flags that Sinew has switched off.
         if not is_keyed or obj.visible_get():
             properties.store(replaced, "visibility_is_keyed", is_keyed)
         if not is_keyed:
@@ -292,7 +296,8 @@ def _switch_off(obj: bpy.types.Object) -> None:
 def _restore_visibility(
     modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
 ) -> None:
-    """What an animation sets, or has set last, Sinew did not change."""
+    """Restores the flags, unless an animation sets them or has set them last: then Sinew did not change
+    them."""
     if not replaced.visibility_is_keyed:
         _show(modifier, replaced.show_viewport, replaced.show_render)
 
@@ -300,7 +305,7 @@ def _restore_visibility(
 def _restore_unkeyed_visibility(
     obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier, replaced: properties.SinewReplacedModifier
 ) -> None:
-    """Where an animation sets one of the flags from now on, the other is the artist's own again."""
+    """Restores a flag that is not animated where an animation sets the other one from now on."""
     for name in ("show_viewport", "show_render"):
         if not is_animated(obj, modifier, name) and getattr(modifier, name) != getattr(replaced, name):
             setattr(modifier, name, getattr(replaced, name))
@@ -308,7 +313,7 @@ def _restore_unkeyed_visibility(
 
 def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> None:
     for name, value in (("show_viewport", viewport), ("show_render", render)):
-        # Setting what is set has Blender evaluate the object, too.
+        # Setting an unchanged value makes Blender evaluate the object, too.
         if modifier is not None and getattr(modifier, name) != value:
             setattr(modifier, name, value)
 
@@ -316,7 +321,7 @@ def _show(modifier: bpy.types.Modifier | None, viewport: bool, render: bool) -> 
 def _replaced_modifier(
     obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier
 ) -> properties.SinewReplacedModifier:
-    """What Sinew keeps of an Armature modifier, made where it is missing."""
+    """Returns what Sinew stores about an Armature modifier, and makes it where it is missing."""
     replaced_modifiers = properties.of(obj).replaced_modifiers
     found = next((s for s in replaced_modifiers if stack.modifier_of(obj, s) == modifier), None)
     if found is None:
@@ -331,20 +336,21 @@ def _replaced_modifier(
 def replaced_modifiers(
     obj: bpy.types.Object,
 ) -> list[tuple[bpy.types.ArmatureModifier, properties.SinewReplacedModifier]]:
-    """The Armature modifiers that Sinew replaces, in their order, and what it keeps of each."""
+    """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
+    it."""
     run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers
     count = len(kept)
     pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
     if len(kept) != count:
-        # To add one has Blender move those before it in memory.
+        # Adding one makes Blender move the earlier ones in memory.
         pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
     return pairs
 
 
 def follow_stack(obj: bpy.types.Object) -> None:
-    """Brings Sinew's modifier and what it keeps of the Armature modifiers in line with how the artist moved,
-    renamed and deleted modifiers. Each keeps its method; one that no longer follows the first without a gap
-    deforms by itself again."""
+    """Follows the artist's changes of the stack, where modifiers were moved, renamed or deleted. Each
+    Armature modifier keeps its method; one that no longer follows the first without a gap deforms by itself
+    again."""
     settings = properties.of(obj)
     _position_modifier(obj)
     kept = settings.replaced_modifiers
@@ -368,8 +374,8 @@ def follow_stack(obj: bpy.types.Object) -> None:
 
 
 def _position_modifier(obj: bpy.types.Object) -> None:
-    """In front of the Armature modifiers that it replaces; behind them where they can be on beside
-    it, as it moves each vertex to its point whatever came before."""
+    """Moves Sinew's modifier before the Armature modifiers that it replaces; or behind them where they can be
+    on at the same time, as it sets each vertex to its point regardless of the modifiers before it."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     own, first, last = modifiers.index(nodes), modifiers.index(run[0]), modifiers.index(run[-1])
     if keeps_modifiers_on(obj) or stack.visibility_is_animated(obj) or _is_chained_to_parent(obj):
@@ -380,8 +386,8 @@ def _position_modifier(obj: bpy.types.Object) -> None:
 
 
 def keep_out_of_chain(obj: bpy.types.Object) -> None:
-    """While the Armature modifiers deform, Sinew's is not among them: Blender does not chain Multi Modifiers
-    across another one, be it off."""
+    """Moves Sinew's modifier out of the Armature modifiers while these deform: Blender does not chain Multi
+    Modifiers across another modifier, even one that is off."""
     run, nodes, modifiers = stack.armature_modifiers(obj), sinew_modifier(obj), list(obj.modifiers)
     if nodes is None or not run:
         return
@@ -391,19 +397,19 @@ def keep_out_of_chain(obj: bpy.types.Object) -> None:
 
 
 def _is_chained_to_parent(obj: bpy.types.Object) -> bool:
-    """Whether the first Armature modifier is a Multi Modifier to a parent that deforms, too."""
+    """Whether the first Armature modifier is a Multi Modifier, and the parent deforms, too."""
     first = armature_modifier(obj)
     return first is not None and first.use_multi_modifier and stack.parent_deforms(obj)
 
 
 def keeps_modifiers_on(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifiers stay on in the viewport, in front of Sinew's: tools for weights look
-    there for the bones that deform."""
+    """Whether the Armature modifiers stay on in the viewport, before Sinew's: tools for weights find the
+    deforming bones through them."""
     return obj.mode == "WEIGHT_PAINT" and not stack.visibility_is_animated(obj)
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:
-    """What each Armature modifier that Sinew replaces blends by, by its name."""
+    """Returns the method of each Armature modifier that Sinew replaces, by the modifier's name."""
     return {
         replaced.name: properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
         for number, replaced in enumerate(settings.replaced_modifiers)
@@ -418,7 +424,7 @@ def adopt_pointers(obj: bpy.types.Object) -> None:
 
 
 def restore_pointers(obj: bpy.types.Object) -> None:
-    """The Armature modifiers point to their armatures again."""
+    """Makes the Armature modifiers point to their armatures again."""
     for modifier, replaced in replaced_modifiers(obj):
         _restore_pointer(modifier, replaced)
 
@@ -434,12 +440,12 @@ def _restore_pointer(
 
 
 def is_deleted(armature: bpy.types.Object) -> bool:
-    """Whether the user deleted it: that takes an object out of all collections, and Sinew's pointer alone
-    still keeps it in the file."""
+    """Whether the user deleted it: it is then in no collection, and only Sinew's pointer keeps it in the
+    file."""
     return armature.library is None and not armature.users_collection
 
 
 def restore_builtin(obj: bpy.types.Object) -> None:
-    """The Armature modifiers point to their armatures again, and no driver of ours does."""
+    """Makes the Armature modifiers point to their armatures again, and removes Sinew's driver."""
     restore_pointers(obj)
     pose_driver.remove(obj)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Corrective Smooth right behind the Armature modifiers, in whose place the stage delta_mush can smooth: it
-then stays in the stack, switched off while Sinew deforms."""
+"""A Corrective Smooth directly behind the Armature modifiers can be replaced by the stage delta_mush: it then
+stays in the stack, switched off while Sinew deforms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..core.phrases import Phrase, phrase
 from ..io.animation_paths import animated_paths
 from . import properties, stack, stage_settings, upstream_proxy
 
-# By the parameters of the stage.
+# The modifier's property for each parameter of the stage.
 NAMES = {
     "iterations": "iterations",
     "factor": "factor",
@@ -25,13 +25,13 @@ NAMES = {
 
 
 def candidate(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
-    """The first one behind the Armature modifiers that is on."""
+    """Returns the first active Corrective Smooth behind the Armature modifiers, or None."""
     found = (m for m in stack.downstream(obj) if m.type == "CORRECTIVE_SMOOTH" and stack.is_on(m))
     return next(found, None)
 
 
 def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> str:
-    """One sentence where the stage would not have exactly the modifier's shape, else empty."""
+    """Returns a sentence where the stage would not give exactly the modifier's shape, else ""."""
     between = _between(obj, modifier)
     path = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
     beyond = _beyond_bounds(modifier)
@@ -52,7 +52,7 @@ def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier)
 
 
 def _between(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
-    """The names of those that are on in front of it, behind the Armature modifiers."""
+    """Returns the names of the active modifiers between it and the Armature modifiers."""
     behind = stack.downstream(obj)
     return [m.name for m in behind[: behind.index(modifier)] if stack.is_on(m)]
 
@@ -66,7 +66,7 @@ def _beyond_bounds(modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
 
 
 def _has_other_vertices(obj: bpy.types.Object) -> bool:
-    """Whether modifiers in front change how many there are."""
+    """Whether upstream modifiers change the number of vertices."""
     if properties.of(obj).upstream_proxy is None:
         return False
     mesh = upstream_proxy.evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get())
@@ -74,9 +74,9 @@ def _has_other_vertices(obj: bpy.types.Object) -> bool:
 
 
 def take_over(obj: bpy.types.Object) -> None:
-    """The stage smooths as the modifier did, which is off from the next session.refresh() on.
+    """Has the stage smooth as the modifier did; the modifier is off from the next session.refresh() on.
 
-    Raises SinewError, and changes nothing, where that would not be the same shape.
+    Raises SinewError, and changes nothing, where the shape would differ.
     """
     modifier = candidate(obj)
     if modifier is None:
@@ -99,7 +99,7 @@ def take_over(obj: bpy.types.Object) -> None:
 
 
 def _values(modifier: bpy.types.CorrectiveSmoothModifier) -> dict[str, Any]:
-    """The parameters of the stage that smooth as the modifier does."""
+    """Returns the parameters with which the stage smooths as the modifier does."""
     values = {name: getattr(modifier, of_modifier) for name, of_modifier in NAMES.items()}
     return values | {
         "radius": 0.0,
@@ -109,13 +109,13 @@ def _values(modifier: bpy.types.CorrectiveSmoothModifier) -> dict[str, Any]:
 
 
 def stage_values(obj: bpy.types.Object) -> Mapping[str, Mapping[str, Any]]:
-    """What the modifiers of the object without Sinew smooth by, as core.stages.StageValues."""
+    """Returns how the object's modifiers without Sinew smooth, as core.stages.StageValues."""
     modifier = replaced_modifier(obj)
     return {} if modifier is None else {"delta_mush": _values(modifier)}
 
 
 def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
-    """The one that was taken over, however it was moved and renamed; else one of its name."""
+    """Returns the modifier that was taken over, even if it was moved and renamed; else one of its name."""
     replaced = properties.of(obj).replaced_smooth
     smooths = [modifier for modifier in obj.modifiers if modifier.type == "CORRECTIVE_SMOOTH"]
     if not replaced.name:
@@ -125,12 +125,12 @@ def replaced_modifier(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifi
 
 
 def switch(obj: bpy.types.Object, on: bool) -> None:
-    """The one that was taken over as it was, or off."""
+    """On: the modifier that was taken over has its own flags. Off: it is off."""
     modifier, replaced = replaced_modifier(obj), properties.of(obj).replaced_smooth
     if modifier is None:
         return
     wanted = (replaced.show_viewport, replaced.show_render) if on else (False, False)
     for name, value in zip(("show_viewport", "show_render"), wanted, strict=True):
-        # Setting what is set has Blender evaluate the object, too.
+        # Setting an unchanged value makes Blender evaluate the object, too.
         if getattr(modifier, name) != value:
             setattr(modifier, name, value)

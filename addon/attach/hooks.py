@@ -9,9 +9,10 @@ from ..core.phrases import phrase
 from . import stack
 
 
-def misled(obj: bpy.types.Object) -> list[str]:
-    """A sentence for each Hook behind that has a list of vertices. Behind Geometry Nodes, as behind all that
-    do more than deform, Blender takes as many of the first vertices instead (seen on 4.2 to 5.2)."""
+def warnings(obj: bpy.types.Object) -> list[str]:
+    """Returns a sentence for each downstream Hook with a list of vertices. Behind Geometry Nodes, and all
+    other modifiers that do more than deform, Blender uses the first vertices, as many as are in the list,
+    instead (seen on 4.2 to 5.2)."""
     return [
         phrase(
             "{name}: behind Sinew's modifier, Blender moves other vertices than those assigned to this Hook; "

@@ -9,15 +9,15 @@ import sinew
 
 
 def method_items(first_number: int = 0) -> list[tuple[str, str, str, int]]:
-    """Blender shows an item without identifier as a heading. A property of these needs a default: else it
-    would be the first heading.
+    """Returns the items. Blender shows an item without identifier as a heading. A property with these items
+    needs a default: otherwise it would be the first heading.
 
     first_number  added to the numbers of methods, which start at 1
     """
     items = []
     groups = groupby(sinew.methods(), lambda method: method.group)
     for number, (group, methods) in enumerate(groups, start=1):
-        # No value of a property: those are not negative.
+        # Negative, so never the value of a property.
         items.append(("", group, "", -number))
         items += [(m.name, m.label, m.description, m.number + first_number) for m in methods]
     return items

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an Armature modifier's options mean for Sinew, and which it does not reproduce."""
+"""What an Armature modifier's options mean for Sinew, and which options it does not reproduce."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ModifierOptions:
 
     @staticmethod
     def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
-        """The same, in order, to compare quickly."""
+        """Returns the same values in the same order, for quick comparison."""
         return (
             modifier.use_vertex_groups,
             modifier.use_bone_envelopes,
@@ -43,15 +43,16 @@ class ModifierOptions:
         )
 
     def weighting(self, obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> Weighting:
-        """What deforms the mesh: its groups that have a bone, or none where the modifier leaves them."""
+        """Returns what deforms the mesh: its groups that have a bone, or no groups where the modifier does
+        not use them."""
         names = [group.name for group in obj.vertex_groups]
         bone_of_group = bones.of_groups(names) if self.use_vertex_groups else np.full(len(names), -1)
         return Weighting(bones, entries_of_bones(weights, bone_of_group), self.use_envelopes)
 
     def mask_weights(self, obj: bpy.types.Object, weights: GroupWeights) -> np.ndarray | None:
-        """float32 [vertices], the share of the deformation each vertex takes; None for all of it.
+        """Returns float32 [vertices], the share of the deformation that each vertex gets; None for all of it.
 
-        A mask that names no group, or on a mesh without any weights, is ignored, as Blender does.
+        As in Blender, a mask is ignored if its group is missing or if the mesh has no weights.
         """
         group = obj.vertex_groups.get(self.mask) if self.mask else None
         if group is None or len(weights.groups) == 0:
@@ -61,7 +62,7 @@ class ModifierOptions:
 
 
 def differences(obj: bpy.types.Object) -> list[str]:
-    """A sentence for each thing that the modifiers do and Sinew does not."""
+    """Returns a sentence for each thing that the modifiers do and Sinew does not."""
     found = []
     skinned = stack.armature_modifiers(obj)
     others = [m for m in obj.modifiers if m.type == "ARMATURE" and m not in skinned and m.object is not None]

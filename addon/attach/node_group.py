@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group "Sinew": moves each vertex to its point in an attribute or in a point buffer.
+"""The Geometry Nodes group "Sinew": sets each vertex to its point, from an attribute or from a point buffer.
 
-One that also gives normals is another group: a mesh whose normals Blender computes has no nodes for them.
+There are separate groups with and without normals: without, a mesh whose normals Blender computes has no
+nodes for them.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ import bpy
 
 from ..io import mesh_io
 
-# A custom property on the group, so that a renamed or copied group is still known as ours; its value tells
-# where the group finds the points.
+# A custom property on the group, by which a renamed or copied group is recognised; its value says where the
+# group gets the points.
 MARK = "sinew_node_group"
 ATTRIBUTE, POINT_BUFFER = 10, 11
-# Added to it where the group gives normals of this domain.
+# Added to the value where the group gives normals of this domain.
 _WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40}
-# Where the attribute of normals is named.
+# The input with the name of the normals attribute.
 NORMALS = "Normals"
-# Whether they are given in renders, too.
+# The input that says whether normals are given in renders, too.
 IN_RENDERS = "Normals in Renders"
-# An input that no node reads; pose_driver has its driver there.
+# An input that no node reads; pose_driver puts its driver there.
 POSE = "Pose"
 # An input that is off in saved files: without Sinew the group then says what is missing.
 PRESENT = "Sinew Is There"
@@ -29,7 +30,7 @@ MISSING = (
     "Armature modifier shows the nearest shape that Blender has."
 )
 
-# The inputs that name a helper, or where there is none, an attribute.
+# Inputs that name a helper object, or an attribute where there is no helper.
 _HELPER_INPUTS = ("Points", "Front")
 
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
@@ -45,11 +46,11 @@ def find(kind: int) -> bpy.types.NodeTree | None:
 
 
 def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
-    """The group that takes points from an ATTRIBUTE or from a POINT_BUFFER.
+    """Returns the group that takes points from an ATTRIBUTE or from a POINT_BUFFER.
 
-    normals  the domain of those that it takes too, POINT or CORNER; empty for none. Blender 4.5 and later
+    normals  the domain of normals that it also takes, POINT or CORNER; empty for none. Needs Blender 4.5
     """
-    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_carrier
+    make = _make_for_attribute if kind == ATTRIBUTE else _make_for_buffer
     return find(kind + _WITH_NORMALS[normals]) or make(normals)
 
 
@@ -63,15 +64,15 @@ def remove_unused() -> None:
     def unused() -> list[bpy.types.NodeTree]:
         return [g for g in bpy.data.node_groups if g.get(MARK) and g.library is None and g.users == 0]
 
-    # One group can be all that uses another.
+    # Removing one group can leave another unused.
     while groups := unused():
         for group in groups:
             bpy.data.node_groups.remove(group)
 
 
 def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
-    """Gives a Sinew modifier its inputs, by name; those that it has already are not set, as every change
-    makes Blender evaluate the object."""
+    """Sets inputs of a Sinew modifier by name. Unchanged ones are not set, as every change makes Blender
+    evaluate the object."""
     changed = [name for name, value in values.items() if get_input(modifier, name) != value]
     for name in changed:
         identifier = _identifier(modifier, name)
@@ -80,12 +81,13 @@ def set_inputs(modifier: bpy.types.Modifier, values: dict[str, object]) -> None:
         else:
             modifier[identifier] = values[name]
     if changed:
-        # Setting an input has Blender neither evaluate the object nor wait for another one.
+        # Setting an input alone makes Blender neither evaluate the object nor add the dependency on an input
+        # object.
         modifier.node_group = modifier.node_group
 
 
 def get_input(modifier: bpy.types.Modifier, name: str) -> object:
-    """None where the modifier has no such input."""
+    """Returns None where the modifier has no such input."""
     identifier = _identifier(modifier, name)
     if identifier is None:
         return None
@@ -95,13 +97,13 @@ def get_input(modifier: bpy.types.Modifier, name: str) -> object:
 
 
 def forget_helpers(modifier: bpy.types.Modifier) -> None:
-    """Its inputs name no object."""
+    """Clears the inputs that name an object."""
     named = [n for n in _HELPER_INPUTS if isinstance(get_input(modifier, n), bpy.types.Object)]
     set_inputs(modifier, dict.fromkeys(named))
 
 
 def input_path(modifier: bpy.types.Modifier, name: str) -> str:
-    """The path of an input from the modifier's object, for a driver."""
+    """Returns the data path of an input, relative to the modifier's object, for a driver."""
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
@@ -125,7 +127,7 @@ def _identifier(modifier: bpy.types.Modifier, name: str) -> str | None:
 def new_group(name: str, kind: int, inputs: dict[str, tuple[str, str]]) -> bpy.types.NodeTree:
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[MARK] = kind
-    # Blender's menu of modifiers must not offer it: on other objects it does nothing.
+    # Keeps it out of Blender's menu of modifiers: on other objects it does nothing.
     group.is_modifier = False
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     for socket, (socket_type, description) in inputs.items():
@@ -155,7 +157,7 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
             PRESENT: PRESENT_SOCKET,
         },
     )
-    # Set Position would add an offset to each point.
+    # Not Set Position, which would compute an offset for each point.
     source, named, place, remove, result = add_nodes(
         group,
         "NodeGroupInput",
@@ -169,9 +171,10 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
     group.links.new(source.outputs["Points"], named.inputs["Name"])
     group.links.new(source.outputs["Geometry"], place.inputs["Geometry"])
     group.links.new(named.outputs["Attribute"], enabled_socket(place.inputs, "Value"))
-    # A mesh without the attribute keeps its shape instead of falling into the origin.
+    # A mesh without the attribute keeps its shape instead of collapsing to the origin.
     group.links.new(named.outputs["Exists"], place.inputs["Selection"])
-    # Else a subdivision behind would work it out for each of its vertices, and exports would have it.
+    # Removed, as a subdivision behind would interpolate it for each of its vertices, and exports would
+    # contain it.
     group.links.new(source.outputs["Points"], remove.inputs["Name"])
     group.links.new(place.outputs["Geometry"], remove.inputs["Geometry"])
     moved = remove.outputs["Geometry"]
@@ -204,8 +207,8 @@ def _with_normals(
     in_renders: bpy.types.NodeSocket,
     domain: str,
 ) -> bpy.types.NodeSocket:
-    """The geometry with these normals; as it is where the first of them is 0: then Sinew gave none. As it is
-    also in renders, where they are not for these."""
+    """Returns the geometry with these normals; unchanged where the first normal is 0, which means that Sinew
+    gave none, and in renders where the normals are for the viewport only."""
     length, is_given, view, is_here, both, give, choice = add_nodes(
         group,
         "ShaderNodeVectorMath",
@@ -242,7 +245,7 @@ def _sample(
     domain: str,
     index: bpy.types.NodeSocket | None = None,
 ) -> bpy.types.NodeSocket:
-    """A vector of another or the same geometry, at an index; the first where that is None."""
+    """Returns a vector of another or the same geometry at an index; the first one where the index is None."""
     (sample,) = add_nodes(group, "GeometryNodeSampleIndex")
     sample.data_type, sample.domain = "FLOAT_VECTOR", domain
     group.links.new(geometry, sample.inputs["Geometry"])
@@ -256,7 +259,7 @@ def _name(name: str, normals: str) -> str:
     return f"{name} with {normals.title()} Normals" if normals else name
 
 
-def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
+def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
     group = new_group(
         _name("Sinew Carrier", normals),
         POINT_BUFFER + _WITH_NORMALS[normals],
@@ -285,7 +288,7 @@ def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
     buffer, stored = info.outputs["Geometry"], position.outputs["Position"]
     link(_sample(group, buffer, stored, "POINT", index.outputs["Index"]), place.inputs["Position"])
     link(source.outputs["Geometry"], place.inputs["Geometry"])
-    # Where the numbers of vertices differ, as before the first points are written, the shape stays as it is.
+    # Where the number of vertices differs, as before the first points are written, the shape is unchanged.
     fits = same_count(group, source.outputs["Geometry"], buffer, normals)
     link(fits, place.inputs["Selection"])
     moved = place.outputs["Geometry"]
@@ -293,7 +296,7 @@ def _make_for_carrier(normals: str) -> bpy.types.NodeTree:
         moved = _take_normals_of_buffer(
             group, source, moved, buffer, stored, index.outputs["Index"], fits, normals
         )
-    # Never taken: naming the object in a node is what makes Blender evaluate it.
+    # This switch is never on: a node that names the object makes Blender evaluate it.
     upstream_proxy, choice = add_nodes(group, "GeometryNodeObjectInfo", "GeometryNodeSwitch")
     choice.input_type = "GEOMETRY"
     link(source.outputs["Front"], upstream_proxy.inputs["Object"])
@@ -313,7 +316,7 @@ def _take_normals_of_buffer(
     fits: bpy.types.NodeSocket,
     domain: str,
 ) -> bpy.types.NodeSocket:
-    """The buffer's vertices behind the points are the normals."""
+    """Takes the normals from the buffer's vertices behind the points."""
     size, behind, choice = add_nodes(
         group, "GeometryNodeAttributeDomainSize", "FunctionNodeIntegerMath", "GeometryNodeSwitch"
     )
@@ -334,8 +337,8 @@ def _take_normals_of_buffer(
 def _say_what_is_missing(
     group: bpy.types.NodeTree, source: bpy.types.Node, geometry: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
-    """For those who open the file without Sinew: a frame in the node editor and, from Blender 4.3 on, a
-    warning at the modifier. Returns what the group is to give."""
+    """Adds a message for those who open the file without Sinew: a frame in the node editor and, from Blender
+    4.3 on, a warning at the modifier. Returns the geometry for the group's output."""
     frame = group.nodes.new("NodeFrame")
     frame.label, frame.label_size = MISSING, 20
     frame.location = (0, 300)
@@ -349,7 +352,7 @@ def _say_what_is_missing(
     link = group.links.new
     link(source.outputs[PRESENT], missing.inputs[0])
     link(missing.outputs[0], warning.inputs["Show"])
-    # A warning that nothing reads is not evaluated.
+    # Blender does not evaluate a warning whose output is not used.
     link(warning.outputs["Show"], choice.inputs["Switch"])
     link(geometry, choice.inputs["False"])
     link(geometry, choice.inputs["True"])
@@ -359,9 +362,9 @@ def _say_what_is_missing(
 def same_count(
     group: bpy.types.NodeTree, mesh: bpy.types.NodeSocket, buffer: bpy.types.NodeSocket, normals: str = ""
 ) -> bpy.types.NodeSocket:
-    """Whether a buffer has as many vertices as a mesh.
+    """Returns a socket that says whether a buffer has as many vertices as a mesh.
 
-    normals  and as many more as that has elements of this domain
+    normals  the domain whose number of elements in the mesh is added; empty for none
     """
     of_mesh, of_buffer, equal = add_nodes(
         group, "GeometryNodeAttributeDomainSize", "GeometryNodeAttributeDomainSize", "FunctionNodeCompare"
@@ -383,5 +386,5 @@ def same_count(
 
 
 def enabled_socket(sockets: bpy.types.bpy_prop_collection, name: str) -> bpy.types.NodeSocket:
-    """A socket of a node that has one of that name for each type of data."""
+    """Returns the enabled socket of a node that has several sockets of that name, one for each data type."""
     return next(socket for socket in sockets if socket.name == name and socket.enabled)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether Sinew can give an object its normals with the points, and which: changes nothing.
+"""Decides whether Sinew can give an object its normals along with the points, and which. Changes nothing.
 
-Blender then has them as free custom normals of the evaluated mesh and computes none. They draw it as
-Blender's own do. But modifiers behind would move points and keep the normals, and what takes over the mesh
-with its attributes would have them too. And some of Blender's are means of the given ones then (seen on 4.5
-and 5.2): the normal of a face, and that of a vertex where the corners have their own.
+Blender then has them as free custom normals of the evaluated mesh and computes none. They draw the mesh as
+Blender's own normals do. But downstream modifiers could move points and keep the normals, and anything that
+copies the mesh with its attributes would copy them, too. And some of Blender's normals are then means of the
+given ones (seen on 4.5 and 5.2): the normal of a face, and that of a vertex where the corners have their own.
 
-In front of Sinew's modifier may stand what leaves a mesh whose faces and sharp edges Sinew has read: they
-stay, or are read again with the weights. Weighted Normal and Normal Edit are not evaluated apart, so nobody
-knows what they make.
+Upstream modifiers are no obstacle if Sinew knows the faces and sharp edges that they make: these stay the
+same, or are read again along with the weights. Weighted Normal and Normal Edit are not part of the upstream
+proxy, so Sinew does not know their result.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ..io import mesh_io
 from ..io.animation_paths import is_animated, is_visibility_animated
 from . import node_group, properties, stack, upstream_proxy
 
-# False: of objects with normals as Blender computes them it computes them itself, when somebody reads them.
+# False: Sinew leaves normals of the setting As Blender to Blender, which computes them when they are read.
 are_used = True
-# Set Mesh Normal has free normals.
+# The node Set Mesh Normal can set free normals.
 ARE_SUPPORTED = bpy.app.version >= (4, 5)
-# Behind Sinew's modifier these neither read nor change normals, points and faces.
-HARMLESS_BEHIND = {
+# Downstream, these neither read nor change normals, points and faces.
+HARMLESS_DOWNSTREAM = {
     "COLLISION",
     "UV_PROJECT",
     "UV_WARP",
@@ -35,7 +35,7 @@ HARMLESS_BEHIND = {
     "VERTEX_WEIGHT_MIX",
     "VERTEX_WEIGHT_PROXIMITY",
 }
-# In front of it these keep faces, sharp edges and custom normals as they are: they move points at most.
+# Upstream, these keep faces, sharp edges and custom normals: they move points at most.
 _KEEPS_SHADING = {
     "ARMATURE",
     "CAST",
@@ -58,36 +58,37 @@ _KEEPS_SHADING = {
 }
 # These make the same faces and sharp edges whatever the points are, but other custom normals.
 _KEEPS_FACES = {"ARRAY", "MASK", "MIRROR", "SOLIDIFY", "SUBSURF"}
-# Modifiers and constraints that read another object's normals or take over its attributes; how they name it.
+# Modifiers and constraints that read another object's normals or copy its attributes, and their properties
+# that name it.
 READERS = {"BOOLEAN", "DATA_TRANSFER", "NODES", "SHRINKWRAP"}
 _POINTERS = ("object", "collection", "target", "auxiliary_target")
 
 
 class Kind(Enum):
-    """Of the normals of a mesh, by what they take to compute."""
+    """The normals of a mesh, by what has to be computed for them."""
 
     VERTEX = "vertex"
     CORNER = "corner"  # some edges or faces are sharp
-    CUSTOM = "custom"  # of corners, in relation to the computed ones
+    CUSTOM = "custom"  # of corners, stored relative to the computed ones
 
 
 def are_given(settings: properties.SinewSettings) -> bool:
-    """Whether Sinew is to give an object its normals, as far as that is a choice."""
+    """Whether the settings let Sinew give an object its normals."""
     return settings.normals == properties.SKINNED_NORMALS or (
         are_used and settings.normals == properties.AS_BLENDER
     )
 
 
 def kind_of(mesh: bpy.types.Mesh, domain: str) -> Kind | None:
-    """domain  as domain_of()"""
+    """domain: as from domain_of()."""
     if domain and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is not None:
         return Kind.CUSTOM
     return {"POINT": Kind.VERTEX, "CORNER": Kind.CORNER}.get(domain)
 
 
 def domain_of(mesh: bpy.types.Mesh) -> str:
-    """Which normals draw the mesh, POINT or CORNER; empty where Blender is to compute them: of flat meshes,
-    which takes it no longer than to be given them, and where custom normals are free already."""
+    """Returns the domain of the normals that draw the mesh, POINT or CORNER. Empty where Blender has to
+    compute them: for flat meshes, where giving normals saves no time, and for free custom normals."""
     if not ARE_SUPPORTED or mesh.is_editmode:
         return ""
     attribute = mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS)
@@ -98,8 +99,9 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
 
 
 def obstacle(obj: bpy.types.Object) -> str:
-    """Why Blender has to compute the normals of a skinned object, as a clause; empty where it need not."""
-    known = _known_in_front(obj)
+    """Returns why Blender has to compute the normals of a skinned object, as a clause; empty where it need
+    not."""
+    known = _known_upstream(obj)
     for modifier in stack.upstream(obj):
         if modifier.type not in known and stack.can_be_on(obj, modifier):
             return phrase("{name} is in front", name=modifier.name)
@@ -113,25 +115,26 @@ def obstacle(obj: bpy.types.Object) -> str:
 
 
 def is_for_viewport_alone(obj: bpy.types.Object) -> bool:
-    """Whether Blender has to compute the normals in renders, for a modifier behind that is on there."""
+    """Whether Blender has to compute the normals in renders, for a downstream modifier that is on only
+    there."""
     return bool(_needing(obj, in_renders=True))
 
 
-def _known_in_front(obj: bpy.types.Object) -> set[str]:
-    """Types of modifiers in front whose result Sinew reads often enough."""
+def _known_upstream(obj: bpy.types.Object) -> set[str]:
+    """Returns the types of upstream modifiers whose result Sinew reads often enough."""
     if upstream_proxy.changes_weights(obj):
-        # Then all is read again with each frame that changes it.
+        # Then everything is read again in each frame that changes it.
         return _KEEPS_SHADING | _KEEPS_FACES | upstream_proxy.WEIGHT_CHANGERS
     has_custom = mesh_io.find_attribute(obj.data, mesh_io.CUSTOM_NORMALS) is not None
     return _KEEPS_SHADING if has_custom else _KEEPS_SHADING | _KEEPS_FACES
 
 
 def _needing(obj: bpy.types.Object, in_renders: bool) -> list[bpy.types.Modifier]:
-    """The modifiers behind that need or change normals, as far as they can be on."""
+    """Returns the downstream modifiers that need or change normals and can be on."""
     return [
         modifier
         for modifier in stack.downstream(obj)
-        if modifier.type not in HARMLESS_BEHIND and _can_be_on(obj, modifier, in_renders)
+        if modifier.type not in HARMLESS_DOWNSTREAM and _can_be_on(obj, modifier, in_renders)
     ]
 
 
@@ -154,14 +157,14 @@ def may_read_meshes(obj: bpy.types.Object) -> bool:
 
 
 def is_read_by_others(obj: bpy.types.Object) -> bool:
-    """Whether another object reads, or may read, its evaluated mesh, itself or as one of a collection."""
+    """Whether another object reads, or may read, its evaluated mesh, directly or through a collection."""
     sources = {obj, *_collections_of(obj)}
     users = {user for found in bpy.data.user_map(subset=sources).values() for user in found} - {obj}
     return any(_reads(user, sources) for user in users)
 
 
 def _collections_of(obj: bpy.types.Object) -> set[bpy.types.Collection]:
-    """Those that it is in, and those that these are in."""
+    """Returns the collections that it is in, and the parents of these."""
     found, known = set(obj.users_collection), set()
     while found:
         known |= found
@@ -170,7 +173,7 @@ def _collections_of(obj: bpy.types.Object) -> set[bpy.types.Collection]:
 
 
 def _reads(user: bpy.types.ID, sources: set[bpy.types.ID]) -> bool:
-    # Hair curves name the mesh that they grow on.
+    # Hair curves refer to the mesh that they grow on.
     if isinstance(user, bpy.types.GeometryNodeTree | bpy.types.ParticleSettings | bpy.types.Curves):
         return True
     if not isinstance(user, bpy.types.Object) or properties.is_helper(user):
@@ -178,7 +181,7 @@ def _reads(user: bpy.types.ID, sources: set[bpy.types.ID]) -> bool:
     bones = user.pose.bones if user.pose is not None else ()
     constraints = [*user.constraints, *(each for bone in bones for each in bone.constraints)]
     readers = [each for each in (*user.modifiers, *constraints) if each.type in READERS]
-    # What inputs Geometry Nodes have, their group decides.
+    # Any Geometry Nodes group counts, as its inputs can be of any kind.
     return any(
         (each.type == "NODES" and not node_group.is_sinew(each))
         or any(getattr(each, name, None) in sources for name in _POINTERS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The text block that says what is missing to those who open a saved file without Sinew."""
+"""The text block in a saved file that tells people without Sinew what is missing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ modifiers deform them, by the nearest shape that Blender has. Leave the modifier
 
 
 def write(objects: list[bpy.types.Object]) -> None:
-    """Before the file is saved; without objects there is nothing to say."""
+    """Writes the text, before the file is saved; without objects there is none."""
     remove()
     if objects:
         text = bpy.data.texts.new(NAME)
@@ -32,6 +32,6 @@ def write(objects: list[bpy.types.Object]) -> None:
 
 
 def remove() -> None:
-    """Nobody who has Sinew needs it."""
+    """Removes the text, which nobody who has Sinew needs."""
     for text in [text for text in bpy.data.texts if text.get(MARK) and text.library is None]:
         bpy.data.texts.remove(text)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Sinew made for objects that were deleted since: point buffers, upstream proxies, node groups."""
+"""Removes what Sinew made for objects that were deleted since: point buffers, upstream proxies, node
+groups."""
 
 from __future__ import annotations
 
@@ -9,10 +10,10 @@ from . import node_group, properties, upstream_proxy
 
 
 def remove() -> None:
-    """Takes away what nothing in the file uses any more.
+    """Removes what nothing in the file uses any more.
 
-    Blender's own counts of users are too high where it has deleted several copies at once, and in 5.2 where
-    a modifier was removed whose inputs name an object.
+    Blender's user counts cannot be trusted: they are too high after it has deleted several copies at once,
+    and in 5.2 after a modifier was removed whose inputs name an object.
     """
     used = _used_by_settings()
     helpers = {

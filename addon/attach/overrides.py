@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings on library overrides, which Blender does not keep with the file where the library has none.
+"""Keeps settings on library overrides, which Blender does not save where the library has none.
 
-The modifier that Sinew adds is kept, and the point buffer that it names is local: that holds a copy of them.
+Blender saves the modifier that Sinew adds, and the point buffer that it names is local: so the point buffer
+stores a copy of the settings.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import bpy
 from . import node_group, properties, stack
 
 
-def keep(obj: bpy.types.Object) -> None:
+def store(obj: bpy.types.Object) -> None:
     """Copies the settings of a skinned override to its point buffer."""
     settings = properties.of(obj)
     if obj.override_library is not None and settings.point_buffer is not None:
@@ -19,8 +20,8 @@ def keep(obj: bpy.types.Object) -> None:
         properties.of(settings.point_buffer).helper = True
 
 
-def take_back() -> None:
-    """Gives all overrides whose settings are gone those that their point buffers hold."""
+def restore() -> None:
+    """Restores settings that overrides have lost, from their point buffers."""
     for obj in bpy.data.objects:
         if obj.type != "MESH" or obj.override_library is None or properties.has_sinew(obj):
             continue

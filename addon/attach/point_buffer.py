@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object in no scene whose vertices are the deformed points of another, then its normals where Sinew gives
-these.
+"""An object in no scene whose vertices are the deformed points of another object, followed by its normals
+where Sinew gives them.
 
-It serves where an attribute of the mesh can not: the mesh is linked from another file, others use it, it has
-other vertices than what is deformed, or the points are written after the update. Within Blender's evaluation
-its evaluated copy is written, and it keeps the rest points.
+It is used where an attribute of the mesh is not possible: the mesh is linked from another file, shared, or
+has other vertices than what is deformed, or the points are written after the update. Within Blender's
+evaluation Sinew writes to its evaluated copy, and the original keeps the rest points.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ def write(point_buffer: bpy.types.Object, points: np.ndarray) -> None:
 
 
 def is_in(depsgraph: bpy.types.Depsgraph, point_buffer: bpy.types.Object, with_points: bool) -> bool:
-    """Whether an evaluation that has the point buffer has it as it is. One that was deleted and that undo
-    brought back, in a view layer that is not shown, Blender (4.2 to 5.2) leaves as it was evaluated last:
-    with what another step had.
+    """Whether an evaluation that contains the point buffer has its current content. Blender (4.2 to 5.2) does
+    not evaluate again a buffer that was deleted and that undo restored, in a view layer that is not shown:
+    its content is then that of another step.
 
-    with_points  not only as many
+    with_points  compares the points, not only their number
     """
     evaluated = point_buffer.evaluated_get(depsgraph)
-    # What is at the address of something that was deleted has Blender give out that one.
+    # At the address of a deleted object, Blender returns what was evaluated for that.
     if not (isinstance(evaluated, bpy.types.Object) and evaluated.type == "MESH" and evaluated.is_evaluated):
         return True
     mesh, own = evaluated.data, point_buffer.data
@@ -60,5 +60,5 @@ def remove(obj: bpy.types.Object) -> None:
     settings = properties.of(obj)
     point_buffer, settings.point_buffer = settings.point_buffer, None
     if point_buffer is not None and point_buffer.library is None:
-        # Takes the object that uses it along.
+        # Also removes the object that uses it.
         bpy.data.meshes.remove(point_buffer.data)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the deformed points of an object, and its normals, are stored for Sinew's modifier to read.
+"""Stores the deformed points of an object, and its normals, where Sinew's modifier reads them.
 
-In an attribute of the mesh; in a point buffer where the mesh is not the object's own or not what is deformed.
-Within Blender's evaluation they are written to the evaluated attribute or buffer, so that no frame touches a
-mesh of the file.
+They are stored in an attribute of the mesh; or in a point buffer, where the mesh is not the object's own or
+not what is deformed. Within Blender's evaluation they are written to the evaluated attribute or buffer, so
+that a frame changes no mesh of the file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from . import node_group, point_buffer, pose_driver, properties, references, sta
 from .subscribers import subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = "sinew_points", "sinew_normals"
-# Earlier versions also kept colours in the mesh.
+# Earlier versions also stored colours in the mesh.
 _OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, "sinew_colours")
 
 
@@ -24,9 +24,9 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
     """Makes the attribute or the point buffer for an object's points, and has Sinew's modifier read it.
 
     normals     the domain of the normals that are stored with them, POINT or CORNER; empty for none
-    in_renders  they are given in renders, too
+    in_renders  normals are given in renders, too
 
-    Raises SinewError where what stands in front can not be evaluated apart.
+    Raises SinewError where the modifiers before Sinew cannot be evaluated separately.
     """
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
     if in_buffer:
@@ -48,7 +48,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
     made_by_features = (make(obj) for make in subscribers.node_group)
     group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind, normals)
     if nodes.node_group != group:
-        # It can be on an input that another group does not have.
+        # The driver can be on an input that the other group does not have.
         pose_driver.remove(obj)
         references.note(obj)
         nodes.node_group = group
@@ -61,13 +61,13 @@ def _ensure_attribute(obj: bpy.types.Object) -> None:
     if not settings.attribute:
         settings.attribute = _free_attribute_name(mesh, ATTRIBUTE)
     if not mesh_io.has_vectors(mesh, settings.attribute, "POINT"):
-        # What an evaluation shows to which Sinew gave no points.
+        # Shown by an evaluation in which Sinew gave no points.
         rest = mesh_io.read_points(mesh)
         mesh_io.write_vectors(mesh, settings.attribute, _marked(rest, rest))
 
 
 def _ensure_normals_attribute(obj: bpy.types.Object, domain: str) -> None:
-    """Of zeros, which say that Sinew gave none to an evaluation."""
+    """Fills the attribute with zeros, which mean that Sinew gave no normals."""
     settings, mesh = properties.of(obj), obj.data
     if not domain:
         if settings.normals_attribute:
@@ -84,8 +84,8 @@ def _ensure_normals_attribute(obj: bpy.types.Object, domain: str) -> None:
 def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: np.ndarray) -> None:
     """Stores float32 [vertices, 3], object space, in the point buffer, and has Blender evaluate it.
 
-    rest     the points as the mesh comes with them
-    normals  float32 [vertices or corners, 3], stored behind them; or [0, 3]
+    rest     float32 [vertices, 3], the rest points
+    normals  float32 [vertices or corners, 3], stored behind the points; or [0, 3]
     """
     stored = _marked(points, rest)
     if len(normals):
@@ -96,16 +96,17 @@ def write(obj: bpy.types.Object, points: np.ndarray, rest: np.ndarray, normals: 
 def set_rest_points(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rest: np.ndarray, normals: int, anew: bool
 ) -> None:
-    """Gives the point buffer the rest points, which an evaluation moves: if their number differs, or anew.
+    """Stores the rest points in the point buffer, which an evaluation then moves: where their number differs,
+    or if `anew`.
 
-    normals  how many are to follow, here zeros, which say that Sinew gave none
+    normals  the number of normals behind them; they are 0, which means that Sinew gave none
     """
     if anew or not are_written(obj, depsgraph, len(rest) + normals, are_moved=True):
         write(obj, rest, rest, np.zeros((normals, 3), dtype=np.float32))
 
 
 def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
-    """_differing_from() in place."""
+    """Marks points as written by Sinew, in place; see _marked()."""
     if np.array_equal(shown[:1], rest[:1]) and np.array_equal(shown, rest):
         shown[:] = _marked(shown, rest)
 
@@ -113,9 +114,9 @@ def mark_as_written(shown: np.ndarray, rest: np.ndarray) -> None:
 def are_written(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, count: int, are_moved: bool = False
 ) -> bool:
-    """Whether the point buffer holds as many points and normals, and this evaluation has them.
+    """Whether the point buffer has `count` points and normals, and this evaluation has the same.
 
-    are_moved  by the evaluation itself: there are others in it
+    are_moved  the evaluation itself moves the points, so only the number is compared
     """
     buffer = properties.of(obj).point_buffer
     if buffer is None or len(buffer.data.vertices) != count:
@@ -124,10 +125,10 @@ def are_written(
 
 
 def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> bool:
-    """Whether a mesh that has lost Sinew's modifier has its shape itself, as the modifier was applied: then
-    the attribute is gone, too.
+    """Whether a mesh without Sinew's modifier has the deformed shape, because the modifier was applied; the
+    attribute is then gone, too.
 
-    rest, shown  float32 [vertices, 3], points as they were bound and as they were last; None where unknown
+    rest, shown  float32 [vertices, 3], the points as bound, and the last shape; None where unknown
     """
     settings, own = properties.of(obj), mesh_io.read_points(obj.data)
     if not settings.replaces_modifiers:
@@ -141,9 +142,9 @@ def are_applied(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarra
 
 
 def _marked(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """The points; where they are the rest points to the last bit, one of them off by a rounding. So a mesh
-    that Sinew's modifier was applied to can be known from one that it was deleted from, and points that Sinew
-    wrote from those that a mesh comes with."""
+    """Returns the points. If they equal the rest points exactly, one of them is changed by a rounding error.
+    So applying Sinew's modifier can be told from deleting it, and points written by Sinew from those of the
+    mesh."""
     if not np.array_equal(points, rest):
         return points
     other = points.copy()
@@ -152,8 +153,8 @@ def _marked(points: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def remove_point_attributes(obj: bpy.types.Object) -> None:
-    """Takes them off the mesh while Sinew is off: a subdivision would work them out for each of its vertices,
-    and exports would have them."""
+    """Removes them from the mesh while Sinew is off: a subdivision would interpolate them for each of its
+    vertices, and exports would contain them."""
     if not obj.data.is_editmode:
         remove_attributes(obj)
         _forget_names(properties.of(obj))
@@ -166,14 +167,14 @@ def _forget_names(settings: properties.SinewSettings) -> None:
 
 
 def remove(obj: bpy.types.Object) -> None:
-    """Takes away all that stored points."""
+    """Removes everything that stores points."""
     upstream_proxy.remove(obj)
     point_buffer.remove(obj)
     remove_point_attributes(obj)
 
 
-def let_go(obj: bpy.types.Object) -> None:
-    """The object refers to nothing that Sinew made (references.py); ensure() gives it all of that again."""
+def clear_references(obj: bpy.types.Object) -> None:
+    """Clears all references to what Sinew made (references.py); ensure() makes them again."""
     settings, nodes = properties.of(obj), stack.sinew_modifier(obj)
     pose_driver.remove(obj)
     _forget_helpers(settings)
@@ -189,8 +190,8 @@ def _forget_helpers(settings: properties.SinewSettings) -> None:
 
 
 def unshare(objects: list[bpy.types.Object]) -> None:
-    """No two objects share a point buffer or an upstream proxy, as copies of an object do: ensure() makes
-    each its own."""
+    """Makes sure that no two objects share a point buffer or an upstream proxy, as copies of an object do:
+    ensure() gives each its own."""
     taken: set[str] = set()
     for obj in objects:
         settings = properties.of(obj)
@@ -213,8 +214,8 @@ def _free_attribute_name(mesh: bpy.types.Mesh, start: str) -> str:
 
 
 def remove_attributes(obj: bpy.types.Object) -> None:
-    """Takes all attributes of ours off the mesh: one that was copied, or saved by an earlier Sinew, can have
-    more than one."""
+    """Removes all of Sinew's attributes from the mesh: a mesh that was copied, or saved by an earlier Sinew,
+    can have several."""
     mesh = obj.data
     if not mesh.is_editable:
         return

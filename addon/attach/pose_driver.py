@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The driver that ties a skinned object to the poses, which no modifier does while Sinew is at work.
+"""The driver that makes a skinned object depend on the poses, as no modifier does while Sinew deforms.
 
-Its variables read the bones, so Blender evaluates their poses even where the armature is hidden. On an input
-of Sinew's modifier it also places Sinew within Blender's own evaluation: whenever a pose, the object's place,
-its settings or its shape keys change, Blender evaluates the driver after them and before the modifiers, and
-the last two variables ask Sinew for the points (in_evaluation). So a frame is evaluated once, as with a
-modifier (seen on 4.2 to 5.2, viewport and render). A variable that reads a property is no script: it is also
-read where files may not run any.
+Its variables read the bones, so Blender evaluates their poses even if the armature is hidden. If it is on an
+input of Sinew's modifier, it also calls Sinew within Blender's evaluation: whenever a pose, the object's
+transform, its settings or its shape keys change, Blender evaluates the driver after them and before the
+modifiers, and the last two variables request the points from Sinew (deform/in_depsgraph.py). So a frame is
+evaluated once, as with any modifier (seen on 4.2 to 5.2, viewport and render). Variables that read properties
+are no scripts: they are evaluated also where files may not run scripts.
 
-On a property of the object, which makes nothing dirty, it only keeps the poses evaluated: for points that are
-written after the update. Its value is always 0.
+If it is on a property of the object, it makes nothing dirty and only keeps the poses evaluated, for points
+that are written after the update. Its value is always 0.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ import bpy
 from . import node_group, properties, references, stack
 
 PATH = "sinew.pose"
-# What the last two variables read.
+# The properties that the last two variables read.
 OBJECT_REQUEST_PATH, MESH_REQUEST_PATH = "sinew.asked", "sinew_asked"
 WORLD_MATRIX = "matrix_world[0][0]"
-# Blender reads an object's size no sooner than its modifiers are evaluated (seen on 4.2 to 5.2).
+# Blender reads an object's dimensions only after its modifiers are evaluated (seen on 4.2 to 5.2).
 EVALUATED_SIZE = "dimensions[0]"
 _PREFIX = "sinew_"
 
@@ -51,18 +51,20 @@ class _Variable:
 
 
 def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]], in_depsgraph: bool) -> None:
-    """Makes the driver as it has to be.
+    """Makes the driver, or makes it again where it is not as it has to be.
 
-    poses   each an armature and the path of a property that is read no sooner than its bones are posed.
-            Blender evaluates these bones, their parents and their constraints' targets, and no others.
-    in_depsgraph  it asks Sinew for the points, once the point buffer and what stands in front are evaluated
+    poses         armatures, each with the path of a property that Blender reads only after its bones are
+                  posed. Blender evaluates these bones, their parents and their constraints' targets, and no
+                  others.
+    in_depsgraph  the driver requests the points, after the point buffer and the upstream proxy are evaluated
     """
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
     if in_depsgraph:
         path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
-        # By a property, as Blender reads the transforms of the driver's own object without waiting for them.
+        # Read through a property, as Blender does not wait for the driver's own object in transform
+        # variables.
         variables += [_Variable(each, WORLD_MATRIX) for each in (*armatures, obj)]
         helpers = (properties.of(obj).upstream_proxy, properties.of(obj).point_buffer)
         variables += [_Variable(helper, EVALUATED_SIZE) for helper in helpers if helper is not None]
@@ -71,19 +73,20 @@ def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]],
         variables += [_Variable(obj, OBJECT_REQUEST_PATH), _Variable(obj.data, MESH_REQUEST_PATH)]
     curve = _find(obj)
     if curve is not None:
-        # One that failed once, as while its modifier had no node group, Blender does not evaluate again.
+        # Blender does not evaluate a driver again that failed once, as while its modifier had no node group.
         is_valid = curve.is_valid and curve.driver.is_valid
         if curve.data_path == path and is_valid and _reads(curve.driver, variables):
             return
         _take_off(obj, curve)
     references.note(obj)
     curve = obj.driver_add(path)
-    # Whatever the variables are, the value is 0: so no frame changes the input. By an assignment Blender
-    # would also evaluate the object's keys, and take back what was moved without a key.
+    # The modifier maps any value of the variables to 0, so no frame changes the input. Assigning the
+    # coefficients would make Blender also evaluate the object's keys, and revert what was moved without a
+    # key.
     curve.modifiers.new("GENERATOR").coefficients.foreach_set((0.0, 0.0))
     driver = curve.driver
     driver.type = "SUM"
-    # Else it is what the property was just now, and differs from one time to the next.
+    # Otherwise the expression is the property's current value, which differs each time.
     driver.expression = ""
     for number, variable in enumerate(variables):
         variable.add_to(driver, f"{_PREFIX}{number}")
@@ -96,7 +99,7 @@ def _reads(driver: bpy.types.Driver, variables: list[_Variable]) -> bool:
 
 
 def remove(obj: bpy.types.Object) -> None:
-    """Takes the driver off, and the animation data where it was all of it."""
+    """Removes the driver, and the animation data if it had nothing else."""
     curve = _find(obj)
     if curve is not None:
         _take_off(obj, curve)
@@ -105,12 +108,12 @@ def remove(obj: bpy.types.Object) -> None:
 
 def _take_off(obj: bpy.types.Object, curve: bpy.types.FCurve) -> None:
     obj.animation_data.drivers.remove(curve)
-    # Blender has written its value there.
+    # Blender has written the driver's value there.
     properties.of(obj).property_unset("pose")
 
 
 def remove_empty_animation(obj: bpy.types.Object) -> None:
-    """Takes the object's animation data away where it is empty and was not there before Sinew."""
+    """Removes the object's animation data if it is empty and did not exist before Sinew."""
     animation = obj.animation_data
     if properties.of(obj).had_animation:
         return
@@ -119,7 +122,7 @@ def remove_empty_animation(obj: bpy.types.Object) -> None:
 
 
 def _find(obj: bpy.types.Object) -> bpy.types.FCurve | None:
-    """Known by what its last variables read, as its path is that of a modifier which may have gone."""
+    """Finds the driver by what its last variables read, as its path contains a modifier that may be gone."""
     animation = obj.animation_data
     for curve in animation.drivers if animation is not None else ():
         if curve.data_path == PATH or _requests_points(curve.driver):

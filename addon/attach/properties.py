@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Sinew stores of an object, in the .blend file."""
+"""What Sinew stores about an object, in the .blend file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .method_items import method_items
 from .stage_settings import OFF
 
 METHODS = {method.name: method for method in sinew.methods()}
-# The choice beside Sinew's methods: the Armature modifier as the file has it.
+# A choice in addition to Sinew's methods: the Armature modifier as it is in the file.
 BLENDER = "blender"
 
 
@@ -31,7 +31,8 @@ def method_description(name: str) -> str:
 
 @dataclass
 class Listeners:
-    """Who hears of changed settings; set on registration, as what reacts to settings also reads them."""
+    """Functions that are called when settings change; set on registration, as they read settings
+    themselves."""
 
     method_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
     enabled_changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
@@ -70,7 +71,7 @@ def _heat_changed(settings: SinewSettings, context: bpy.types.Context) -> None:
         listeners.heat_changed(settings.id_data, context)
 
 
-# On a library override, only what is marked so is kept with the file.
+# On a library override, Blender saves only properties with this flag.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 SAME_METHOD = "SAME"
 # Who computes normals.
@@ -78,16 +79,16 @@ AS_BLENDER, SKINNED_NORMALS, LEAVE_NORMALS = "AS_BLENDER", "SKINNED", "LEAVE"
 
 
 def method_of_modifier(method: str, own: str, is_first: bool) -> str:
-    """What one of an object's Armature modifiers blends by; the first has the object's.
+    """Returns the method of one of an object's Armature modifiers; the first has the object's.
 
     method  the object's
-    own     the kept modifier's
+    own     the one stored for the modifier
     """
     return method if is_first or own == SAME_METHOD else own
 
 
 class SinewReplacedModifier(bpy.types.PropertyGroup):
-    """What Sinew keeps of an Armature modifier that it replaces, called `name`."""
+    """What Sinew stores about an Armature modifier that it replaces, called `name`."""
 
     armature: bpy.props.PointerProperty(
         name="Armature",
@@ -102,7 +103,7 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    # The Armature modifier's own flags, given back on removal.
+    # The Armature modifier's own flags, restored on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     visibility_is_keyed: bpy.props.BoolProperty(
@@ -134,11 +135,11 @@ class SinewReplacedModifier(bpy.types.PropertyGroup):
 
 
 class SinewReplacedSmooth(bpy.types.PropertyGroup):
-    """What Sinew keeps of the Corrective Smooth in whose place the stage delta_mush smooths, called `name`;
-    without a name there is none."""
+    """What Sinew stores about the Corrective Smooth that the stage delta_mush replaces, called `name`; an
+    empty name means none."""
 
     uid: bpy.props.IntProperty(options={"HIDDEN"}, override=OVERRIDABLE)
-    # The modifier's own flags, given back on removal.
+    # The modifier's own flags, restored on removal.
     show_viewport: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
     show_render: bpy.props.BoolProperty(options={"HIDDEN"}, default=True, override=OVERRIDABLE)
 
@@ -148,7 +149,7 @@ METHOD_GROUPS = stage_settings.method_groups(_method_changed)
 
 
 class SinewSettings(bpy.types.PropertyGroup):
-    """How Sinew deforms this object: in the place of the Armature modifiers of `stand_ins`. Without any, the
+    """How Sinew deforms this object, in place of the Armature modifiers in `stand_ins`. If that is empty, the
     object has no Sinew."""
 
     method: bpy.props.EnumProperty(
@@ -281,11 +282,11 @@ class SinewSettings(bpy.types.PropertyGroup):
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
-    # Files have had the names above since the first version: code has these.
+    # Files have the names above since the first version; code uses these.
 
     @property
     def replaced_modifiers(self) -> bpy.types.bpy_prop_collection:
-        """What Sinew keeps of each Armature modifier that it replaces."""
+        """What Sinew stores about each Armature modifier that it replaces."""
         return self.stand_ins
 
     @property
@@ -295,8 +296,8 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def has_nearest_volume(self) -> bool:
-        """Whether the Armature modifiers' Preserve Volume is what is nearest to Sinew's method, and not the
-        artist's own."""
+        """Whether the Armature modifiers have the Preserve Volume nearest to Sinew's method, not the artist's
+        own."""
         return self.is_saved
 
     @property
@@ -310,7 +311,7 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def upstream_proxy(self) -> bpy.types.Object | None:
-        """The copy that has the modifiers in front alone (upstream_proxy.py)."""
+        """The copy that has only the upstream modifiers (upstream_proxy.py)."""
         return self.front
 
     @upstream_proxy.setter
@@ -319,7 +320,7 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def upstream_signature(self) -> str:
-        """What the proxy was made from, as upstream_proxy.signature()."""
+        """What the proxy was made from, as upstream_proxy.signature() returns it."""
         return self.front_signature
 
     @upstream_signature.setter
@@ -328,7 +329,7 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def mixed_method(self) -> str:
-        """The method that the mix has for its second; empty where it is off."""
+        """The second method of the mix; empty where the mix is off."""
         return "" if self.mix.method == OFF else self.mix.method
 
     @property
@@ -338,11 +339,11 @@ class SinewSettings(bpy.types.PropertyGroup):
 
     @property
     def armatures(self) -> list[bpy.types.Object]:
-        """All that deform the object, each once."""
+        """All armatures that deform the object, each once."""
         return list(dict.fromkeys(s.armature for s in self.replaced_modifiers if s.armature is not None))
 
 
-# One group of settings for each stage, and for each method that has parameters, by its name.
+# A group of settings for each stage, and for each method that has parameters, by its name.
 SinewSettings.__annotations__.update(
     {
         name: bpy.props.PointerProperty(type=group, description=group.__doc__, override=OVERRIDABLE)
@@ -356,7 +357,7 @@ def of(obj: bpy.types.Object) -> SinewSettings:
 
 
 def has_sinew(obj: bpy.types.Object) -> bool:
-    # To read the settings of an object that has none would leave an empty group in the file.
+    # Reading the settings of an object that has none would leave an empty group in the file.
     if obj.type != "MESH" or not obj.is_property_set("sinew"):
         return False
     return len(obj.sinew.replaced_modifiers) > 0 and not obj.sinew.helper
@@ -373,7 +374,7 @@ def is_copy(obj: bpy.types.Object) -> bool:
 
 
 def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
-    """Gives a group of settings the values of another, without telling the listeners."""
+    """Copies all values of a group of settings to another, without calling the listeners."""
     for name, prop in source.bl_rna.properties.items():
         if name == "rna_type":
             continue
@@ -396,28 +397,28 @@ def copy(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> No
 
 
 def copy_groups(source: SinewSettings, target: SinewSettings, names: Iterable[str]) -> None:
-    """The same for some groups within the settings. One that is not there is not made by being read."""
+    """Copies some groups of the settings. Groups that do not exist are not read, as that would make them."""
     for name in names:
         if source.is_property_set(name):
             copy(getattr(source, name), getattr(target, name))
 
 
 def make_groups(settings: SinewSettings) -> None:
-    """Has the object all groups of settings, which are made by being read: Blender 5.2 can not give a library
-    override one that its library lacks."""
+    """Makes all groups of settings of the object, by reading them: Blender 5.2 cannot give a library override
+    a group that its library lacks."""
     for name in (*STAGE_GROUPS, *METHOD_GROUPS):
         getattr(settings, name)
 
 
 def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | str) -> None:
-    """Sets what Sinew keeps for itself: telling Blender would touch the object's mesh, as its weights' change
-    does."""
+    """Sets a value that only Sinew uses, without Blender's update: that would touch the object's mesh, as a
+    change of weights does."""
     if getattr(group, name) != value:
         group[name] = value
 
 
 def clear(obj: bpy.types.Object) -> None:
-    """Takes Sinew's settings out of the object, as if they had never been."""
+    """Removes Sinew's settings from the object, as if they had never existed."""
     obj.property_unset("sinew")
 
 
@@ -428,7 +429,7 @@ CLASSES = (
     SinewSettings,
 )
 
-# A property of meshes themselves, so that its getter has the evaluated mesh and nothing is stored.
+# A property of meshes, so that its getter receives the evaluated mesh and nothing is stored.
 MESH_REQUEST = bpy.props.FloatProperty(
     get=_mesh_requested, options={"HIDDEN"}, description="Read by pose_driver's driver, to ask for points"
 )

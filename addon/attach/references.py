@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which objects Sinew had refer to something between two of Blender's steps of undo.
+"""Records which objects were given new references by Sinew between two of Blender's undo steps.
 
 Where an object is the same in two steps, undo keeps it as it is in memory. What Sinew made for it since the
-last step (a helper, a node group) is in neither of them and gone afterwards: Blender would read freed memory
-(seen on 4.2 to 5.2). So point_store.let_go() comes before undo.
+last step (a helper, a node group) is in neither step and gone afterwards: Blender would read freed memory
+(seen on 4.2 to 5.2). So point_store.clear_references() clears these references before undo.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _is_between_steps = False
 
 @contextmanager
 def between_steps() -> Iterator[None]:
-    """For what handlers and timers do. Of what operators and the panel do Blender makes a step."""
+    """Context for what handlers and timers do. For operators and the panel, Blender makes an undo step."""
     global _is_between_steps
     before, _is_between_steps = _is_between_steps, True
     try:
@@ -30,12 +30,12 @@ def between_steps() -> Iterator[None]:
 
 
 def are_between_steps() -> bool:
-    """Whether what is made now is in no step of undo."""
+    """Whether what is made now is in no undo step."""
     return _is_between_steps
 
 
 def note(obj: bpy.types.Object) -> None:
-    """The object is about to refer to something else."""
+    """Records an object that is about to get another reference."""
     if _is_between_steps:
         _noted.add(obj.session_uid)
 

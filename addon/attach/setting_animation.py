@@ -11,7 +11,7 @@ from . import pose_driver, properties
 
 
 def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
-    """Takes keys of Sinew's settings off the object, unless another that Sinew is on plays them, too."""
+    """Removes keys of Sinew's settings from the object, unless another object with Sinew plays them, too."""
     animation = obj.animation_data
     if animation is None:
         return
@@ -32,14 +32,15 @@ def remove_keys(obj: bpy.types.Object, path: str = "sinew.") -> None:
 
 
 def _others_need(obj: bpy.types.Object, player: bpy.types.AnimData | bpy.types.NlaStrip) -> bool:
-    """Whether another object that Sinew is on plays the same curves, as a linked duplicate does."""
+    """Whether another object with Sinew plays the same curves, as a linked duplicate does."""
     played = (player.action, actions.slot_of(player))
     others = (o for o in bpy.data.objects if o != obj and o.animation_data and properties.has_sinew(o))
     return any((p.action, actions.slot_of(p)) == played for o in others for p in players(o.animation_data))
 
 
 def remove(obj: bpy.types.Object) -> None:
-    """Takes keys and drivers of Sinew's settings off the object, and its animation data if they were all."""
+    """Removes keys and drivers of Sinew's settings from the object, and its animation data if nothing else
+    was in it."""
     remove_keys(obj)
     animation = obj.animation_data
     if animation is None:

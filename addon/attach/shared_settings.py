@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings that the meshes of a character have in common."""
+"""The settings that the meshes of a character share."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import bpy
 
 from . import properties
 
-# Of properties.SinewSettings; all stages and parameters of methods are, too.
+# Properties of properties.SinewSettings; all stages and parameters of methods are shared, too.
 SHARED = ("method", "scale_rule", "normals", "leave_small")
 GROUPS = {**properties.STAGE_GROUPS, **properties.METHOD_GROUPS}
 
 
 def share(source: bpy.types.Object, target: bpy.types.Object) -> None:
-    """Gives a mesh those of another. It is for the caller to suspend updates meanwhile."""
+    """Copies the shared settings of a mesh to another. The caller suspends updates meanwhile."""
     own, other = properties.of(target), properties.of(source)
     for name in SHARED:
         assign(own, name, getattr(other, name))
@@ -23,6 +23,6 @@ def share(source: bpy.types.Object, target: bpy.types.Object) -> None:
 
 
 def assign(group: bpy.types.PropertyGroup, name: str, value: object) -> None:
-    """Only what differs: each assignment has Blender evaluate the object."""
+    """Assigns only a different value: each assignment makes Blender evaluate the object."""
     if getattr(group, name) != value:
         setattr(group, name, value)

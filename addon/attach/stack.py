@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whose modifiers stand where in an object's stack. Changes nothing."""
+"""Finds Sinew's modifier, the Armature modifiers, and those before and behind them in an object's stack.
+Changes nothing."""
 
 from __future__ import annotations
 
@@ -8,11 +9,11 @@ import bpy
 from ..io.animation_paths import is_visibility_animated
 from . import node_group, properties
 
-# Modifiers that leave positions, topology and weights alone may stand in front of the Armature modifier.
+# These change no positions, topology or weights, so they may be before the Armature modifier.
 HARMLESS_UPSTREAM = {"NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WEIGHTED_NORMAL"}
 
-# While weights or colours are painted, Blender leaves out what does not tell which vertex of the mesh each of
-# its vertices comes from (measured on 4.2 and 5.2).
+# In the paint modes Blender leaves out modifiers that do not say which vertex of the mesh each of their
+# vertices comes from (measured on 4.2 and 5.2).
 LEFT_OUT_IN_PAINT = {
     "BEVEL",
     "BOOLEAN",
@@ -37,7 +38,7 @@ def can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
 
 
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    """Sinew's own modifier; one that has lost its node group is known by its name."""
+    """Returns Sinew's own modifier. One that has lost its node group is recognised by its name."""
     nodes = [m for m in obj.modifiers if m.type == "NODES"]
     lost = (m for m in nodes if m.node_group is None and _is_name_of_ours(obj, m.name))
     return next((m for m in nodes if node_group.is_sinew(m)), None) or next(lost, None)
@@ -50,13 +51,13 @@ def _is_name_of_ours(obj: bpy.types.Object, name: str) -> bool:
 
 
 def armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier | None:
-    """The first Armature modifier that Sinew replaces, or would."""
+    """Returns the first Armature modifier that Sinew replaces, or would replace."""
     return next(iter(armature_modifiers(obj)), None)
 
 
 def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
-    """The Armature modifiers that Sinew replaces, or would: the first and those right behind it, which
-    Blender may chain as Multi Modifiers."""
+    """Returns the Armature modifiers that Sinew replaces, or would replace: the first and those directly
+    behind it, which Blender may chain as Multi Modifiers."""
     own, run = sinew_modifier(obj), []
     for modifier in list(obj.modifiers)[_start(obj) :]:
         if modifier.type == "ARMATURE":
@@ -67,8 +68,8 @@ def armature_modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier
 
 
 def _start(obj: bpy.types.Object) -> int:
-    """The place of the first Armature modifier that Sinew replaces; of the first one with an armature,
-    those that are switched off last, where it would."""
+    """Returns the index of the first Armature modifier that Sinew replaces. Without Sinew, that is the first
+    with an armature, preferably one that is on."""
     modifiers = list(obj.modifiers)
     if not properties.has_sinew(obj):
         candidates = [m for m in modifiers if m.type == "ARMATURE" and m.object is not None]
@@ -77,15 +78,15 @@ def _start(obj: bpy.types.Object) -> int:
     found = [modifier_of(obj, replaced) for replaced in properties.of(obj).replaced_modifiers]
     known = sorted(_index(obj, modifier) for modifier in found if modifier is not None)
     start = next(iter(known), behind_own)
-    # New: between our own modifier and the first that is known.
+    # New modifiers between Sinew's and the first known one count.
     between = modifiers[behind_own:start]
     if between and all(m.type == "ARMATURE" for m in between):
         start = behind_own
-    # New, right in front of ours or of the first.
+    # So do new ones directly before Sinew's or before the first.
     ahead = min(start, len(modifiers)) - 1
     if ahead >= 0 and modifiers[ahead] == sinew_modifier(obj):
         ahead -= 1
-    # Or others in the place of those that are gone, where Sinew is behind them: it has switched those off.
+    # So do others in place of those that are gone, if Sinew's is behind them, as it has switched them off.
     while ahead >= 0 and (_deforms(modifiers[ahead]) or (not known and modifiers[ahead].type == "ARMATURE")):
         start, ahead = ahead, ahead - 1
     return start
@@ -94,7 +95,8 @@ def _start(obj: bpy.types.Object) -> int:
 def modifier_of(
     obj: bpy.types.Object, replaced: properties.SinewReplacedModifier
 ) -> bpy.types.ArmatureModifier | None:
-    """The Armature modifier that was replaced, however it was moved and renamed; else one of its name."""
+    """Returns the Armature modifier that was replaced, even if it was moved and renamed; else one of its
+    name."""
     armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
     same = (m for m in armatures if m.persistent_uid == replaced.uid)
     return next(same, None) or next((m for m in armatures if m.name == replaced.name), None)
@@ -109,14 +111,14 @@ def _index(obj: bpy.types.Object, modifier: bpy.types.Modifier | None) -> int:
 
 
 def visibility_is_animated(obj: bpy.types.Object) -> bool:
-    """Whether an animation decides when one of the Armature modifiers is on."""
+    """Whether an animation switches one of the Armature modifiers on and off."""
     return any(is_visibility_animated(obj, modifier) for modifier in armature_modifiers(obj))
 
 
 def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The modifiers ahead of those that Sinew replaces, without Sinew's own, and without those that Blender
-    leaves out in the object's mode."""
-    # Also while it has no node group yet.
+    """Returns the modifiers before those that Sinew replaces, without Sinew's own, and without those that
+    Blender leaves out in the object's mode."""
+    # Compared by identity, too, as it has no node group at first.
     own = sinew_modifier(obj)
     ahead = list(obj.modifiers)[: _index(obj, armature_modifier(obj))]
     left_out = LEFT_OUT_IN_PAINT if obj.mode in ("WEIGHT_PAINT", "VERTEX_PAINT") else ()
@@ -124,17 +126,17 @@ def upstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def downstream(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The modifiers behind those that Sinew replaces, or would, without Sinew's own."""
+    """Returns the modifiers behind those that Sinew replaces, or would replace, without Sinew's own."""
     run, own = armature_modifiers(obj), sinew_modifier(obj)
     behind = list(obj.modifiers)[_index(obj, run[-1]) + 1 :] if run else []
     return [modifier for modifier in behind if modifier != own]
 
 
 def upstream_changes(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Those ahead that are on and change positions, topology or weights."""
+    """Returns the upstream modifiers that are on, or may be, and change positions, topology or weights."""
     return [m for m in upstream(obj) if can_be_on(obj, m) and m.type not in HARMLESS_UPSTREAM]
 
 
 def parent_deforms(obj: bpy.types.Object) -> bool:
-    """Whether the object's parent deforms it ahead of all modifiers (parent type Armature)."""
+    """Whether the object's parent deforms it before all modifiers (parent type Armature)."""
     return obj.parent is not None and obj.parent_type == "ARMATURE" and obj.parent.type == "ARMATURE"

@@ -13,35 +13,35 @@ from ..core import parameters
 from .method_items import method_items
 
 STAGES = {stage.name: stage for stage in sinew.stages()}
-# The parameter of each that says whether it does anything: its first.
+# The parameter that switches each stage on: its first.
 _SWITCHES = {stage.name: stage.parameters[0].id for stage in STAGES.values()}
-# Those that can be set to something.
+# Methods that have parameters.
 METHODS = {method.name: method for method in sinew.methods() if method.parameters}
-# The choice beside the methods where a parameter names one: the stage does nothing.
+# Choice of a parameter that names a method: the stage is off.
 OFF = "OFF"
-# Of a library override, only what is marked so is kept with the file.
+# On a library override, Blender saves only properties with this flag.
 _OVERRIDE = {"LIBRARY_OVERRIDABLE"}
 
 
 def as_stored(value: parameters.Value) -> parameters.Value:
-    """The value of a property for one that a command or a job file has."""
+    """Converts a value of a command or a job file to the property's value."""
     return OFF if value == parameters.OFF else value
 
 
 def groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:
-    """A class of property groups for each stage, by its name. `update` is called at each change."""
+    """Returns a property group class for each stage, by its name. `update` is called at each change."""
     return {name: _group("Stage", stage, update) for name, stage in STAGES.items()}
 
 
 def method_groups(update: Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]) -> dict[str, type]:
-    """The same for each method that has parameters."""
+    """Returns the same for each method that has parameters."""
     return {name: _group("Method", method, update) for name, method in METHODS.items()}
 
 
 def method_values(settings: bpy.types.PropertyGroup, methods: Iterable[str]) -> dict[str, parameters.Value]:
-    """The parameters of some methods by their full names, as Deformer.deform() takes them.
+    """Returns the parameters of some methods by their full names, as Deformer.deform() takes them.
 
-    settings  of an object
+    settings  an object's
     """
     return {
         f"{name}.{each.id}": getattr(getattr(settings, name), each.id)
@@ -63,24 +63,24 @@ def _group(kind: str, owner: sinew.Method | sinew.Stage, update: Callable) -> ty
 
 
 def is_on(settings: bpy.types.PropertyGroup, name: str) -> bool:
-    """Whether a stage does anything, as its first parameter says."""
+    """Whether a stage is on, by its first parameter."""
     return getattr(getattr(settings, name), _SWITCHES[name]) not in (False, OFF)
 
 
 def names_on(settings: bpy.types.PropertyGroup, among: Iterable[str] = STAGES) -> list[str]:
-    """The stages that are on by an object's settings."""
+    """Returns the stages that are on in an object's settings."""
     return [name for name in among if is_on(settings, name)]
 
 
 def values_of(settings: bpy.types.PropertyGroup, name: str) -> dict[str, Any]:
-    """The parameters of a stage by their ids, but for vertex groups."""
+    """Returns the parameters of a stage by their ids, without vertex groups."""
     group, stage = getattr(settings, name), STAGES[name]
     return {each.id: getattr(group, each.id) for each in stage.parameters if each.kind != "vertex_group"}
 
 
 def vertex_groups(settings: bpy.types.PropertyGroup) -> dict[str, str]:
-    """The name of the vertex group of each stage that takes one, by the stage's name; empty where none is
-    chosen."""
+    """Returns the name of the vertex group of each stage that takes one, by the stage's name; empty where
+    none is chosen."""
     return {
         name: getattr(getattr(settings, name), each.id)
         for name, stage in STAGES.items()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What methods keep of vertices, in the mesh that it belongs to: in saved files, so that who opens one need
-not compute it again. By the hash of what it was made from: a mesh that changed has none of its own.
+"""Stores methods' vertex data in the mesh that it belongs to, so that it need not be computed again when a
+saved file is opened. The key is a hash of what the data was made from: a changed mesh finds no data.
 
-A property of the mesh, not an attribute: modifiers behind would interpolate that in every frame.
+It is a property of the mesh, not an attribute: downstream modifiers would interpolate that in every frame.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class SinewVertexData(bpy.types.PropertyGroup):
 
 
 def read(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
-    """float32 [vertices, n] by its key; copies."""
+    """Returns float32 [vertices, n] by its key; copies."""
     if not mesh.is_property_set(NAME):
         return {}
     found = {}
@@ -37,7 +37,7 @@ def read(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
 
 
 def write(mesh: bpy.types.Mesh, made: Mapping[str, np.ndarray]) -> None:
-    """Replaces all that the mesh has."""
+    """Replaces everything that the mesh has stored."""
     if not mesh.is_editable:
         return
     if not made:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where features subscribe to what Sinew does with its objects: nothing below them knows of them."""
+"""Features subscribe here to what Sinew does with its objects; nothing below the features imports them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ import bpy
 class Subscribers:
     """Each list is called in the order of subscription.
 
-    node_group       makes the node group of an object's modifier; None where the usual one will do
-    before_removal   Sinew is about to be taken off an object
-    after_removal    it was taken off one
-    objects_changed  these are the objects that have Sinew now
-    deformed         all objects have the shape of this evaluation, as far as handlers are concerned
-    frame_shown      what the panel shows of a frame may differ
-    exported         an export has ended, or failed
-    safe_mode_changed  it was switched on or off
-    precomputation_asked  something is computed on a thread, or will be
-    precomputation_shown  how far that is may differ
+    node_group                makes the node group of an object's modifier; None to use the standard one
+    before_removal            Sinew is about to be taken off an object
+    after_removal             Sinew was taken off an object
+    objects_changed           these are the objects that have Sinew now
+    deformed                  all objects have the shape of this evaluation, as far as handlers are concerned
+    frame_shown               what the panel shows of a frame may differ
+    exported                  an export has ended, or failed
+    safe_mode_changed         safe mode was switched on or off
+    precomputation_requested  something is computed on a thread, or will be
+    precomputation_shown      the progress of that may differ
     """
 
     node_group: list[Callable[[bpy.types.Object], bpy.types.NodeTree | None]] = field(default_factory=list)
@@ -35,7 +35,7 @@ class Subscribers:
     frame_shown: list[Callable[[], None]] = field(default_factory=list)
     exported: list[Callable[[], None]] = field(default_factory=list)
     safe_mode_changed: list[Callable[[], None]] = field(default_factory=list)
-    precomputation_asked: list[Callable[[], None]] = field(default_factory=list)
+    precomputation_requested: list[Callable[[], None]] = field(default_factory=list)
     precomputation_shown: list[Callable[[], None]] = field(default_factory=list)
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who reacts to Blender's events: one thread at a time, and none to those that Sinew itself
-causes. A window that renders calls handlers from the render's thread beside its own."""
+"""Makes handlers of Blender's events run on one thread at a time, and ignore events that Sinew itself causes.
+A window that renders calls handlers from the render's thread, too."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from contextlib import contextmanager
 import bpy
 
 _lock = threading.RLock()
-# How many blocks of updates_suspended() the thread that holds the lock is in.
+# How many updates_suspended() blocks the thread that has the lock is in.
 _depth = 0
 
 
 @contextmanager
 def updates_suspended() -> Iterator[None]:
     """Events inside, on this thread, are only noted for the refresh() that has to follow; those of other
-    threads wait for the end."""
+    threads wait until the end."""
     global _depth
     with _lock:
         _depth += 1
@@ -29,14 +29,14 @@ def updates_suspended() -> Iterator[None]:
 
 
 def is_rendering_in_window() -> bool:
-    """Whether a thread of its own renders. Modifiers, drivers and objects may not come or go then: the thread
-    reads them, and telling the window of a change is for the main thread alone."""
+    """Whether a separate thread renders. Modifiers, drivers and objects must not be added or removed then:
+    the thread reads them, and only the main thread may notify the window of a change."""
     return not bpy.app.background and bpy.app.is_job_running("RENDER")
 
 
 def is_playing_in_window() -> bool:
-    """Whether a change of frame is that of a window that plays. Exporters that run beside it have a thread of
-    their own."""
+    """Whether a change of frame is that of a window that plays. Exporters that run beside it have their own
+    thread."""
     if bpy.app.background or not is_main_thread():
         return False
     return any(window.screen.is_animation_playing for window in bpy.context.window_manager.windows)
@@ -47,7 +47,7 @@ def is_main_thread() -> bool:
 
 
 class _Reaction:
-    """A class, as a generator's context takes longer than what most frames ask of it."""
+    """A class, as a generator's context takes longer than the work of most frames."""
 
     def __enter__(self) -> bool:
         _lock.acquire()
@@ -58,7 +58,8 @@ class _Reaction:
 
 
 def reaction() -> _Reaction:
-    """For what reacts to an event, once no other thread does: whether this one is to."""
+    """Context for a reaction to an event, entered when no other thread reacts. Its value is whether to
+    react."""
     return _REACTION
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh as it comes to the Armature modifier, where something in front of it changes the mesh.
+"""The mesh that the Armature modifier gets, where something before it changes the mesh.
 
-A copy of the object, in no scene, has the modifiers in front and no others. Sinew's own modifier names it,
-so Blender evaluates it along with the object, and its evaluated mesh is what Sinew deforms.
+A copy of the object, in no scene, has only the upstream modifiers. Sinew's own modifier names it, so Blender
+evaluates it along with the object, and Sinew deforms its evaluated mesh.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..core.errors import SinewError
 from ..io.animation_paths import animated_paths
 from . import properties, references, stack
 
-# A copy would run a simulation of its own, with a cache of its own.
+# A copy would run its own simulation, with its own cache.
 SIMULATIONS = {
     "CLOTH",
     "SOFT_BODY",
@@ -26,7 +26,7 @@ SIMULATIONS = {
     "EXPLODE",
 }
 
-# These can change weights from one frame to the next, or which vertices there are without changing how many.
+# These can change weights from frame to frame, or exchange vertices without changing their number.
 WEIGHT_CHANGERS = {
     "BOOLEAN",
     "DECIMATE",
@@ -41,16 +41,16 @@ WEIGHT_CHANGERS = {
 
 
 def is_needed(obj: bpy.types.Object) -> bool:
-    """Whether what comes to the Armature modifier is anything but the mesh and its relative shape keys."""
+    """Whether the Armature modifier gets anything other than the mesh and its relative shape keys."""
     keys = obj.data.shape_keys
     absolute = keys is not None and not keys.use_relative
     return absolute or stack.parent_deforms(obj) or bool(stack.upstream_changes(obj))
 
 
 def check_not_needed(obj: bpy.types.Object, why: str) -> None:
-    """Raises SinewError where there is anything else.
+    """Raises SinewError where a proxy is needed.
 
-    why  a clause: what can not go with it, and what to do
+    why  a clause: what does not work with it, and what to do
     """
     if is_needed(obj):
         names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
@@ -58,7 +58,7 @@ def check_not_needed(obj: bpy.types.Object, why: str) -> None:
 
 
 def check(obj: bpy.types.Object) -> None:
-    """Raises SinewError where what stands in front can not be evaluated apart."""
+    """Raises SinewError where the upstream modifiers cannot be evaluated separately."""
     first = stack.armature_modifier(obj)
     if first is not None and first.use_multi_modifier and stack.parent_deforms(obj):
         raise SinewError(
@@ -74,7 +74,7 @@ def check(obj: bpy.types.Object) -> None:
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """The copy, made anew where the modifiers in front are others than those that it has."""
+    """Returns the copy, made again where the upstream modifiers differ from its own."""
     settings = properties.of(obj)
     if not is_needed(obj):
         remove(obj)
@@ -105,15 +105,15 @@ def is_proxy(helper: bpy.types.Object) -> bool:
 
 
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh | None:
-    """The mesh that comes to the Armature modifier; None as long as Blender has not evaluated it."""
+    """Returns the mesh that the Armature modifier gets; None as long as Blender has not evaluated it."""
     proxy = properties.of(obj).upstream_proxy
     evaluated = proxy.evaluated_get(depsgraph)
-    # Just made at the address of an object that was deleted, it has Blender give out what that was.
+    # If it was just made at the address of a deleted object, Blender returns what was evaluated for that.
     is_other = not isinstance(evaluated, bpy.types.Object) or evaluated.sinew.token != proxy.sinew.token
     if is_other or not evaluated.is_evaluated:
         return None
-    # Of what is hidden Blender may need the position alone, as a constraint's target: then the modifiers in
-    # front are not evaluated, and the mesh is the one that they would have been given.
+    # For a hidden object Blender may need only the transform, as a constraint's target: then it does not
+    # evaluate the upstream modifiers, and the mesh is their input.
     is_plain = evaluated.data == obj.data.evaluated_get(depsgraph)
     if is_plain and not obj.visible_get(view_layer=depsgraph.view_layer):
         return None
@@ -135,7 +135,7 @@ def _make(obj: bpy.types.Object) -> bpy.types.Object:
     wanted = {m.name for m in stack.upstream(obj)}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)
-    # Follows the object whatever moves that.
+    # So that it follows the object, whatever moves that.
     for constraint in list(copy.constraints):
         copy.constraints.remove(constraint)
     copy.constraints.new("COPY_TRANSFORMS").target = obj
@@ -154,7 +154,8 @@ def _keep_animation_of_modifiers(copy: bpy.types.Object) -> None:
 
 
 def signature(obj: bpy.types.Object) -> str:
-    """Differs where the copy would: by the settings of what stands in front, and the pinned shape key."""
+    """Returns a text that differs where the copy would: by the settings of the upstream modifiers, and the
+    pinned shape key."""
     pinned = (obj.show_only_shape_key, obj.active_shape_key_index)
     animation = obj.animation_data
     action = animation.action.session_uid if animation is not None and animation.action is not None else 0
@@ -165,7 +166,7 @@ def signature(obj: bpy.types.Object) -> str:
 
 
 def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) -> list:
-    """What the artist set; what an animation sets comes to the copy by itself."""
+    """Returns the values that the artist set; animated ones reach the copy by themselves."""
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
     return [
         (name, value)
@@ -174,12 +175,12 @@ def _modifier_values(modifier: bpy.types.Modifier, animated: tuple[str, ...]) ->
     ]
 
 
-# How a modifier is shown, not what it does.
+# How a modifier is displayed, not what it does.
 _INTERFACE = {"rna_type", "show_expanded", "is_active", "execution_time", "persistent_uid"}
 
 
 def _values(struct: bpy.types.bpy_struct, depth: int) -> list:
-    """All that a modifier's settings hold, nested; data blocks by their identity."""
+    """Returns all values of a modifier's settings, nested; data-blocks by their identity."""
     values = [(f'["{key}"]', _id_property(value)) for key, value in _id_properties(struct)]
     for name, prop in struct.bl_rna.properties.items():
         if name in _INTERFACE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arguments that several commands have."""
+"""Arguments that several commands share."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def add_engine(parser: argparse.ArgumentParser, default: str | None = "auto") ->
 
 
 def add_copies(parser: argparse.ArgumentParser) -> None:
-    """Inputs, --out and --overwrite, of commands that write a file for each input."""
+    """Adds inputs, --out and --overwrite, for commands that write a file for each input."""
     parser.add_argument("inputs", nargs="+", metavar="FILE_OR_FOLDER")
     parser.add_argument(
         "--out", required=True, type=folder_to_write, metavar="DIR", help="folder for what is written"
@@ -66,7 +66,7 @@ def add_copies(parser: argparse.ArgumentParser) -> None:
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
-    """Adds --set, whose value is the dictionary of parameters.parse()."""
+    """Adds --set, whose value is the dictionary from parameters.parse()."""
     parser.add_argument(
         "--set",
         action=_Set,

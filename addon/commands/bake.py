@@ -157,7 +157,7 @@ def _bake(
     ]
     evaluate.set_parameters(args.set)
     chosen = (frames or list(range(scene.frame_start, scene.frame_end + 1)))[:: args.step]
-    # Hidden objects are baked as well, and hidden in the copy.
+    # Hidden objects are baked as well, and hidden again in the copy.
     with evaluate.shown(meshes):
         errors = evaluate.use_methods([(obj, args.method) for obj in meshes])
         outcome.left_out += [str(error) for error in errors if error is not None]
@@ -169,8 +169,8 @@ def _bake(
             started = bake.start(taken, args.to, chosen, target, args.overwrite, helpers)
         except SinewError as error:
             raise SinewError(f"{source}: {error}") from None
-        # An exporter writes all frames in one call, which can not be interrupted and can crash on a full
-        # disk: it runs in a process of its own.
+        # An exporter writes all frames in one call, which cannot be interrupted and can crash on a full disk:
+        # so it runs in a separate process.
         shares = bake_apart.sample(started) if isinstance(started, bake_apart.Export) else started.sample()
         with (
             _whole_or_nothing(started, source),

@@ -33,7 +33,7 @@ class Action:
 
     command   a command of worker.py
     done      a participle for the summary, as in "3 of 4 files re-skinned"
-    settings  those given on the command line
+    settings  from the command line
     job       path of a job file
     methods   names of methods that can be chosen; empty where no method is needed
     """
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, console: Console, action: Action) -> int:
-    """Exit status: 0 all went well, 1 something failed or was not changed."""
+    """Returns the exit status: 0 all went well, 1 something failed or was not changed."""
     job_file = read_job_file(Path(action.job), action.methods) if action.job else JobFile()
     inputs = args.inputs or job_file.inputs
     out = args.out or (job_file.out and folder_to_write(job_file.out))
@@ -147,7 +147,7 @@ def run(args: argparse.Namespace, console: Console, action: Action) -> int:
 
 
 def _check_bakes(jobs: list[Job], settings: list[Settings]) -> None:
-    """Raises WrongUse where a bake would be written over an input or another's copy."""
+    """Raises WrongUse where a bake would overwrite an input or another file's copy."""
     taken = {path: job.source for job in jobs for path in (job.source, job.target)}
     for job, wanted in zip(jobs, settings, strict=True):
         for path in {bake_path(job.target, kind) for kind in wanted.kinds}:
@@ -158,7 +158,7 @@ def _check_bakes(jobs: list[Job], settings: list[Settings]) -> None:
 
 
 class _Workers:
-    """The workers of a batch; the constructor checks the options before anything is done."""
+    """The workers of a batch; the constructor checks the options before any work starts."""
 
     def __init__(self, args: argparse.Namespace, files: int, console: Console) -> None:
         self._args, self._console = args, console
@@ -213,12 +213,12 @@ class _Workers:
 
 
 def _lines_given() -> Iterator[str]:
-    """The lines of standard input; paths need not be valid text."""
+    """Returns the lines of standard input; paths need not be valid text."""
     return map(os.fsdecode, sys.stdin.buffer)
 
 
 def _processors() -> int:
-    """The number of processors that this process may use."""
+    """Returns the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -252,8 +252,8 @@ def _task(args: argparse.Namespace, action: Action, job: Job, settings: Settings
 
 
 def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> dict | None:
-    """The hash and the versions with which the copy is up to date; None where it must be written. Raises
-    SinewError where it must not be replaced."""
+    """Returns the hash and the versions with which the copy is up to date; None where it has to be written.
+    Raises SinewError where it must not be replaced."""
     record = journal.latest.get(journal.name_of(job.target))
     may_react = journal.matches(job.target, record)
     if job.target.exists() and not args.overwrite and not (args.resume and may_react):
@@ -272,7 +272,7 @@ def _known(args: argparse.Namespace, task: dict, job: Job, journal: Journal) -> 
 
 
 def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
-    """Records the outcome of a task, and renames its copy; returns the record."""
+    """Records the outcome of a task, renames its copy, and returns the record."""
     target = Path(task["target"])
     before = journal.latest.get(journal.name_of(target), {})
     if "unchanged" in outcome:
@@ -297,7 +297,7 @@ def _keep(journal: Journal, task: dict, outcome: dict) -> dict:
 
 def _record_failure(journal: Journal, target: Path, record: dict, before: dict) -> None:
     record.pop("unfinished", None)
-    # The older copy still exists, and is this batch's own.
+    # The older copy still exists, and belongs to this batch.
     for key in ("written", "beside"):
         record.pop(key, None)
         if key in before:
@@ -322,7 +322,7 @@ def _show_result(console: Console, progress: BatchProgress, task: dict, result: 
 
 
 def _row(job: Job, name: str, result: dict) -> dict:
-    """The entry of a file in the report."""
+    """Returns the entry of a file in the report."""
     status = "failed" if "error" in result else "unchanged" if "unchanged" in result else "written"
     shown = ("error", "meshes", "left_out", "bakes", "notes", "versions", "seconds", "attempts", "pictures")
     return {"source": str(job.source), "file": name, "status": status} | {

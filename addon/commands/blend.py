@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew blend`: actions of an armature blended into a new one, in a copy of the file."""
+"""`sinew blend`: blends actions of an armature into a new one, in a copy of the file."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ root's steps over the ground are blended and added up.
 --measure prints, for each action and the blend, how far feet slide while they are on the ground, how far the
 root goes, and the angular acceleration of bones; and how much bones shrink under matrix_linear."""
 
-# As options write the names of core.motion.blend.
+# The names of core.motion.blend, as the options spell them.
 ROOT_MOTIONS = {"travel": "travel", "in-place": "in_place", "keyed": "keyed"}
 
 
@@ -195,7 +195,7 @@ def _armature(args: argparse.Namespace) -> bpy.types.Object:
                 f"{args.file}: has no armature {args.armature!r}; there are: {', '.join(found) or 'none'}"
             )
         return found[args.armature]
-    # One that plays nothing is seldom meant.
+    # An armature that plays nothing is seldom meant.
     playing = {name: obj for name, obj in found.items() if obj.animation_data is not None}
     left = playing if len(playing) == 1 else found
     if len(left) != 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew check`: whether files can be rendered, before they are sent to a farm."""
+"""`sinew check`: checks whether files can be rendered, before they are sent to a render farm."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _files_of(given: Path) -> list[Path]:
 
 
 def _checked(paths: list[Path], limits: Limits) -> Generator[tuple[Path, dict], None, None]:
-    """Each file and its outcome, by a Blender process that is started again where it crashes or is ended.
+    """Yields each file and its outcome, from a Blender process that is restarted if it crashes or is ended.
     Raises SinewError where none can be started."""
     blender = None
     try:
@@ -114,7 +114,7 @@ def _report(path: Path, outcome: dict, status: BlenderStatus | None) -> dict:
 
 
 def _missing(status: BlenderStatus) -> list[str]:
-    """Why the other Blender can not deform as this one does."""
+    """Returns why the other Blender cannot deform as this one does."""
     name = f"{status.program} (Blender {status.blender})"
     if status.problem is not None:
         return [f"needs Sinew, which {name} does not have: {status.problem}; install and enable it there"]
@@ -124,7 +124,7 @@ def _missing(status: BlenderStatus) -> list[str]:
 
 
 def line_of(report: dict) -> str:
-    """The line of one file without --json."""
+    """Returns the line of one file without --json."""
     if report["problems"]:
         text = "; ".join(report["problems"])
     elif report["needs_sinew"]:

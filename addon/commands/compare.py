@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare`: a page for each file that shows and measures methods beside each other."""
+"""`sinew compare`: writes a page for each file that shows and measures methods side by side."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _compare(
     args: argparse.Namespace,
     console: Console,
 ) -> bool:
-    """Writes one file's page; false where a mesh was left out."""
+    """Writes one file's page; returns False where a mesh was left out."""
     import bpy
 
     from ..deform import evaluate
@@ -139,7 +139,7 @@ def _compare(
     frames = frames or list(range(scene.frame_start, scene.frame_end + 1))
     evaluate.set_frame(scene, frames[0])
     played = [*methods, args.reference]
-    meshes, left_out = evaluate.drivable_meshes(scene, path, played, args.object)
+    meshes, left_out = evaluate.deformable_meshes(scene, path, played, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = measure.gather(scene, meshes)

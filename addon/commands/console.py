@@ -38,7 +38,7 @@ class Console:
             self._rich = RichConsole(file=err, highlight=False)
 
     def say(self, text: str) -> None:
-        """Prints a result on standard output. Raises SinewError where it can not be written, as on a full
+        """Prints a result on standard output. Raises SinewError where it cannot be written, as on a full
         disk."""
         with self._writing_results():
             print(_shown(text) if self.out.isatty() else text, file=self.out, flush=True)
@@ -49,7 +49,7 @@ class Console:
             # rich prints it above the bar.
             self._rich.print(_shown(text), markup=False, soft_wrap=True)
         else:
-            # A note that can not be printed is no reason to stop.
+            # A note that cannot be printed is no reason to stop.
             with suppress(OSError):
                 print(_shown(text), file=self.err, flush=True)
 
@@ -63,11 +63,11 @@ class Console:
             import rich.table
             import rich.text
 
-            # Folded, not cut: the end of a path matters.
+            # Wrapped, not truncated: the end of a path matters.
             table = rich.table.Table(*(rich.table.Column(name, overflow="fold") for name in columns))
             for row in rows:
                 table.add_row(*(rich.text.Text(_shown(cell)) for cell in row))
-            # Not cut to 80 columns where there is no terminal to fit.
+            # Without a terminal, not truncated to 80 columns.
             width = None if self.out.isatty() else 200
             with self._writing_results():
                 rich.console.Console(file=self.out, highlight=False, width=width).print(table)
@@ -77,7 +77,7 @@ class Console:
             self.say("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
     def progress(self, items: Iterable[Item], total: int, what: str) -> Iterator[Item]:
-        """The items, with a bar on a terminal and one line elsewhere."""
+        """Yields the items, with a progress bar on a terminal and one line elsewhere."""
         with self.bar(what, total) as show:
             for number, item in enumerate(items):
                 yield item
@@ -86,8 +86,8 @@ class Console:
 
     @contextmanager
     def bar(self, what: str, total: int) -> Iterator[Callable[[float], None]]:
-        """Shows the progress of a work of `total` parts: a bar on a terminal, one line elsewhere. Call the
-        returned function with the share that is done, 0 to 1."""
+        """Shows the progress of a work of `total` parts: a bar on a terminal, one line elsewhere. The
+        returned function is called with the progress, 0 to 1."""
         if self._rich is None or not self._rich.is_terminal:
             self.note(f"{what} ({total})")
             yield lambda _share: None
@@ -107,12 +107,12 @@ class Console:
         try:
             yield
         except OSError as error:
-            # Python would try to write the rest again at the end of the process, with a traceback.
+            # Otherwise Python would try to write the rest at the end of the process, with a traceback.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
             raise SinewError(f"standard output: can not be written: {error.strerror or error}") from None
 
     def close(self) -> None:
-        """Gives the terminal back where the process is about to end at once."""
+        """Restores the terminal before the process ends."""
         if self._close_bar is not None:
             self._close_bar()
         self.out.flush()
@@ -129,7 +129,7 @@ class Console:
 
         columns = (
             TextColumn("{task.description}"),
-            # Leaves space for a terminal's ^C in 80 columns: where that wraps, the bar is drawn twice.
+            # Leaves space for a terminal's ^C in 80 columns: if that wraps, the bar is drawn twice.
             BarColumn(bar_width=20),
             MofNCompleteColumn(),
             TextColumn("{task.fields[meshes]} meshes, {task.fields[failed]} failed"),
@@ -144,7 +144,8 @@ class Console:
 
 
 def _shown(text: str) -> str:
-    """The text without control characters, which would act on a terminal: names in files can have any."""
+    """Returns the text without control characters, which would affect a terminal: names in files can contain
+    any."""
     return _CONTROLS.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
@@ -162,7 +163,7 @@ class BatchProgress:
         self._console, self._total, self._bar, self._bar_task = console, total, bar, bar_task
 
     def step(self, line: str | None, meshes: int, failed: bool) -> None:
-        """Counts one more file; `line` describes it, None where it was printed already."""
+        """Counts one more file; `line` describes it, None if it was printed already."""
         self.done += 1
         self.meshes += meshes
         self.failed += failed
@@ -173,7 +174,7 @@ class BatchProgress:
 
 
 def take_over_output() -> Console:
-    """Standard output and error for Sinew only: what Blender prints is discarded.
+    """Reserves standard output and error for Sinew: what Blender prints is discarded.
 
     Blender writes to the file descriptors themselves, so these are redirected until the end of the process,
     when it still prints.
@@ -186,15 +187,15 @@ def take_over_output() -> Console:
     os.dup2(discard, 1)
     os.dup2(discard, 2)
     os.close(discard)
-    # A traceback of Sinew's is a bug and must be shown.
+    # A traceback of Sinew's is a bug and has to be shown.
     sys.stderr = err
     return Console(out, err)
 
 
 def keep_output() -> Console:
-    """Standard output and error shared with Blender, for `--verbose`."""
+    """Shares standard output and error with Blender, for `--verbose`."""
     for stream in (sys.stdout, sys.stderr):
-        # Where there is no UTF-8, as in many of Windows' consoles: shown is what can be.
+        # Without UTF-8, as in many of Windows' consoles, characters that cannot be printed are replaced.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     return Console(sys.stdout, sys.stderr, verbose=True)

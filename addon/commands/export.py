@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew export`: a .glb by Blender's own exporter, with what engines need to skin as Sinew does."""
+"""`sinew export`: writes a .glb with Blender's own exporter, with what engines need to skin as Sinew does."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     scene = bpy.context.scene
     meshes = attach.deformed_meshes(list(scene.objects))
     left_out: list[str] = []
-    # Blender does not evaluate what is hidden.
+    # Blender does not evaluate hidden objects.
     with evaluate.shown(meshes):
         if args.method is not None:
             evaluate.set_parameters(args.set)
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             try:
                 write_whole(args.out, lambda path: _write(path, args.influences))
             except RuntimeError as error:
-                # The exporter's: all that Blender wrote.
+                # The exporter's error, with everything that Blender printed.
                 raise SinewError(f"{args.out}: can not be written: {files.telling_line(error)}") from None
     left_out += export.left_out()
     for sentence in left_out:
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 def _write(path: Path, influences: int) -> None:
     import bpy
 
-    # Where the exporter fails, Blender prints a traceback and raises it as an error.
+    # If the exporter fails, Blender prints a traceback and raises it as an error.
     with redirect_stderr(io.StringIO()):
         bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_influence_nb=influences)
     if not is_whole(path, "gltf"):
@@ -95,7 +95,8 @@ def _write(path: Path, influences: int) -> None:
 
 @contextmanager
 def _known_to_exporters() -> Iterator[None]:
-    """They look for extensions among those that are switched on, where Sinew is not with bpy as a module."""
+    """Exporters search for extensions among the enabled ones, which do not include Sinew with bpy as a
+    module."""
     import bpy
 
     module = __package__.rpartition(".")[0]

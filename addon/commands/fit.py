@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew fit`: rigid transforms fitted to numbers in files. Without Blender."""
+"""`sinew fit`: fits rigid transforms to numbers in files, without Blender."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Files are .npy, or text with a row of numbers for each point (3) or motion: 7 (w
 dual quaternion), 12 or 16 (a matrix, row by row), with commas or blanks between. Exit status 1: another
 transform fits as well, as of points on one line."""
 
-# Numbers of a row, and the last axes that they are.
+# The number of values in a row, and the shape that they have.
 SHAPES = {7: (7,), 8: (8,), 12: (3, 4), 16: (4, 4)}
 FILES = {"points": 2, "hand-eye": 2, "average": 1}
 
@@ -86,7 +86,7 @@ def _fitted(args: argparse.Namespace, rows: list[np.ndarray], weights: np.ndarra
 
 
 def _facts(transform: np.ndarray, is_defined: bool, left: dict[str, Any]) -> dict[str, Any]:
-    """`transform` in whichever layout it is, by its last axis."""
+    """`transform` can have any layout, recognised by its last axis."""
     matrix = transform
     if transform.shape[-1] != 4:
         layout = sinew.quat_vec if transform.shape[-1] == 7 else sinew.dual_quat
@@ -120,7 +120,7 @@ def _say(facts: dict[str, Any], console: Console) -> None:
 
 
 def _numbers(path: Path) -> np.ndarray:
-    """float64 [rows, ..]."""
+    """Reads float64 [rows, ..]."""
     if not path.is_file():
         raise SinewError(f"{path}: no such file")
     try:

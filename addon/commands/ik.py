@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew ik`: copies of files whose IK chains are solved by Sinew, or both solvers measured."""
+"""`sinew ik`: writes copies of files whose IK chains Sinew solves, or measures both solvers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew inbetween`: copies of files whose bones move between their keyed poses by a method of Sinew."""
+"""`sinew inbetween`: writes copies of files whose bones move between their keyed poses by a method of
+Sinew."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def describe_file(path: Path) -> list[dict[str, object]]:
-    """A dictionary for each mesh that an armature deforms, in any scene of the file."""
+    """Returns a dictionary for each mesh that an armature deforms, in any scene of the file."""
     import bpy
 
     from ..attach import attach
@@ -53,7 +53,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
         armature = attach.armature_of(obj)
         if armature is None:
             raise SinewError(f"{path}: {obj.name} was deformed by Sinew, and its armature is missing")
-        facts = survey.describe_undriven(obj)
+        facts = survey.describe_in_file(obj)
         meshes.append(
             {
                 "object": obj.name,
@@ -70,7 +70,7 @@ def describe_file(path: Path) -> list[dict[str, object]]:
 
 
 def left_to_blender() -> list[str]:
-    """The open file's objects other than meshes that an armature deforms."""
+    """Returns the objects of the open file, other than meshes, that an armature deforms."""
     import bpy
 
     from ..attach import attach

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew methods`: the methods and the stages that may follow them."""
+"""`sinew methods`: lists the methods, and the stages that may follow them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _facts(row: sinew.Method | sinew.Stage) -> dict:
-    """The facts of a method or a stage; its parameters by the names that --set takes."""
+    """Returns the facts of a method or a stage; its parameters by the names that --set takes."""
     facts = {"name": row.name, "label": row.label, "description": row.description, "source": row.source}
     return facts | {"parameters": _parameters(row)}
 

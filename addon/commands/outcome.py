@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outcome of one of a command's files."""
+"""The outcome of a command for one file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from .console import Console
 
 @dataclass
 class Outcome:
-    """left_out: a sentence for each object that was left as it was; error: why nothing was written."""
+    """The outcome of a command for one file.
+
+    left_out  a sentence for each object that was not changed
+    error     why nothing was written
+    """
 
     job: Job
     left_out: list[str] = field(default_factory=list)

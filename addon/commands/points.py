@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew points`: the deformed vertices of chosen frames, as numpy arrays."""
+"""`sinew points`: writes the deformed vertices of chosen frames, as numpy arrays."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     if "frames" in (obj.name for obj in taken):
         raise SinewError(f"{args.file}: an object is called frames, as the array of frames is; rename it")
-    # A linked object can have the name of one of the file's own.
+    # A linked object can have the same name as one of the file's own.
     names = Counter(obj.name for obj in taken)
     keys = {obj: obj.name if names[obj.name] == 1 else obj.name_full for obj in taken}
     points: dict[str, list[np.ndarray]] = {key: [] for key in keys.values()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew render`: pictures of frames under one method, compared with golden ones."""
+"""`sinew render`: renders frames under one method, and compares them with golden pictures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ..core.parameters import Value, as_texts, parse
 from .arguments import add_engine, add_file, add_object, add_set
 from .console import Console
 
-# In percent of the pixels; none differs between Blender 4.2 and 5.2 on one machine.
+# In percent of the pixels; between Blender 4.2 and 5.2 on one machine, no pixel differs.
 USUAL_TOLERANCE = 0.05
 
 
@@ -102,8 +102,8 @@ def _check_fits(args: argparse.Namespace, golden: RenderSettings, frames: list[f
 
 
 def _check_free(out: Path, frames: list[float]) -> None:
-    """Raises SinewError where files of these names exist that `sinew render` did not make: others use names
-    such as 0001.png, too."""
+    """Raises SinewError where files with these names exist that `sinew render` did not make: other programs
+    use names such as 0001.png, too."""
     if (out / SETTINGS).exists():
         return
     for frame in frames:
@@ -131,7 +131,7 @@ def _draw(
     files.open_file(args.file)
     scene = bpy.context.scene
     evaluate.set_frame(scene, frames[0])
-    meshes, left_out = evaluate.drivable_meshes(scene, args.file, [method], args.object)
+    meshes, left_out = evaluate.deformable_meshes(scene, args.file, [method], args.object)
     if left_out:
         raise SinewError(f"{args.file}: {left_out[0]}")
     evaluate.use_method_on(meshes, method)
@@ -150,7 +150,7 @@ def _draw(
     settings = RenderSettings(
         args.file.name, method, frames, engine, size, args.own_look, names, views, as_texts(parameters)
     )
-    # Written first: it marks the pictures as made by this command, also where it is interrupted.
+    # Written first: it marks the pictures as made by this command, even if that is interrupted.
     write_text(args.out / SETTINGS, settings.to_json())
     for index, frame in enumerate(console.progress(frames, len(frames), f"Drawing {args.file.name}")):
         evaluate.set_frame(scene, frame)
@@ -162,7 +162,7 @@ def _draw(
 
 
 def _judge(args: argparse.Namespace, frames: list[float], console: Console) -> int:
-    """Compares pictures, shows a table, draws what differs; exit status."""
+    """Compares pictures, prints a table, draws the differences; returns the exit status."""
     from ..features.pages import pictures
 
     rows, failures = [], 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew report`: the experiments of Smith 2013 again, on one page."""
+"""`sinew report`: repeats the experiments of Smith 2013, on one page."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _make(args: argparse.Namespace, console: Console) -> None:
-    """report.html and report.json."""
+    """Writes report.html and report.json."""
     import sinew
 
     from ..core.report import answers, joints, measure, meshes, page, paths, studies, tables
@@ -121,7 +121,7 @@ def _make(args: argparse.Namespace, console: Console) -> None:
 
 
 def _draw(args: argparse.Namespace, console: Console) -> tuple[Figure, ...]:
-    """Figures 3.6 to 3.11, or the reason why this installation can not draw them."""
+    """Returns figures 3.6 to 3.11, or the reason why this installation cannot draw them."""
     from ..core.report import meshes
     from ..prepare import prepare_blender
 

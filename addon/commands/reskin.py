@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew reskin`: copies of files in which every armature-deformed mesh uses Sinew."""
+"""`sinew reskin`: writes copies of files in which every armature-deformed mesh uses Sinew."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew restore`: copies of re-skinned files with their Armature modifiers as they were."""
+"""`sinew restore`: writes copies of re-skinned files with their original Armature modifiers."""
 
 from __future__ import annotations
 

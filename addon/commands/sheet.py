@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`sinew compare --out SHEET.png`: one picture of a frame under several methods."""
+"""`sinew compare --out SHEET.png`: draws one picture of a frame under several methods."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..core.sheet import Column, require_pillow, write_sheet
 from ..core.views import close_view, most_different_vertex
 from .console import Console
 
-# Suffixes of a picture; other paths are folders.
+# Extensions of pictures; other paths are folders.
 PICTURES = {".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf"}
 
 
 def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
-    """A column for each method, with the same camera for all, a close-up of the vertex at which the methods
-    differ most, and the volume relative to the rest pose."""
+    """Draws a column for each method, with the same camera for all, a close-up of the vertex at which the
+    methods differ most, and the volume relative to the rest pose."""
     import bpy
 
     from ..attach import properties
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace, methods: list[str], console: Console) -> int:
     files.open_file(path)
     scene = bpy.context.scene
     evaluate.set_frame(scene, frame)
-    meshes, left_out = evaluate.drivable_meshes(scene, path, methods, args.object)
+    meshes, left_out = evaluate.deformable_meshes(scene, path, methods, args.object)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
 

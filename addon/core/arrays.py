@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays that may be missing."""
+"""Comparison of arrays that may be None."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ import numpy as np
 
 
 def are_equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
-    """Whether both are missing, or neither is and they have the same shape and numbers."""
+    """Whether both are None, or both have the same shape and numbers."""
     return a is b or (a is not None and b is not None and np.array_equal(a, b))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Point caches of baked frames, MDD and PC2; which frames a bake can have; the disk space that it needs."""
+"""Point caches of baked frames (MDD and PC2), and checks of the frames and the disk space of a bake."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from .errors import SinewError, WrongUse
 from .output import remove, writing
 
-# Bakes that play in a .blend, and bakes that are files for other programs.
+# Bakes that a .blend plays, and bakes to files for other programs.
 BONES = "bones"
 IN_FILE = ("shape-keys", "mdd", "pc2", BONES)
 EXPORTS = {"alembic": ".abc", "usd": ".usdc", "gltf": ".glb"}
@@ -24,24 +24,25 @@ BAKED = ".baked.blend"
 
 
 def bake_path(copy: Path, kind: str) -> Path:
-    """The file that a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for bakes that a .blend
-    plays."""
+    """Returns the file that a batch bakes beside a copy: "hero.usdc", or "hero.baked.blend" for bakes that a
+    .blend plays."""
     return copy.with_suffix(EXPORTS.get(kind, BAKED))
 
 
 def mdd_header(frames: Sequence[float], vertices: int, rate: float) -> bytes:
-    """Big-endian: number of frames, of points, and the time of each frame in seconds."""
+    """Returns, big-endian: number of frames, number of points, and the time of each frame in seconds."""
     times = (np.asarray(frames, dtype=np.float64) / rate).astype(">f4")
     return struct.pack(">ii", len(frames), vertices) + times.tobytes()
 
 
 def pc2_header(frames: Sequence[float], vertices: int, _rate: float) -> bytes:
-    """Little-endian: version 1, number of points, first frame, frames from sample to sample, samples."""
+    """Returns, little-endian: version 1, number of points, first frame, frames between samples, number of
+    samples."""
     step = frames[1] - frames[0] if len(frames) > 1 else 1.0
     return struct.pack("<12siiffi", b"POINTCACHE2\0", 1, vertices, frames[0], step, len(frames))
 
 
-# By format: its header, and the type of a coordinate.
+# For each format, its header and the type of a coordinate.
 FORMATS: dict[str, tuple[Callable[[Sequence[float], int, float], bytes], str]] = {
     "mdd": (mdd_header, ">f4"),
     "pc2": (pc2_header, "<f4"),
@@ -51,8 +52,8 @@ FORMATS: dict[str, tuple[Callable[[Sequence[float], int, float], bytes], str]] =
 class PointCache:
     """A point cache that is written frame by frame to a temporary file; publish() renames it to `path`.
 
-    frames  of the samples to come
-    rate    frames a second
+    frames  of the samples that will be written
+    rate    frames per second
     """
 
     def __init__(self, path: Path, kind: str, frames: Sequence[float], vertices: int, rate: float) -> None:
@@ -66,12 +67,12 @@ class PointCache:
             self._file.write(header(frames, vertices, rate))
 
     def write(self, points: np.ndarray) -> None:
-        """The next sample, [vertices, 3]."""
+        """Writes the next sample, [vertices, 3]."""
         with writing(self.path):
             self._file.write(points.astype(self._coordinate).tobytes())
 
     def close(self) -> None:
-        """Ends the file; its samples are written."""
+        """Closes the file after its last sample."""
         with writing(self.path):
             self._file.close()
 
@@ -100,7 +101,7 @@ def check_space(folder: Path, needed: int) -> None:
 
 
 def check_frames(kind: str, frames: Sequence[float]) -> None:
-    """Raises WrongUse where a bake of this kind can not have the frames, in rising order."""
+    """Raises WrongUse where a bake of this kind is not possible for the frames, which are ascending."""
     is_whole = all(float(frame).is_integer() for frame in frames)
     if kind in ("alembic", "usd") and not (is_whole and is_even(frames, 1)):
         raise WrongUse(f"{kind}: Blender exports every frame of a range; give frames such as 1-48")
@@ -139,8 +140,9 @@ def is_even(frames: Sequence[float], step: float | None = None) -> bool:
 
 
 def ramps(frames: Sequence[float]) -> list[tuple[list[float], list[float]]]:
-    """For each frame, times and values of the keys of its shape: 1 at that frame, 0 at its neighbours. With
-    linear interpolation between the keys, two neighbours are mixed at a time and all values sum to 1."""
+    """Returns, for each frame, times and values of the keys of its shape: 1 at that frame, 0 at its
+    neighbours. With linear interpolation between the keys, two neighbours are mixed at a time and all values
+    sum to 1."""
     result = []
     for number in range(len(frames)):
         neighbours = range(max(number - 1, 0), min(number + 2, len(frames)))

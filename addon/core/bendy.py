@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bendy bones: n segments have n + 1 joints along the bone; a vertex is moved by the two joints next to it.
+"""Bendy bones: n segments have n + 1 joints along the bone; a vertex is moved by the two joints nearest to
+it.
 
 A joint is what Blender calls so (PoseBone.bbone_segment_matrix): the transform between two segments.
 
-Based on: what Blender's Armature modifier does; for the curved mapping, the description of its "B-Bone vertex
-mapping" in Blender's developer documentation and its change 110758, whose constants it shares.
+Based on what Blender's Armature modifier does. For the curved mapping, on the description of its "B-Bone
+vertex mapping" in Blender's developer documentation and its change 110758, whose constants are used here.
 """
 
 from __future__ import annotations
@@ -27,14 +28,16 @@ def spread_over_joints(
     first_joints: np.ndarray,
     curved: np.ndarray,
 ) -> Influences:
-    """The influences, each one of a bendy bone split between the two joints next to the vertex.
+    """Returns the influences, with each influence of a bendy bone split between the two joints nearest to the
+    vertex.
 
     points        float [vertices, 3], rest points in armature space
     rest          float [bones + joints, 4, 4], armature space, Y along the bone
     lengths       float [bones]
     segments      int [bones], 1 for a bone that does not bend
-    first_joints  int [bones], index of the bone's first joint; its joints follow one another
-    curved        bool [bones], vertices are mapped along the bone's curve at rest, not its straight line
+    first_joints  int [bones], index of the bone's first joint; a bone's joints are consecutive
+    curved        bool [bones], vertices are mapped along the bone's curve at rest, not along its straight
+                  line
     """
     counts = influences.counts
     vertices = np.repeat(np.arange(len(counts)), counts)
@@ -57,7 +60,7 @@ def spread_over_joints(
     second_share = np.clip(along - joint, 0.0, 1.0)
 
     # Two entries for every influence; the second has weight 0 for bones that do not bend, and is then
-    # dropped. The order stays that of the influences: dual quaternions depend on it.
+    # dropped. The order of the influences is kept: dual quaternions depend on it.
     targets = np.stack([bones, bones], axis=1)
     weights = np.stack([influences.weights, np.zeros_like(influences.weights)], axis=1)
     targets[bends, 0] = first_joints[bent] + joint
@@ -73,10 +76,11 @@ def spread_over_joints(
 
 
 def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:
-    """float64 [n]: where along a bendy bone's curve each point lies, 0 at its head, 1 at its tail.
+    """Returns float64 [n]: the position of each point along a bendy bone's curve, 0 at its head, 1 at its
+    tail.
 
-    A binary search among the planes through the joints finds the segment. Inside a bend the share would jump
-    at these planes: it is smoothed at each plane that the search tested, from the last to the first.
+    A binary search among the planes through the joints finds the segment. Inside a bend the position would
+    jump at these planes, so it is smoothed at each plane that the search tested, from the last to the first.
 
     points  float64 [n, 3]
     joints  float64 [segments + 1, 4, 4] at rest, Y along the curve, same space
@@ -103,8 +107,8 @@ def share_along_curve(points: np.ndarray, joints: np.ndarray) -> np.ndarray:
 
 
 def _search(distances: np.ndarray, segments: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
-    """The planes tested at each step, -1 for points whose search has ended, and the two that enclose a point:
-    -1 before the first plane, segments + 1 behind the last."""
+    """Returns the planes tested at each step, -1 for points whose search has ended, and the two planes that
+    enclose each point: -1 before the first plane, segments + 1 behind the last."""
     count = len(distances)
     first, last = np.full(count, -1), np.full(count, segments + 1)
     bias = np.zeros(count, dtype=np.int64)
@@ -121,7 +125,7 @@ def _search(distances: np.ndarray, segments: int) -> tuple[list[np.ndarray], np.
 
 
 def _smoothing_scales(segments: int, widest: float) -> np.ndarray:
-    """1 / width of the smoothing at each step of the search, in lengths of the whole bone."""
+    """Returns 1 / width of the smoothing at each step of the search, in lengths of the whole bone."""
     steps = int(np.ceil(np.log2(segments + 2)))
     narrowing = max(widest, 1.0) ** (1.0 / (steps - 1))
     return segments / widest * narrowing ** np.arange(steps)
@@ -130,7 +134,7 @@ def _smoothing_scales(segments: int, widest: float) -> np.ndarray:
 def _pull_to_plane(
     share: np.ndarray, plane: np.ndarray, distances: np.ndarray, segments: int, scale: float
 ) -> np.ndarray:
-    """`share`, that of points near one plane moved towards the value that the ideal slope gives."""
+    """Returns `share`, where values of points near a plane are moved towards those with the ideal slope."""
     distance = distances[np.arange(len(share)), plane]
     at_plane = plane / segments
     gap = np.abs(share - at_plane) - np.abs(distance)

@@ -16,10 +16,10 @@ from .stage_mesh import StageMesh
 
 
 def segments(bones: Bones) -> tuple[np.ndarray, np.ndarray]:
-    """Heads and tails at rest, float32 [bones + joints, 3], armature space.
+    """Returns heads and tails at rest, float32 [bones + joints, 3], armature space.
 
-    A joint of a bendy bone has the two segments of the bone beside it, as one: a vertex between two joints is
-    then beside the segments of both.
+    A joint of a bendy bone gets its two adjacent segments as one: so a vertex between two joints is compared
+    with the segments of both.
     """
     heads = bones.rest[:, :3, 3].copy()
     tails = heads.copy()
@@ -34,14 +34,14 @@ def segments(bones: Bones) -> tuple[np.ndarray, np.ndarray]:
 
 
 class BulgeLimit:
-    """See core.stages.Stage. By the bones of the first Armature modifier that takes part."""
+    """See core.stages.Stage. Uses the bones of the first Armature modifier that takes part."""
 
     def __init__(self, mesh: StageMesh, mask: np.ndarray | None) -> None:
         self._mesh = mesh
         self._mask = mask
         self._native: sinew.BulgeLimit | None = None
-        # What it is bound to.
-        self._link = -1
+        # What the native stage is bound to.
+        self._modifier = -1
         self._rest_points: np.ndarray | None = None
         self._space: np.ndarray | None = None
         # By the number of the Armature modifier.
@@ -50,42 +50,46 @@ class BulgeLimit:
     def apply(
         self, points: np.ndarray, values: Mapping[str, Any], rest_points: np.ndarray, frames: Sequence[Any]
     ) -> None:
-        link = next((i for i, frame in enumerate(frames) if frame is not None), None)
-        if link is None:
+        modifier = next((i for i, frame in enumerate(frames) if frame is not None), None)
+        if modifier is None:
             return
-        frame, bones = frames[link], self._mesh.weightings[link].bones
-        motions = frame.pose.astype(np.float64) @ self._rest_inverses(link)
+        frame, bones = frames[modifier], self._mesh.weightings[modifier].bones
+        motions = frame.pose.astype(np.float64) @ self._rest_inverses(modifier)
         if frame.scale_rule == IGNORED.name:
             motions = sinew.affine.split_scale(motions, bones.rest_axes.astype(np.float64)).rigid
-        self._bind(link, rest_points, frame.bones_from_model).apply(
+        self._bind(modifier, rest_points, frame.bones_from_model).apply(
             points, motions.astype(np.float32), points, strength=values["strength"], form=values["form"]
         )
 
-    def _rest_inverses(self, link: int) -> np.ndarray:
-        """float64 [bones + joints, 4, 4]. Inverted once: numpy does it with threads of its own, for which a
-        frame would wait on a busy machine."""
-        if link not in self._inverses:
-            rest = self._mesh.weightings[link].bones.rest
-            self._inverses[link] = np.linalg.inv(rest.astype(np.float64))
-        return self._inverses[link]
+    def _rest_inverses(self, modifier: int) -> np.ndarray:
+        """Returns float64 [bones + joints, 4, 4]. Inverted only once: numpy's inversion uses its own threads,
+        for which a frame would wait on a busy machine."""
+        if modifier not in self._inverses:
+            rest = self._mesh.weightings[modifier].bones.rest
+            self._inverses[modifier] = np.linalg.inv(rest.astype(np.float64))
+        return self._inverses[modifier]
 
-    def _bind(self, link: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> sinew.BulgeLimit:
-        weighting = self._mesh.weightings[link]
+    def _bind(self, modifier: int, rest_points: np.ndarray, bones_from_model: np.ndarray) -> sinew.BulgeLimit:
+        weighting = self._mesh.weightings[modifier]
         is_same = (
             rest_points is self._rest_points
             and self._space is not None
             and np.array_equal(bones_from_model, self._space)
         )
         space = bones_from_model.astype(np.float32)
-        if self._native is None or link != self._link or (weighting.depends_on_points and not is_same):
-            self._native = self._make(weighting, link, rest_points, bones_from_model)
+        if (
+            self._native is None
+            or modifier != self._modifier
+            or (weighting.depends_on_points and not is_same)
+        ):
+            self._native = self._make(weighting, modifier, rest_points, bones_from_model)
         elif not is_same:
             self._native.set_rest_points(rest_points, space)
-        self._link, self._rest_points, self._space = link, rest_points, bones_from_model.copy()
+        self._modifier, self._rest_points, self._space = modifier, rest_points, bones_from_model.copy()
         return self._native
 
     def _make(
-        self, weighting: Weighting, link: int, rest_points: np.ndarray, bones_from_model: np.ndarray
+        self, weighting: Weighting, modifier: int, rest_points: np.ndarray, bones_from_model: np.ndarray
     ) -> sinew.BulgeLimit:
         points = rest_points
         if weighting.depends_on_points:
@@ -98,13 +102,13 @@ class BulgeLimit:
             influences.weights,
             *segments(weighting.bones),
             bones_from_model=bones_from_model.astype(np.float32),
-            weights=self._weights(link),
+            weights=self._weights(modifier),
         )
 
-    def _weights(self, link: int) -> np.ndarray | None:
-        """The vertex group's; 0 where the Armature modifier's own mask leaves a vertex behind its bones: how
-        far it is from them says nothing."""
-        follows = self._mesh.link_masks[link] if self._mesh.link_masks else None
+    def _weights(self, modifier: int) -> np.ndarray | None:
+        """Returns the vertex group's weights, with 0 where the Armature modifier's own mask keeps a vertex
+        from following its bones: its distance from them means nothing."""
+        follows = self._mesh.modifier_masks[modifier] if self._mesh.modifier_masks else None
         if follows is None:
             return self._mask
         whole = (follows >= 1.0).astype(np.float32)

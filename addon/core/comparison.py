@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The results of a comparison of methods: numbers of each frame, worst frames, diagnostics; as CSV and
+"""The results of a comparison of methods: measures of each frame, worst frames, diagnostics; as CSV and
 JSON."""
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, fields
 from .diagnostics import Finding
 from .metrics import METRICS, Gauge, Summary
 
-# Compared where the user names none.
+# Compared unless the user names others.
 USUAL_METHODS = ("lbs", "qv", "dq")
 # Differences below this share of the diagonal, or of the value at rest, are rounding errors.
 ROUNDING = 1e-5
@@ -24,7 +24,7 @@ LENGTHS = {"distance_max", "distance_rms", "bulge_min", "bulge_max", "bulge_wors
 
 @dataclass(frozen=True)
 class RestFacts:
-    """The rest shape of all meshes together."""
+    """Facts about the rest shape of all meshes together."""
 
     vertices: int
     triangles: int
@@ -36,7 +36,7 @@ class RestFacts:
 
     @classmethod
     def of(cls, gauge: Gauge) -> RestFacts:
-        """At the frame that `gauge` was set to last."""
+        """Returns the facts at the frame last set in `gauge`."""
         surface, rest = gauge.surface, gauge.rest
         return cls(
             surface.vertex_count,
@@ -50,7 +50,7 @@ class RestFacts:
 
     @property
     def note(self) -> str:
-        """How far the volume can be trusted, one sentence; empty for a closed mesh."""
+        """Returns one sentence about how reliable the volume is; empty for a closed mesh."""
         if self.clashes:
             return (
                 f"{self.clashes:,} edges have faces that wind against each other, or more than two: the "
@@ -76,14 +76,14 @@ class Worst:
 
 @dataclass
 class Comparison:
-    """Methods beside each other on the meshes of one file.
+    """Several methods compared on the meshes of one file.
 
     methods    name -> label, in order
-    reference  the method that distances are measured to
+    reference  the method that distances are measured from
     unit       of lengths
     summaries  by method, for each frame
-    times      by method, for each frame: milliseconds that Blender took for the whole frame
-    own        by method, for each frame: the milliseconds of these that Sinew took
+    times      by method, for each frame: the milliseconds that Blender took for the whole frame
+    own        by method, for each frame: the milliseconds of this that Sinew took
     findings   by mesh
     """
 
@@ -104,7 +104,7 @@ class Comparison:
         return [getattr(summary, entry) for summary in self.summaries[method]]
 
     def length(self, value: float) -> str:
-        """As text with its unit; 0 for a rounding error."""
+        """The length as text with its unit; 0 for a rounding error."""
         return f"{value if abs(value) > ROUNDING * self.rest.diagonal else 0.0:.3g}\u00a0{self.unit}"
 
     def shows(self, entry: str, value: float) -> bool:
@@ -112,7 +112,7 @@ class Comparison:
         return abs(value) > ROUNDING * (self.rest.diagonal if entry in LENGTHS else 1.0)
 
     def worst(self, entry: str) -> Worst:
-        """Where an entry of the summaries is largest by magnitude; the first of equals."""
+        """Returns where an entry of the summaries has its largest magnitude; the first of equals."""
         candidates = [
             Worst(entry, frame, method, value)
             for method in self.methods
@@ -123,8 +123,8 @@ class Comparison:
         return max(candidates, key=lambda worst: abs(worst.value), default=nothing)
 
     def worst_frames(self, count: int) -> list[float]:
-        """At most `count` frames, in order: those at which a measure is worst, one for each measure, without
-        those close to one that is already chosen."""
+        """Returns at most `count` frames, in order: the worst frame of each measure, without those close to
+        one that is already chosen."""
         entries = ["distance_max", "volume_change", *(metric.worst for metric in METRICS.values())]
         apart = (max(self.frames) - min(self.frames)) / 10
         chosen: list[float] = []
@@ -141,7 +141,7 @@ class Comparison:
         return statistics.median(self.own[method])
 
     def to_csv(self) -> str:
-        """A row for each frame and method, the entries of Summary and the times in columns."""
+        """Returns a row for each frame and method, with the entries of Summary and the times as columns."""
         names = [field.name for field in fields(Summary)]
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -154,7 +154,7 @@ class Comparison:
         return text.getvalue()
 
     def to_json(self) -> str:
-        """Everything, including the vertices of the findings."""
+        """Returns everything, including the vertices of the findings."""
         return json.dumps(
             {
                 "file": self.file,
@@ -182,13 +182,13 @@ class Comparison:
 
 
 def peaks(values: Sequence[float], count: int) -> list[int]:
-    """Indices of at most `count` local maxima of `values`, largest first; the first of equal neighbours.
-    Frames next to the worst one show the same, so they are no peaks of their own."""
+    """Returns the indices of at most `count` local maxima of `values`, largest first; the first of equal
+    neighbours. Frames next to the worst one show the same, so only maxima count."""
     padded = [-math.inf, *values, -math.inf]
     indices = [i for i, value in enumerate(values) if padded[i] < value and value >= padded[i + 2]]
     return sorted(indices, key=lambda i: -values[i])[:count]
 
 
 def _finite(values: dict[str, float]) -> dict[str, float | None]:
-    """NaN and infinity as None: JSON has neither."""
+    """Replaces NaN and infinity by None, as JSON has neither."""
     return {name: value if math.isfinite(value) else None for name, value in values.items()}

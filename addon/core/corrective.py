@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Corrective shapes: what to add to rest points so that a skinning gives another shape in one pose."""
+"""Corrective shapes: offsets of rest points with which skinning gives another shape in one pose."""
 
 from __future__ import annotations
 
@@ -7,23 +7,27 @@ from collections.abc import Callable
 
 import numpy as np
 
-# Skinning is affine in each rest point, but where envelopes make weights of it.
+# One step would do, as skinning is affine in each rest point; but with envelopes, weights depend on the
+# points.
 STEPS = 4
-# Of the mesh's diagonal: how far rest points are moved to see what becomes of it, and what is near enough.
+# As a share of the mesh's diagonal: how far rest points are moved to find the effect, and when a result is
+# close enough.
 PROBE, NEAR = 1e-2, 1e-6
-# A point whose surroundings the skinning flattens to less than this part could be reached from far away only.
+# Where skinning flattens the surroundings of a point to less than this share, the needed offset would be too
+# large.
 LEAST_WIDTH = 0.05
 
 
 def offsets(
     rest_points: np.ndarray, wanted: np.ndarray, skin: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The offsets of rest points, float64 [vertices, 3], and how far from `wanted` each is without them and
-    with them, [vertices]. One that can not be brought there has no offset.
+    """Returns the offsets of rest points, float64 [vertices, 3], and the distance of each vertex from
+    `wanted` without and with them, [vertices]. Vertices that cannot be moved there have no offset.
 
     rest_points  float32 [vertices, 3]
     wanted       float32 [vertices, 3], the shape
-    skin         makes the shape of rest points, [vertices, 3] each; each vertex of its own point alone
+    skin         computes the shape of rest points, both [vertices, 3]; each vertex depends on its own point
+                 alone
     """
     rest, goal = rest_points.astype(np.float64), wanted.astype(np.float64)
     found = np.zeros_like(rest)
@@ -45,7 +49,7 @@ def offsets(
         found += _solve(np.stack(axes, axis=-1), goal - now)
         now = shape(found)
         left = _distances(goal, now)
-    # Not one that came no nearer.
+    # Drops offsets that did not bring a vertex nearer.
     found[left > start] = 0.0
     return found, start, np.minimum(left, start)
 
@@ -55,7 +59,7 @@ def _distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _solve(matrices: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """[n, 3]: zero where a matrix, [n, 3, 3], is flatter than LEAST_WIDTH."""
+    """Solves for [n, 3]; zero where a matrix of [n, 3, 3] is flatter than LEAST_WIDTH."""
     left, widths, right = np.linalg.svd(matrices)
     reached = widths[:, -1] >= LEAST_WIDTH
     inverse = np.divide(1.0, widths, out=np.zeros_like(widths), where=reached[:, None])

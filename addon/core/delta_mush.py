@@ -11,7 +11,7 @@ import sinew
 
 from .stage_mesh import StageMesh
 
-# What it is bound with: bound again, in about the time of a frame, where a key changes one of them.
+# Parameters of the binding: where a key changes one, it is bound again, in about the time of a frame.
 BIND_PARAMETERS = ("iterations", "radius", "factor", "smooth_type", "pin_boundary")
 
 

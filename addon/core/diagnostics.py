@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong, or fragile, in the weights of a mesh: where, what it means and what to do about it."""
+"""Finds what is wrong, or fragile, in the weights of a mesh: where, what it means, and what to do about
+it."""
 
 from __future__ import annotations
 
@@ -16,13 +17,13 @@ from .vectors import dots
 
 # Below this sum, weights painted by accident decide how a vertex moves.
 SMALL_WEIGHT_SUM = 0.01
-# Most game engines take so many influences a vertex.
+# The limit of influences per vertex in most game engines.
 USUAL_INFLUENCES = 4
 # A bone rotated by 180 degrees against the others, within this tolerance, is about to change hemisphere.
 DEGREES_FROM_180 = 5.0
-# Bones of a smaller share of the weight do not move a vertex far when they change hemisphere.
+# Bones with a smaller share of the weight move a vertex only slightly when they change hemisphere.
 VISIBLE_SHARE = 0.05
-# The number of orders of six influences; of more influences, so many random orders are tried.
+# The number of orders of six influences. For more influences, this many random orders are tried.
 MAX_ORDERS = 720
 
 
@@ -36,7 +37,7 @@ class Finding:
     meaning   one sentence
     advice    one sentence, what to do
     groups    the vertex groups that have it, for faults of groups
-    frames    where it was seen, for faults that depend on the pose
+    frames    the frames where it was seen, for faults that depend on the pose
     """
 
     name: str
@@ -49,7 +50,7 @@ class Finding:
 
     @property
     def count(self) -> int:
-        """Of the vertices, or of the groups where there are any."""
+        """The number of vertices, or of groups for faults of groups."""
         return len(self.groups) or len(self.vertices)
 
     def to_dict(self) -> dict[str, object]:
@@ -74,7 +75,7 @@ def check_weights(
     most_influences: int = USUAL_INFLUENCES,
     masks: Collection[str] = (),
 ) -> list[Finding]:
-    """The faults that do not depend on a pose; only those that were found.
+    """Returns the faults that do not depend on a pose and that the mesh has.
 
     points       [vertices, 3], rest points in armature space
     weights      the mesh's groups as stored
@@ -155,15 +156,15 @@ _OF_POSES = {
 
 
 class PoseCheck:
-    """Checks poses, one after the other, for vertices whose dual quaternions are about to change hemisphere.
+    """Checks one pose after another for vertices whose dual quaternions are about to change hemisphere.
 
     A dual quaternion and its negative (its antipode) are the same rigid motion. Dual quaternion skinning
-    gives each bone's the sign that brings it into the hemisphere of the sum of those before it, in the order
-    of the vertex's groups.
+    gives each bone's dual quaternion the sign that brings it into the hemisphere of the sum of those before
+    it, in the order of the vertex's groups.
     """
 
     def __init__(self, influences: Influences) -> None:
-        """influences  over bones and joints of bendy bones, in stored order"""
+        """influences: over bones and joints of bendy bones, in stored order."""
         self._influences = influences
         self._vertices = np.repeat(np.arange(len(influences.counts)), influences.counts)
         self._visible = self._visible_influences()
@@ -173,12 +174,12 @@ class PoseCheck:
         }
 
     def add_pose(self, rotations: np.ndarray, frame: float) -> None:
-        """One pose of an action, in the order of time.
+        """Checks one pose of an action; poses come in the order of time.
 
         rotations  unit quaternions [4, bones + joints] of posed_from_rest
         """
         if self._last is not None:
-            # A bone's quaternion may come with either sign: take the one nearer to the last pose's.
+            # A bone's quaternion may come with either sign: take the one nearer to that of the last pose.
             rotations = rotations * np.where(dots(rotations, self._last[0]) < 0.0, -1.0, 1.0)
         terms = rotations.take(self._influences.bones, axis=1)
         signs, cosines, lengths = self._signs(terms)
@@ -213,7 +214,7 @@ class PoseCheck:
 
     def _visible_influences(self) -> np.ndarray:
         """bool [influences]: those whose change of sign moves the vertex visibly: both their own weight and
-        the weight before them are at least VISIBLE_SHARE of the vertex's."""
+        the sum of the weights before them are at least VISIBLE_SHARE of the vertex's."""
         weights = self._influences.weights.astype(np.float64)
         before = np.cumsum(weights) - weights
         before -= before[self._influences.offsets[self._vertices]]
@@ -221,9 +222,9 @@ class PoseCheck:
         return np.minimum(weights, before) >= VISIBLE_SHARE * total[self._vertices]
 
     def _signs(self, terms: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The sign of each influence (1 or -1) and the magnitude of its cosine with the sum of those before
-        it,
-        [influences]; the length of each vertex's sum of all as a share of its weights, [vertices]."""
+        """Returns the sign of each influence (1 or -1) and the magnitude of its cosine with the sum of those
+        before it, [influences]; and the length of each vertex's whole sum as a share of its weights,
+        [vertices]."""
         influences = self._influences
         signs, cosines = np.ones((2, len(influences.bones)))
         sums = np.zeros((4, len(influences.counts)))
@@ -244,7 +245,7 @@ class PoseCheck:
         return signs, cosines, np.where(totals > 0.0, shares, 1.0)
 
     def _depends_on_order(self, terms: np.ndarray, signs: np.ndarray) -> np.ndarray:
-        """bool [vertices]: another order of the influences gives some of them other signs."""
+        """bool [vertices]: whether another order of the influences gives some of them other signs."""
         influences = self._influences
         result = np.zeros(len(influences.counts), dtype=bool)
         for count in range(3, int(influences.counts.max(initial=0)) + 1):
@@ -252,7 +253,7 @@ class PoseCheck:
             indices = influences.offsets[vertices][:, None] + np.arange(count)
             quaternions = terms[:, indices] * signs[indices]  # [4, vertices, count]
             products = np.einsum("ivj,ivk->vjk", quaternions, quaternions)
-            # Where all pairs lie in one hemisphere, each lies in that of any sum of others.
+            # If all pairs are in one hemisphere, each is in the hemisphere of any sum of others.
             uncertain = np.flatnonzero((products < 0.0).any(axis=(1, 2)))
             if len(uncertain):
                 weighted = products[uncertain] * influences.weights[indices[uncertain]][:, None, :]
@@ -264,7 +265,7 @@ def _some_order_differs(products: np.ndarray) -> np.ndarray:
     """bool [n]: whether summing the terms in another order gives any of them another sign.
 
     products  [n, terms, terms]: dot products of row and column, times the column's weight; the terms have the
-              signs that the stored order gives
+              signs of the stored order
     """
     count = products.shape[1]
     differs = np.zeros(len(products), dtype=bool)
@@ -279,7 +280,7 @@ def _some_order_differs(products: np.ndarray) -> np.ndarray:
 
 
 def _orders(count: int) -> Iterator[Sequence[int]]:
-    """All orders of up to six influences, MAX_ORDERS random ones of more."""
+    """Yields all orders of up to six influences, or MAX_ORDERS random orders of more."""
     if count <= 6:
         yield from permutations(range(count))
         return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bone envelopes: the volume around a bone at rest within which it moves vertices.
 
-Based on: what Blender's Armature modifier does with Bone Envelopes and Envelope Multiply.
+Based on what Blender's Armature modifier does with Bone Envelopes and Envelope Multiply.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Envelopes:
 
 
 def multiply_by_envelopes(entries: Entries, envelopes: Envelopes, points: np.ndarray) -> Entries:
-    """The entries, with the weights of bones that have Envelope Multiply scaled by their envelopes.
+    """Returns the entries, where envelopes scale the weights of bones that have Envelope Multiply.
 
     points  [vertices, 3], armature space
     """
@@ -68,9 +68,9 @@ def multiply_by_envelopes(entries: Entries, envelopes: Envelopes, points: np.nda
 def fill_from_envelopes(
     entries: Entries, envelopes: Envelopes, deform: np.ndarray, points: np.ndarray
 ) -> Entries:
-    """The entries; vertices without any get one for every envelope that reaches them.
+    """Returns the entries; vertices without entries get one for every envelope that reaches them.
 
-    An entry of weight 0 counts as an entry: such a vertex gets none.
+    An entry of weight 0 counts as an entry: such a vertex gets no others.
 
     deform  bool [bones]
     points  [vertices, 3], armature space
@@ -80,7 +80,7 @@ def fill_from_envelopes(
     vertices, bones = (grid.ravel() for grid in np.meshgrid(bare, candidates, indexing="ij"))
     weights = envelopes.reach(points[vertices].astype(np.float64), bones) * envelopes.weights[bones]
     reached = weights > 0.0
-    # A stable sort by vertex: bones and groups keep their order.
+    # A stable sort by vertex keeps the order of bones and groups.
     all_vertices = np.concatenate([entries.vertices, vertices[reached]])
     order = np.argsort(all_vertices, kind="stable")
     return Entries(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A folder of arrays by the hash of what they were made from. Any number of processes may share it."""
+"""A folder of arrays, by the hash of what they were made from. Any number of processes may share it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ import numpy as np
 MAGIC = b"SINEW 1\n"
 SUFFIX = ".sinew"
 _DIGEST_BYTES = 16
-# A process that was killed leaves what it had not yet renamed.
+# A killed process leaves files that it had not renamed yet; older ones are removed.
 _SECONDS_OF_UNFINISHED = 3600.0
 
 
 class FileCache:
-    """What can not be read or written is as if it were not there: nothing here raises OSError.
+    """Entries that cannot be read or written count as missing: nothing here raises OSError.
 
     folder  made where it is missing
-    limit   bytes; of more, those that were used least lately are removed
+    limit   bytes; beyond it, the least recently used entries are removed
     """
 
     def __init__(self, folder: Path, limit: int) -> None:
@@ -32,7 +32,7 @@ class FileCache:
         self.limit = limit
 
     def load(self, key: str) -> np.ndarray | None:
-        """None where there is none; a damaged one is removed."""
+        """Returns None where there is no entry; a damaged one is removed."""
         path = self._path(key)
         try:
             content = path.read_bytes()
@@ -50,7 +50,7 @@ class FileCache:
         content = _pack(array)
         if len(content) > self.limit:
             return
-        # Beside it and renamed: others find a whole file or none.
+        # Written beside it and renamed, so that others find a whole file or none.
         unfinished = self.folder / f".{uuid.uuid4().hex}{SUFFIX}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -91,7 +91,7 @@ def _pack(array: np.ndarray) -> bytes:
 
 
 def _unpack(content: bytes) -> np.ndarray | None:
-    """None for what _pack() has not made so."""
+    """Returns None for anything that _pack() has not made."""
     start = len(MAGIC) + _DIGEST_BYTES
     payload = content[start:]
     if content[:start] != MAGIC + _digest(payload):

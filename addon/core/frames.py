@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frame lists as people type them."""
+"""Parses lists of frames."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574
 
 
 def parse_frames(text: str) -> list[float]:
-    """The frames of "1,12,40-48": single frames, which may be fractions, and ranges, in the order typed.
+    """Returns the frames of a text such as "1,12,40-48": single frames, which may be fractions, and ranges,
+    in the order given.
 
-    Whole frames come back as int. Raises WrongUse for anything else.
+    Whole frames are returned as int. Raises WrongUse for anything else.
     """
     frames: list[float] = []
     for part in text.split(","):
         part = part.strip()
         try:
-            # The first character can be a minus sign: a range's dash comes later.
+            # The first character can be a minus sign, so a range's dash is searched after it.
             dash = part.find("-", 1)
             if dash > 0:
                 first: float = int(part[:dash])

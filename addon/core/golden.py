@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Comparison of pictures with golden ones: how much they differ, and a picture of where."""
+"""Compares pictures with golden ones: how much they differ, and a picture of where."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ VISIBLE = 0.2
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """How a folder of pictures was made, stored with them, so that they can be made again in the same way.
+    """How a folder of pictures was made; stored with them, so that they can be made again in the same way.
 
-    engine   "workbench" or "cycles"; with own_look the file's own
-    size     pixels of the longer side
-    views    one for each frame; none with own_look
-    set      parameters as NAME=VALUE
+    engine  "workbench" or "cycles"; with own_look the file's own
+    size    pixels of the longer side
+    views   one for each frame; none with own_look
+    set     parameters as NAME=VALUE
     """
 
     file: str
@@ -80,7 +80,7 @@ class RenderSettings:
 
 
 def picture_name(frame: float) -> str:
-    """Such as 0001.png, 0006.50.png: different for each frame, and sorted by frame."""
+    """Returns a name such as 0001.png or 0006.50.png: different for each frame, and sorted by frame."""
     whole = int(np.floor(frame))
     # Two decimals, more only where needed.
     exact = f"{Decimal(repr(float(frame))) - whole:f}"[2:]
@@ -89,8 +89,8 @@ def picture_name(frame: float) -> str:
 
 
 def difference(picture: np.ndarray, golden: np.ndarray) -> np.ndarray:
-    """float [height, width]: the largest difference of a channel, 0..1, over pixels of [height, width, 4] in
-    0..1 with straight alpha."""
+    """float [height, width]: the largest difference of a channel, 0..1, between pictures [height, width, 4]
+    in 0..1 with straight alpha."""
     return np.abs(_over_black(picture) - _over_black(golden)).max(axis=2)
 
 
@@ -100,7 +100,8 @@ def differing_share(differences: np.ndarray) -> float:
 
 
 def difference_picture(differences: np.ndarray, golden: np.ndarray) -> np.ndarray:
-    """float [height, width, 4]: what differs in colour, towards yellow, over the golden picture in grey."""
+    """float [height, width, 4]: differing pixels in colour, towards yellow, over the golden picture in
+    grey."""
     grey = 0.15 + 0.25 * _over_black(golden)[:, :, :3].mean(axis=2)
     result = np.ones((*differences.shape, 4))
     result[:, :, :3] = grey[:, :, None]

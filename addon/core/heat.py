@@ -18,10 +18,10 @@ _VIRIDIS = bytes.fromhex(
     "28ae802eb37c35b7793dbc7446c06f50c46a5ac86465cb5e70cf577cd25089d54895d840a2da37b0dd2fbddf26cae11f"
     "d8e219e5e419f1e51dfde725"
 )
-# A range of ratios ends at most at this many doublings or halvings, and at least at so many.
+# A range of ratios covers at most, and at least, this many doublings or halvings.
 MAX_DOUBLINGS = 2.0
 MIN_DOUBLINGS = 0.1
-# A range of lengths ends at most at this many times the largest of all methods but the one with the largest.
+# A range of lengths ends at most at this multiple of the second largest method's maximum.
 BEYOND_OTHERS = 2.0
 
 
@@ -34,8 +34,8 @@ def viridis(shares: np.ndarray) -> np.ndarray:
     return stops.take(first, axis=0) + (positions - first)[..., None] * steps.take(first, axis=0)
 
 
-# Of the two sides of the diverging map: lightness and chroma in Oklab at the ends and in the middle. Blue and
-# orange differ to all dichromats, and the neutral middle is nearly white.
+# The two sides of the diverging map: lightness and chroma in Oklab at the ends and in the middle. Blue and
+# orange differ for all dichromats, and the neutral middle is nearly white.
 _MIDDLE_LIGHTNESS, _END_LIGHTNESS, _END_CHROMA = 0.95, 0.47, 0.135
 _BELOW, _ABOVE = np.radians(252.0), np.radians(50.0)
 # From Oklab to linear sRGB (B. Ottosson, 2020, "A perceptual color space for image processing").
@@ -60,7 +60,7 @@ def diverging(shares: np.ndarray) -> np.ndarray:
     away = 2.0 * np.clip(np.asarray(shares, dtype=np.float64), 0.0, 1.0) - 1.0
     hue, far = np.where(away < 0.0, _BELOW, _ABOVE), np.abs(away)
     lightness = _MIDDLE_LIGHTNESS + far * (_END_LIGHTNESS - _MIDDLE_LIGHTNESS)
-    # Pale colours have less chroma than a straight line would give: it would leave sRGB.
+    # Pale colours get less chroma than a straight line would give, which would leave sRGB.
     chroma = _END_CHROMA * np.sin(0.5 * np.pi * far)
     oklab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=-1)
     rgb = np.clip((oklab @ _LMS_FROM_OKLAB.T) ** 3 @ _RGB_FROM_LMS.T, 0.0, 1.0)
@@ -77,7 +77,7 @@ def _linear_table(colour_map: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
 
 
 def linear(colours: np.ndarray) -> np.ndarray:
-    """sRGB colours in 0..1 as scene-linear ones, which Blender stores."""
+    """Converts sRGB colours in 0..1 to scene-linear ones, which Blender stores."""
     return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
 
 
@@ -85,7 +85,7 @@ def linear(colours: np.ndarray) -> np.ndarray:
 class HeatScale:
     """The range of values that the colours cover, from `low` to `high`.
 
-    clipped  some values lie outside the range; they have the first or last colour
+    clipped  some values are outside the range; they get the first or last colour
     """
 
     metric: Metric
@@ -95,7 +95,7 @@ class HeatScale:
 
     @classmethod
     def over(cls, metric: Metric, methods: Sequence[Sequence[Summary]], diagonal: float) -> HeatScale:
-        """A range for all shapes of the summaries, those of one frame or of many, so that colours can be
+        """Returns a range for all shapes of the summaries, of one frame or of many, so that colours can be
         compared.
 
         methods   for each method its summaries; outliers of a single method are clipped
@@ -105,12 +105,12 @@ class HeatScale:
 
     @classmethod
     def over_values(cls, metric: Metric, least: float, most: float, diagonal: float) -> HeatScale:
-        """The same for values from `least` to `most`."""
+        """Returns a range for values from `least` to `most`."""
         return cls._up_to(metric, [_magnitude(metric, [least, most])], diagonal)
 
     @classmethod
     def fixed(cls, metric: Metric, end: float, least: float, most: float) -> HeatScale:
-        """A range that ends at the length, or at the ratio above 1, `end`; for values from `least` to
+        """Returns a range that ends at `end`, a length or a ratio above 1, for values from `least` to
         `most`."""
         beyond = _magnitude(metric, [least, most])
         return cls._to(metric, end, beyond > (np.log2(end) if metric.scale == "log" else end))
@@ -124,7 +124,7 @@ class HeatScale:
 
     @classmethod
     def _up_to(cls, metric: Metric, largest: Sequence[float], diagonal: float) -> HeatScale:
-        """largest  the largest magnitude of each method"""
+        """largest: the largest magnitude of each method."""
         largest = sorted(largest, reverse=True)
         beyond = max(largest, default=0.0)
         if metric.scale == "log":
@@ -143,12 +143,12 @@ class HeatScale:
 
     @property
     def ramp(self) -> Callable[[np.ndarray], np.ndarray]:
-        """The colours from `low` to `high` by shares: of values about a neutral one, as rest is for a ratio,
-        diverging from it; of magnitudes, viridis."""
+        """The colour map from `low` to `high`: viridis for magnitudes, else diverging from the neutral value,
+        such as 1 for a ratio."""
         return viridis if self.metric.scale == "linear" else diverging
 
     def linear_colours(self, values: np.ndarray) -> np.ndarray:
-        """float32 [n, 3], scene-linear, to 0.002: from a table, as it is needed for every frame."""
+        """float32 [n, 3], scene-linear, accurate to 0.002: from a table, as it is computed in every frame."""
         shares = self._shares(values)
         shares *= _STEPS - 1
         shares += 0.5
@@ -156,7 +156,7 @@ class HeatScale:
         return _linear_table(self.ramp).take(indices, axis=0)
 
     def _shares(self, values: np.ndarray) -> np.ndarray:
-        """Where values lie on the scale: 0 at `low`, 1 at `high`."""
+        """Positions of values on the scale: 0 at `low`, 1 at `high`."""
         if self.metric.scale == "log":
             values, low, high = np.log(np.maximum(values, 1e-12)), np.log(self.low), np.log(self.high)
         else:
@@ -181,8 +181,8 @@ def _largest(metric: Metric, summaries: Sequence[Summary]) -> float:
 
 
 def _magnitude(metric: Metric, values: Sequence[float]) -> float:
-    """The largest magnitude; for a ratio, of its doublings or halvings."""
+    """The largest magnitude; for a ratio, in doublings or halvings."""
     if metric.scale == "log":
-        # A face or an edge may have shrunk to nothing.
+        # A face or an edge may have shrunk to zero.
         return max((abs(float(np.log2(max(value, 1e-12)))) for value in values), default=0.0)
     return max((abs(value) for value in values), default=0.0)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any deformation as linear blend skinning: helper bones beside a rig's own, their motions and all weights.
+"""Any deformation as linear blend skinning: finds helper bones in addition to a rig's own, their motions and
+all weights.
 
 After B. H. Le and Z. Deng, *Smooth skinning decomposition with rigid bones* (2012): motions and weights are
-solved in turns, each exactly while the other stands still, so that the error falls with every step. Other
-than there, the rig's bones keep their motions, and a helper bone begins where the error is largest.
+solved alternately, each exactly while the other is fixed, so that the error falls with every step. Unlike
+there, the rig's bones keep their motions, and a helper bone starts where the error is largest.
 """
 
 from __future__ import annotations
@@ -18,28 +19,28 @@ from . import simplex
 from .influences import Influences
 from .phrases import Phrase, phrase
 
-# At most so many of the rig's bones, and of the helper bones, are tried for a vertex.
+# At most this many of the rig's bones, and of the helper bones, are tried for a vertex.
 OWN_CANDIDATES, HELPER_CANDIDATES = 8, 8
-# Of as many errors of candidates vertices are weighted at once: what bounds the memory.
+# Vertices are weighted in chunks with this many numbers, to limit the memory.
 _NUMBERS_AT_ONCE = 2**21
-# A bone that is scaled to nothing has helper bones of this size.
+# The least scale of helper bones, for bones that are scaled to zero.
 _SMALLEST_SCALE = 1e-3
 _SEED_STEPS = 4
 _SEED_VERTICES = 24
 _LAST_SWEEPS = 24
-# The last sweeps end where so many gain less than this share of the error.
+# The last sweeps end when this many gain less than this share of the error.
 _SWEEPS_WITHOUT_GAIN, _SMALL_GAIN = 4, 0.01
 _SMALLEST_WEIGHT = 1e-4
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is to be reproduced, in armature space.
+    """The deformation to be reproduced, in armature space.
 
-    rest        float32 [frames or 1, vertices, 3]: what the armature deforms
-    targets     float32 [frames, vertices, 3]: what it is to become
+    rest        float32 [frames or 1, vertices, 3]: the points that the armature deforms
+    targets     float32 [frames, vertices, 3]: the deformed points
     bones       float64 [frames, bones, 3, 4]: each bone's motion from rest
-    influences  of bones; vertices without any stay as they are
+    influences  of bones; vertices without influences stay at rest
     segments    float64 [bones, 2, 3], heads and tails at rest
     """
 
@@ -57,10 +58,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Wanted:
-    """
-    helpers     how many there may be
-    error       the rms error in scene units from which on no more are added
-    influences  of a vertex, at most
+    """The limits of a solution.
+
+    helpers     the largest number of helper bones
+    error       the rms error in scene units at which no more helper bones are added
+    influences  the largest number per vertex
     """
 
     helpers: int
@@ -70,7 +72,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Errors:
-    """Over all vertices and frames, in scene units."""
+    """Errors over all vertices and frames, in scene units."""
 
     rms: float
     worst: float
@@ -81,10 +83,10 @@ class Blend:
     """How a helper bone follows the pose: it rotates as the dual quaternion blend of some of the rig's bones.
 
     bones      int [n]
-    weights    float64 [n], none below 0, of sum 1
-    head       float64 [3], of the helper bone at rest: scale of bones is about it
-    is_centre  the head is moved as linear blending moves it, as optimised centres of rotation are; else as
-               the dual quaternion blend moves it
+    weights    float64 [n], not negative, of sum 1
+    head       float64 [3], of the helper bone at rest, about which bones scale
+    is_centre  linear blending moves the head, as it does optimised centres of rotation; otherwise the dual
+               quaternion blend moves it
     """
 
     bones: np.ndarray
@@ -95,15 +97,16 @@ class Blend:
 
 @dataclass(frozen=True)
 class Solution:
-    """
-    motions  float64 [frames, helpers, 3, 4]: rigid but for scale, the parent's or their own
+    """The helper bones and all weights.
+
+    motions  float64 [frames, helpers, 3, 4]: rigid except for scale, the parent's or their own
     parents  int [helpers], bones
-    heads    float64 [helpers, 3]: the middle of what each moves
-    bones    int [vertices, influences]: helpers follow the rig's bones; -1 for none
+    heads    float64 [helpers, 3]: the middle of the vertices that each moves
+    bones    int [vertices, influences]: helpers are numbered after the rig's bones; -1 for none
     weights  float64 [vertices, influences], of sum 1 where there are any
-    before   of linear blend skinning by the rig's bones with the weights that there were
-    errors   float32 [vertices]: the rms error of each after it, over all frames
-    blends   of the helper bones, where they follow the pose; else empty
+    before   errors of linear blend skinning by the rig's bones with the original weights
+    errors   float32 [vertices]: the rms error of each with the solution, over all frames
+    blends   of the helper bones, where they follow the pose; otherwise empty
     """
 
     motions: np.ndarray
@@ -125,9 +128,9 @@ MOTIONS = (KEYS, SCALED_KEYS, POSE)
 class HelperOptions:
     """What the user chooses.
 
-    helpers     for each armature, at most; 0 for two a joint
-    error       the rms error, in percent of the diagonal, that as few as possible are to reach; 0 for all
-    influences  of a vertex, at most
+    helpers     the largest number for each armature; 0 for two per joint
+    error       rms error in percent of the diagonal, to be reached with as few as possible; 0 to use all
+    influences  the largest number per vertex
     motion      what moves helper bones, of MOTIONS
     """
 
@@ -137,7 +140,7 @@ class HelperOptions:
     motion: str = KEYS
 
     def of(self, motion: Motion) -> Wanted:
-        # Each weighted bone but the first is jointed to others.
+        # Each weighted bone except the first has a joint with another.
         joints = max(len(np.unique(motion.influences.bones)) - 1, 0)
         return Wanted(self.helpers or 2 * joints, self.error / 100.0 * motion.diagonal, self.influences)
 
@@ -147,11 +150,11 @@ DEFAULT_HELPERS = HelperOptions()
 
 @dataclass(frozen=True)
 class Report:
-    """What came of it; lengths in scene units.
+    """The result for the user; lengths in scene units.
 
-    diagonal       of the meshes' bounding box at rest
-    before, after  over the frames
-    unseen_before, unseen_after  where helper bones follow the pose: over poses that they were not made from
+    diagonal                     of the meshes' bounding box at rest
+    before, after                over the frames
+    unseen_before, unseen_after  where helper bones follow the pose: over poses that they were not solved for
     """
 
     armature: str
@@ -172,7 +175,8 @@ class Report:
         diagonal: float,
         unseen: tuple[Errors, Errors] | None = None,
     ) -> Report:
-        """
+        """Converts a solution to scene units.
+
         unit    of armature space, in scene units
         unseen  before and after, over poses that the solution was not made from
         """
@@ -184,7 +188,7 @@ class Report:
         return cls(armature, len(solution.parents), most, diagonal, *errors)
 
     def as_json(self) -> dict[str, Any]:
-        """With each error as a share of the diagonal, too."""
+        """Returns the report, with each error also as a share of the diagonal."""
         size = self.diagonal or 1.0
         return asdict(self) | {
             name: {
@@ -198,7 +202,7 @@ class Report:
         }
 
     def sentences(self, unit: str) -> list[Phrase]:
-        """unit  what a scene unit is called"""
+        """unit: the name of a scene unit."""
         said = [self._sentence(unit)]
         if self.unseen_before is not None and self.unseen_after is not None:
             numbers = (
@@ -241,9 +245,9 @@ class Report:
 def solve(
     motion: Motion, wanted: Wanted, solver_of: Callable[[Motion, int], Solver] | None = None
 ) -> Generator[float, None, Solution]:
-    """How much is done, 0 to 1; returns the helper bones and the weights of all bones.
+    """Yields the progress, 0 to 1; returns the helper bones and the weights of all bones.
 
-    solver_of  Solver, or another that keeps to motions of its kind
+    solver_of  Solver, or a subclass that is restricted to motions of one kind
     """
     solver = (solver_of or Solver)(motion, wanted.influences)
     before = solver.errors()
@@ -268,7 +272,7 @@ def solve(
 
 
 def _rounds(helpers: int) -> list[int]:
-    """How many are added at a time: half of those that there are."""
+    """Returns how many are added in each round: half of the existing number."""
     rounds, count = [], 0
     while count < helpers:
         rounds.append(min(max(2, count // 2), helpers - count))
@@ -278,11 +282,12 @@ def _rounds(helpers: int) -> list[int]:
 
 @dataclass
 class Helper:
-    """
+    """One helper bone while it is solved.
+
     motion    float64 [frames, 3, 4]
-    scale     float64 [frames], of its parent; one that scales has its own
+    scale     float64 [frames], of its parent; a bone that scales has its own
     may_move  bool [vertices]
-    blend     of the rig's bones that moves it; None for a motion of its own
+    blend     of the rig's bones that moves it; None for an independent motion
     """
 
     motion: np.ndarray
@@ -294,11 +299,11 @@ class Helper:
 
 @dataclass
 class Solver:
-    """Vertices here are those with weights; only errors are of all.
+    """Solves motions and weights alternately. Its vertices are those with weights; only errors are over all.
 
-    targets   float32 [vertices, frames * 3]
-    residual  float32 [vertices, frames * 3]: what the present blend lacks of being 0
-    bones, weights  [vertices, slots] of the present blend; -1 and 0 for none
+    targets         float32 [vertices, frames * 3]
+    residual        float32 [vertices, frames * 3]: the current blend minus the targets
+    bones, weights  [vertices, slots] of the current blend; -1 and 0 for none
     """
 
     motion: Motion
@@ -316,7 +321,7 @@ class Solver:
         self.targets = np.ascontiguousarray(self.motion.targets[:, self.deformed].transpose(1, 0, 2))
         self.targets = self.targets.reshape(len(self.deformed), 3 * frames)
         self.middle = self.rest.mean(axis=1)
-        # Of vertices without weights, which stay at rest whatever the bones do.
+        # Errors of vertices without weights, which stay at rest in every pose.
         still = np.ones(len(influences.counts), dtype=bool)
         still[self.deformed] = False
         self.still = np.flatnonzero(still)
@@ -333,17 +338,17 @@ class Solver:
         return Errors(float(np.sqrt(squares.mean(dtype=np.float64))), float(np.sqrt(squares.max())))
 
     def errors_of_vertices(self) -> np.ndarray:
-        """float32 [vertices], rms over all frames"""
+        """float32 [vertices], rms over all frames."""
         squares = np.zeros(len(self.motion.influences.counts))
         squares[self.deformed] = np.square(self.residual).sum(axis=1)
         squares[self.still] = self.still_squares.sum(axis=1)
         return np.sqrt(squares / max(len(self.motion.targets), 1)).astype(np.float32)
 
     def refine(self) -> Generator[float, None, None]:
-        """Motions and weights in turns, until little is gained; how much is done, 0 to 1.
+        """Solves motions and weights alternately, until little is gained; yields the progress, 0 to 1.
 
-        Alone they take hundreds of turns for what far fewer reach that go on in the direction of the last:
-        the further, the longer that helps.
+        Alone, these steps take hundreds of sweeps. Continuing in the direction of the last sweep takes far
+        fewer; it goes further as long as that helps.
         """
         further, errors = 1.0, [self.errors().rms]
         for sweep in range(_LAST_SWEEPS):
@@ -351,7 +356,7 @@ class Solver:
             self.move()
             if sweep:
                 for helper, old in zip(self.helpers, before[0], strict=True):
-                    self._go_on(helper, old, further)
+                    self._extrapolate(helper, old, further)
             for share in self.weigh():
                 yield (sweep + share) / _LAST_SWEEPS
             errors.append(self.errors().rms)
@@ -371,8 +376,8 @@ class Solver:
     def _state(self, state: tuple[list[Helper], np.ndarray, np.ndarray, np.ndarray]) -> None:
         self.helpers, self.bones, self.weights, self.residual = state
 
-    def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
-        """Moves a helper bone on from what it was, by that much more of its way."""
+    def _extrapolate(self, helper: Helper, old: Helper, further: float) -> None:
+        """Moves a helper bone beyond its new motion, by `further` times its last change."""
         ahead = helper.motion + further * (helper.motion - old.motion)
         helper.scale = np.maximum(helper.scale + further * (helper.scale - old.scale), _SMALLEST_SCALE)
         helper.motion = np.concatenate(
@@ -382,7 +387,7 @@ class Solver:
     # --- Motions
 
     def add_helper(self) -> None:
-        """Where the error is largest; its weights are provisional until weigh()."""
+        """Adds a helper bone where the error is largest; its weights are provisional until weigh()."""
         energy = np.square(self.residual).sum(axis=1)
         seed = int(energy.argmax())
         may_move = self._share_bones(seed)
@@ -394,7 +399,7 @@ class Solver:
         own = self.motion.bones[:, parent]
         scale = np.maximum(np.cbrt(np.abs(np.linalg.det(own[:, :, :3]))), _SMALLEST_SCALE)
         helper = Helper(own, parent, scale, may_move)
-        # At first it moves the vertices about the seed alone, as one piece.
+        # At first it moves only the vertices around the seed, rigidly.
         helper.motion = self._fitted(helper, near, np.ones(len(near)), self.targets[near].astype(np.float64))
         for _step in range(_SEED_STEPS):
             shares = self._best_shares(helper, eligible)
@@ -410,7 +415,8 @@ class Solver:
         self.helpers.append(helper)
 
     def move(self) -> None:
-        """The best motion of each helper bone, one after another, while weights and all others stay."""
+        """Finds the best motion of each helper bone, one after another, while weights and the other bones are
+        fixed."""
         first = self.motion.bones.shape[1]
         for number, helper in enumerate(self.helpers):
             vertices, slots = np.nonzero(self.bones == first + number)
@@ -423,7 +429,7 @@ class Solver:
             self.residual[vertices] += (now - was).astype(np.float32)
 
     def _share_bones(self, seed: int) -> np.ndarray:
-        """bool [vertices]: those that have one of the rig's bones in common with this one."""
+        """bool [vertices]: those that share one of the rig's bones with this one."""
         bones = self.own[seed]
         shared = np.isin(self.own, bones[bones >= 0])
         return np.asarray(shared.any(axis=1))
@@ -436,7 +442,8 @@ class Solver:
         return int(bones[np.linalg.norm(heads + share[:, None] * along - point, axis=1).argmin()])
 
     def _best_shares(self, helper: Helper, vertices: np.ndarray) -> np.ndarray:
-        """float64 [vertices]: how much of it each takes best, of 1, the rest of the blend that much less."""
+        """float64 [vertices]: the best weight of the helper bone for each vertex, while the rest of the blend
+        is scaled to sum 1."""
         residual = self.residual[vertices]
         change = self._moved(helper.motion, vertices) - self.targets[vertices] - residual
         return _share(residual, change)[0]
@@ -444,8 +451,8 @@ class Solver:
     def _fitted(
         self, helper: Helper, vertices: np.ndarray, weights: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
-        """float64 [frames, 3, 4]: the motion whose share of the vertices, `weights` times it, is nearest to
-        `wanted` [vertices, frames * 3]; Le and Deng's equation 9, with the scale of _scale_of()."""
+        """float64 [frames, 3, 4]: the motion that, times `weights`, is nearest to `wanted` [vertices, frames
+        * 3]; Le and Deng's equation 9, with the scale of _scale_of()."""
         rest = self.rest[vertices]
         frames = len(helper.scale)
         wanted = wanted.reshape(len(vertices), frames, 3)
@@ -454,12 +461,12 @@ class Solver:
         middle = np.einsum("v,vfi->fi", weights, wanted) / total
         from_middle = (rest - rest_middle) * weights[:, None, None]
         aside = wanted - weights[:, None, None] * middle
-        # cross[f, i, k]: of what is wanted along i and the rest point along k.
+        # cross[f, i, k]: products of the wanted position along i and the rest point along k.
         if rest.shape[1] == 1:
             cross = np.tensordot(aside, from_middle[:, 0], axes=(0, 0))
         else:
             cross = np.einsum("vfi,vfk->fik", aside, from_middle)
-        # As its motion was, where the vertices leave it open.
+        # Keeps the previous motion where the vertices do not determine it.
         linear = helper.motion[:, :, :3] / helper.scale[:, None, None]
         cross += 1e-7 * np.square(from_middle).sum() * linear
         rotation = _rotation_near(cross)
@@ -471,17 +478,17 @@ class Solver:
     def _scale_of(
         self, helper: Helper, rotation: np.ndarray, cross: np.ndarray, from_middle: np.ndarray
     ) -> np.ndarray:
-        """float64 [frames]: the size of a helper bone that has been rotated.
+        """float64 [frames]: the scale of a helper bone whose rotation was found.
 
         rotation, cross, from_middle  as in _fitted()
         """
         return helper.scale
 
     def _moved(self, motion: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-        """float64 [vertices, frames * 3]: by one bone's motion [frames, 3, 4]."""
+        """float64 [vertices, frames * 3]: moved by one bone's motion [frames, 3, 4]."""
         rest = self.rest[vertices]
         if rest.shape[1] == 1:
-            # Not by numpy's product: see spaces.transformed().
+            # Not with numpy's product: see spaces.transformed().
             x, y, z = motion[:, :, :3].reshape(-1, 3).T
             moved = rest[:, 0, :1] * x
             moved += rest[:, 0, 1:2] * y
@@ -494,7 +501,7 @@ class Solver:
     # --- Weights
 
     def weigh(self) -> Generator[float, None, None]:
-        """The best weights of each vertex while all motions stay; how much is done, 0 to 1."""
+        """Finds the best weights of each vertex while all motions are fixed; yields the progress, 0 to 1."""
         parts, width = [], self.targets.shape[1] * (OWN_CANDIDATES + HELPER_CANDIDATES)
         chunk = max(_NUMBERS_AT_ONCE // max(width, 1), 32)
         for start in range(0, len(self.own), chunk):
@@ -506,7 +513,7 @@ class Solver:
             self.weights = np.concatenate([weights for _bones, weights in parts])
 
     def _weigh(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """[vertices, most] bones and weights; puts right their residual."""
+        """Returns bones and weights [vertices, most], and updates the residual."""
         candidates = self._candidates(vertices)
         errors = np.zeros((len(vertices), candidates.shape[1], self.targets.shape[1]))
         for bone in np.unique(candidates[candidates >= 0]):
@@ -516,7 +523,7 @@ class Solver:
         grams = errors @ errors.transpose(0, 2, 1)
         weights = simplex.sparse_weights(grams, candidates >= 0, self.most)
         before = self._weights_of(vertices, candidates)
-        # What a limit cuts can be worse than what the last round had.
+        # After the limit of influences, the result can be worse than that of the last round.
         is_better = simplex.objective(grams, before) < simplex.objective(grams, weights)
         is_better &= ((before > 0.0).sum(axis=1) <= self.most) & (before.sum(axis=1) > 0.999)
         weights = np.where(is_better[:, None], before, weights)
@@ -528,8 +535,8 @@ class Solver:
         return np.where(weights > 0.0, np.take_along_axis(candidates, order, axis=1), -1), weights
 
     def _candidates(self, vertices: np.ndarray) -> np.ndarray:
-        """int [vertices, candidates], -1 for none: the rig's bones of each, helper bones that it has, and
-        those that lessen its error most."""
+        """int [vertices, candidates], -1 for none: each vertex's bones of the rig, its helper bones, and the
+        helper bones that reduce its error most."""
         own = self.own[vertices, :OWN_CANDIDATES]
         if not self.helpers:
             return own
@@ -551,7 +558,7 @@ class Solver:
         return np.concatenate([own, np.where(is_of_use, first + best, -1)], axis=1)
 
     def _weights_of(self, vertices: np.ndarray, candidates: np.ndarray) -> np.ndarray:
-        """float64 [vertices, candidates]: the present ones, of those bones that are candidates."""
+        """float64 [vertices, candidates]: the current weights of those bones that are candidates."""
         weights = np.zeros(candidates.shape)
         for bones, own in zip(self.bones[vertices].T, self.weights[vertices].T, strict=True):
             is_it = (candidates == bones[:, None]) & (bones >= 0)[:, None]
@@ -606,10 +613,10 @@ class Solver:
 
 @dataclass
 class ScalingSolver(Solver):
-    """Of helper bones that grow and shrink from frame to frame, too; from where rigid ones end: those that
-    scale from the beginning have up to twice the error.
+    """A solver for helper bones that also scale from frame to frame. It continues from the rigid solution: if
+    they scale from the beginning, the error is up to twice as large.
 
-    scales  whether they do by now
+    scales  whether they scale yet
     """
 
     scales: bool = False
@@ -623,21 +630,22 @@ class ScalingSolver(Solver):
     ) -> np.ndarray:
         if not self.scales:
             return helper.scale
-        # What is wanted along the vertices as they are rotated, by what these are.
+        # The extent that is wanted along the rotated vertices, divided by their own.
         along = np.einsum("fik,fik->f", rotation, cross)
         spread = np.square(from_middle).sum(axis=(0, 2))
         return np.maximum(along / np.maximum(spread, 1e-30), _SMALLEST_SCALE)
 
 
 def _rotation_near(matrices: np.ndarray) -> np.ndarray:
-    """float64 [n, 3, 3]: the rotation R with the largest trace of R^T M, of each matrix M."""
+    """float64 [n, 3, 3]: the rotation R with the largest trace of R^T M, for each matrix M."""
     u, _sizes, v = np.linalg.svd(matrices)
     u[:, :, 2] *= np.sign(np.linalg.det(u @ v))[:, None]
     return u @ v
 
 
 def _share(residual: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """float64 [rows]: how much of a change, 0 to 1, makes a residual smallest, and by how much its square."""
+    """float64 [rows]: the share of a change, 0 to 1, that minimises a residual, and the decrease of its
+    square."""
     toward = -np.einsum("vx,vx->v", residual, change)
     length = np.einsum("vx,vx->v", change, change)
     share = np.clip(toward / np.maximum(length, 1e-30), 0.0, 1.0)
@@ -645,7 +653,7 @@ def _share(residual: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _padded(influences: Influences) -> tuple[np.ndarray, np.ndarray]:
-    """int and float64 [vertices, slots]: bones and weights, the heaviest first; -1 and 0 behind."""
+    """int and float64 [vertices, slots]: bones and weights, the heaviest first, padded with -1 and 0."""
     counts = influences.counts
     vertices = np.repeat(np.arange(len(counts)), counts)
     order = np.lexsort((-influences.weights, vertices))

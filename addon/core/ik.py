@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inverse kinematics over frames: what Blender's constraint asks for, solved by `sinew.ik`, and measured."""
+"""Inverse kinematics over frames: the problem of Blender's constraints, solved by `sinew.ik`, and
+measured."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from sinew import affine, ik, quat, quat_vec
 
 from .errors import SinewError
 
-# What commands and the panel solve with: Blender's own limit, which dls never comes near.
+# The iterations of commands and the panel: Blender's own limit, which dls never nearly reaches.
 ITERATIONS = 500
 
 LABELS = {
@@ -22,12 +23,12 @@ LABELS = {
 
 @dataclass(frozen=True)
 class Tree:
-    """Bones that are solved together, parents first, and what pulls them.
+    """Bones that are solved together, parents first, and their constraints.
 
     bones        names; the first is the root
-    parents      int32 [bones], -1 of the root
+    parents      int32 [bones], -1 for the root
     rest         float64 [bones, 3, 3], each bone's axes at rest, relative to its parent's
-    constraints  of each effector: the bone that has the constraint, and its name
+    constraints  for each effector: the bone that has the constraint, and the constraint's name
     effectors    of sinew.ik
     """
 
@@ -52,7 +53,8 @@ class Tree:
 
 
 class Posed(NamedTuple):
-    """A tree at a frame, or at frames in front; armature space, columns of matrices as Blender has them.
+    """A tree at one frame, or at several with a leading axis; armature space, matrices of column vectors as
+    in Blender.
 
     bones       [bones, 4, 4], without the constraints
     parent      [4, 4], of the root's parent; the identity where it has none
@@ -85,9 +87,9 @@ def stack(frames: list[Posed]) -> Posed:
 
 
 def problem_of(tree: Tree, posed: Posed) -> Problem:
-    """Of frames. As Blender's solver has it: bones rotate and keep their lengths as they are scaled; a goal
-    of less influence lies between the tip and the target, but for one with a pole, where the result does.
-    Raises SinewError for mirrored bones."""
+    """Returns the problem of frames as Blender's solver defines it: bones rotate and keep their lengths as
+    scaled; with an influence below 1, a goal is between the tip and the target, except with a pole, where the
+    result is blended instead. Raises SinewError for mirrored bones."""
     mirrored = (np.linalg.det(posed.bones[..., :3, :3]) < 0.0).any(axis=0)
     if mirrored.any():
         names = ", ".join(name for name, is_it in zip(tree.bones, mirrored, strict=True) if is_it)
@@ -140,7 +142,8 @@ def solve(tree: Tree, problem: Problem, method: ik.Method, iterations: int = ITE
 
 
 def blended(tree: Tree, problem: Problem, rotations: np.ndarray, influences: np.ndarray) -> np.ndarray:
-    """[frames, bones, 4]: of a constraint with a pole and less influence, as far as that from the pose."""
+    """[frames, bones, 4]: rotations blended with the unsolved pose, for a constraint with a pole and an
+    influence below 1."""
     if not tree.has_pole or (influences == 1.0).all():
         return rotations
     start = np.pad(problem.rotations, ((0, 0), (0, 0), (0, 3)))
@@ -149,7 +152,7 @@ def blended(tree: Tree, problem: Problem, rotations: np.ndarray, influences: np.
 
 
 def matrices_of(tree: Tree, problem: Problem, rotations: np.ndarray) -> np.ndarray:
-    """float64 [frames, bones, 4, 4]: bones in armature space, scaled as they were."""
+    """float64 [frames, bones, 4, 4]: bones in armature space, with their original scale."""
     own = np.pad(rotations, ((0, 0), (0, 0), (0, 3)))
     relative = quat_vec.compose(problem.rest, own)
     poses = np.empty_like(relative)
@@ -162,8 +165,8 @@ def matrices_of(tree: Tree, problem: Problem, rotations: np.ndarray) -> np.ndarr
 
 
 def tip_errors(tree: Tree, problem: Problem, matrices: np.ndarray) -> np.ndarray:
-    """[frames]: the largest distance of a tip to its goal, in lengths of the longest chain; `matrices` as of
-    matrices_of()."""
+    """[frames]: the largest distance of a tip from its goal, in lengths of the longest chain; `matrices` as
+    from matrices_of()."""
     bones = [effector.bone for effector in tree.effectors]
     scaled = problem.tips / np.maximum(problem.scales[:, bones], 1e-30)
     tips = (matrices[:, bones][..., :3, :3] @ scaled[..., None])[..., 0] + matrices[:, bones][..., :3, 3]
@@ -175,7 +178,7 @@ def tip_errors(tree: Tree, problem: Problem, matrices: np.ndarray) -> np.ndarray
 
 def angular_acceleration(matrices: np.ndarray) -> float:
     """The root of the mean square over frames and bones of the second difference of rotations, radians per
-    frame squared; 0 below three frames. matrices: [frames, bones, 4, 4]."""
+    frame squared; 0 for fewer than three frames. matrices: [frames, bones, 4, 4]."""
     if len(matrices) < 3:
         return 0.0
     rigid = affine.to_quat_vec(_with_axes(_axes_of(matrices)))[..., :4]
@@ -192,14 +195,14 @@ def _reach(tree: Tree, problem: Problem, bone: int) -> np.ndarray:
 
 
 def _between(a: np.ndarray, b: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """From a to b, [.., 7]: rotations along the shortest arc, positions straight."""
+    """From a to b, [.., 7]: rotations along the shortest arc, positions linear."""
     share = np.asarray(share, dtype=np.float64)
     positions = a[..., 4:] + share[..., None] * (b[..., 4:] - a[..., 4:])
     return np.concatenate([quat.slerp(a[..., :4], b[..., :4], share), positions], axis=-1)
 
 
 def _axes_of(matrices: np.ndarray) -> np.ndarray:
-    """Rotations: y as it is at length 1, x square to it where it is sheared; nothing of what has no axes."""
+    """Rotations: y is normalised, x made perpendicular to it; the identity where a matrix has no axes."""
     axes = np.asarray(matrices, dtype=np.float64)[..., :3, :3]
     y = _unit(axes[..., 1])
     x = _unit(axes[..., 0])

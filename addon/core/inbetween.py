@@ -2,8 +2,8 @@
 """Poses between keyed poses: `sinew.interpolate` and `sinew.spline` for bones that also have a scale.
 
 Each bone is interpolated relative to its parent: interpolated relative to the root, bones would separate from
-their parents' tails (Smith 2013, figure 3.3). The method makes the rigid part; the scale is the mean of the
-keyed scales, by the same weights.
+their parents' tails (Smith 2013, figure 3.3). The method gives the rigid part; the scale is the mean of the
+keyed scales, with the same weights.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import sinew
 from sinew import affine, interpolate, quat_vec, spline
 
-# The choice of none of METHODS: the action's own curves.
+# The alternative to METHODS: the action's own curves.
 BLENDER = "blender"
 
 # Between two keys, or on a spline through four.
@@ -34,7 +34,7 @@ class Method(NamedTuple):
     number: int
 
 
-# The one to recommend first, as menus have them. The numbers are stored in files.
+# In the order of menus, the recommended method first. The numbers are stored in files.
 METHODS = {
     method.name: method
     for method in (
@@ -107,15 +107,15 @@ class Poses(NamedTuple):
 
 
 class Inbetweens(NamedTuple):
-    """The poses, and whether the method defines each; sinew.interpolate documents the results that it does
-    not define."""
+    """The poses, and whether the method defines each one; sinew.interpolate documents the undefined
+    results."""
 
     poses: Poses
     is_defined: np.ndarray
 
 
 def straight(a: Poses, b: Poses, progress: np.ndarray, method: interpolate.Method) -> Inbetweens:
-    """Each bone from `a` to `b`, [bones], as far as `progress` [bones] says: 0 is a, 1 is b."""
+    """Each bone between `a` and `b`, [bones], at `progress` [bones]: 0 is a, 1 is b."""
     between = interpolate.between(
         in_layout_of(method, a.rigid), in_layout_of(method, b.rigid), progress, method
     )
@@ -125,15 +125,16 @@ def straight(a: Poses, b: Poses, progress: np.ndarray, method: interpolate.Metho
 def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Method) -> Inbetweens:
     """Each bone on the Catmull-Rom spline through its keys, blend form.
 
-    keys  [4, bones]: two before `at` and two after; at an end of the keys one of them twice
-    times [4]
+    keys   [4, bones]: two before `at` and two after; at an end of the keys one of them twice
+    times  [4]
     """
     layout = np.ascontiguousarray(np.swapaxes(in_layout_of(method, keys.rigid), 0, 1))
     values = [spline.catmull_rom(bone, times, at, method) for bone in layout]
     blended = interpolate.Blended(
         np.array([value.transforms for value in values]), np.array([value.is_defined for value in values])
     )
-    # The translation of a pair is the mean of the keys' translations: the scales are passed as translations.
+    # The translation of a blended pair is the mean of the keys' translations, so the scales are passed as
+    # translations.
     translations = np.zeros_like(keys.rigid) + quat_vec.identity()
     translations[..., 4:] = keys.scale
     roots = sinew.Skeleton(np.full(translations.shape[1], -1, dtype=np.int32))
@@ -146,8 +147,10 @@ def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     PROGRESS_RANGE.
 
     now, a, b  [bones, channels], values of Blender's curves at this time and at the keys; channels without
-               keys are equal. The mean over the channels, each weighted with its change, so that a bone keeps
-               the easing of its keys. 0 where a and b are equal.
+               keys are equal
+
+    It is the mean over the channels, each weighted with its change, so that a bone keeps the easing of its
+    keys. 0 where a and b are equal.
     """
     change = b - a
     total = np.abs(change).sum(axis=1)
@@ -158,14 +161,14 @@ def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def in_layout_of(method: str, rigid: np.ndarray) -> np.ndarray:
-    """Rigid transforms in the layout that a method of sinew.interpolate takes."""
+    """Converts rigid transforms to the layout that a method of sinew.interpolate takes."""
     if method.startswith("matrix_"):
         return quat_vec.to_affine(rigid)
     return rigid if method.startswith("qv_") else quat_vec.to_dual_quat(rigid)
 
 
 def rigid_of(method: str, transforms: np.ndarray) -> np.ndarray:
-    """What in_layout_of() undoes; of a matrix that is not rigid the nearest rotation."""
+    """The inverse of in_layout_of(); for a matrix that is not rigid, the nearest rotation."""
     if method == "matrix_linear":
         transforms = affine.normalized(transforms)
     if method.startswith("matrix_"):
@@ -174,8 +177,8 @@ def rigid_of(method: str, transforms: np.ndarray) -> np.ndarray:
 
 
 def axes_of(matrices: np.ndarray) -> np.ndarray:
-    """[.., 3]: the lengths of a matrix's axes. With the rotation they are what a bone can have of it, as it
-    has no shear."""
+    """[.., 3]: the lengths of a matrix's axes: with the rotation, all of it that a bone can have, as it has
+    no shear."""
     return np.linalg.norm(matrices[..., :3, :3], axis=-2)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex groups as stored, and the influences made from them, which a deformer is bound to."""
+"""Vertex groups as stored, and the influences made from them, to which a deformer is bound."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# A vertex whose weights sum to no more than this is not deformed (Blender's Armature modifier).
+# A vertex whose weights have this sum or less is not deformed (Blender's Armature modifier).
 SMALLEST_WEIGHT_SUM = np.float32(1e-4)
 
 
@@ -38,7 +38,7 @@ class GroupWeights:
         )
 
     def of_group(self, group: int) -> np.ndarray:
-        """float32 [vertices]: each vertex's weight in one group, 0 where it is not in it."""
+        """float32 [vertices]: each vertex's weight in one group, 0 where it is not in the group."""
         vertices = np.repeat(np.arange(len(self.counts)), self.counts)
         chosen = self.groups == group
         result = np.zeros(len(self.counts), dtype=np.float32)
@@ -48,7 +48,7 @@ class GroupWeights:
 
 @dataclass(frozen=True)
 class Entries:
-    """Entries of groups that belong to a bone, also those of weight 0.
+    """Entries of groups that belong to a bone, including those of weight 0.
 
     counts   int32 [vertices], entries of each vertex
     bones    int32 [entries]
@@ -65,8 +65,8 @@ class Entries:
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
     def influences(self) -> Influences:
-        """The entries that deform: without those of weight 0, and without all of a vertex whose weights sum
-        to SMALLEST_WEIGHT_SUM or less. In stored order, on which dual quaternions depend."""
+        """The entries that deform: without those of weight 0, and without vertices whose weights have a sum
+        of SMALLEST_WEIGHT_SUM or less. In stored order, on which dual quaternions depend."""
         vertices = self.vertices
         sums = np.bincount(vertices, weights=self.weights, minlength=len(self.counts))
         kept = (self.weights > 0) & (sums > SMALLEST_WEIGHT_SUM)[vertices]
@@ -84,7 +84,7 @@ class Influences:
 
     offsets  int32 [vertices + 1], the first influence of each vertex, then the end
     bones    int32 [influences]
-    weights  float32 [influences], > 0, any sum
+    weights  float32 [influences], > 0, of any sum
     """
 
     offsets: np.ndarray
@@ -97,7 +97,7 @@ class Influences:
         return np.diff(self.offsets)
 
     def distance_from(self, other: Influences) -> float:
-        """The largest difference of a weight, of as many vertices."""
+        """The largest difference of a weight; both have the same number of vertices."""
         bones = 1 + max(int(each.bones.max(initial=0)) for each in (self, other))
         keys = [np.repeat(np.arange(len(e.counts)), e.counts) * bones + e.bones for e in (self, other)]
         found, at = np.unique(np.concatenate(keys), return_inverse=True)
@@ -106,7 +106,7 @@ class Influences:
 
 
 def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influences:
-    """The influences of several meshes as of one; vertices and bones are concatenated.
+    """Returns the influences of several meshes as one; vertices and bones are concatenated.
 
     bone_counts  of each part, including joints of bendy bones
     """
@@ -121,12 +121,12 @@ def joined(parts: Sequence[Influences], bone_counts: Sequence[int]) -> Influence
 
 
 def entries_of_bones(groups: GroupWeights, bone_of_group: np.ndarray) -> Entries:
-    """The entries of groups that belong to a bone.
+    """Returns the entries of groups that belong to a bone.
 
     bone_of_group  int32 [groups], the bone of each group, -1 for none
     """
     table = np.append(bone_of_group.astype(np.int32), np.int32(-1))
-    # A mesh whose groups were deleted can still have indices of groups past the last.
+    # A mesh whose groups were deleted can still have indices beyond the last group.
     bones = table[np.minimum(groups.groups, len(table) - 1)]
     kept = bones >= 0
     if kept.all():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C in a command. Blender ignores a KeyboardInterrupt raised within its handlers: while code on bpy
-runs, Ctrl-C is recorded, and the next check() raises it. Commands call check() for each frame and step of
-progress."""
+"""Ctrl-C in a command. Blender ignores a KeyboardInterrupt raised within its handlers, so while code that
+uses bpy runs, Ctrl-C is only recorded, and the next check() raises it. Commands call check() for each frame
+and step of progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from types import FrameType
 
 _requested = False
 
-# The rooms whose code Blender may have called.
+# The folders whose code Blender may have called.
 _PACKAGE = __package__.rpartition(".")[0]
 _ON_BPY = tuple(f"{_PACKAGE}.{room}." for room in ("io", "attach", "deform", "ui", "features", "jobs.tasks"))
 
@@ -23,7 +23,7 @@ def deferred() -> Iterator[None]:
     """A context in which Ctrl-C raises KeyboardInterrupt at the next check(); pressed again, at once."""
     global _requested
     if threading.current_thread() is not threading.main_thread():
-        # Signals can be handled in the main thread only.
+        # Only the main thread can handle signals.
         yield
         return
     before = signal.signal(signal.SIGINT, _on_interrupt)
@@ -31,7 +31,7 @@ def deferred() -> Iterator[None]:
         yield
     finally:
         _requested = False
-        # None stands for a handler of Blender's own, which can not be restored.
+        # None stands for a handler of Blender's own, which cannot be restored.
         signal.signal(signal.SIGINT, before or signal.default_int_handler)
 
 
@@ -49,7 +49,7 @@ def _on_interrupt(_signal: int, frame: FrameType | None) -> None:
 
 
 def _is_in_blender(frame: FrameType | None) -> bool:
-    """Whether code on bpy is running, which Blender may have called."""
+    """Whether code that Blender may have called is running."""
     while frame is not None:
         if frame.f_globals.get("__name__", "").startswith(_ON_BPY):
             return True

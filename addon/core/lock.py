@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""File locks, which the system releases when a process ends, also when it is killed."""
+"""File locks that the system releases when a process ends, even if it is killed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import sys
 
 
 def try_lock(descriptor: int) -> bool:
-    """Locks a file for this process alone. False where another process has it, or files can not be locked."""
+    """Locks a file for this process alone. Returns False where another process has the lock, or files cannot
+    be locked."""
     try:
         _lock(descriptor)
     except OSError:
@@ -20,7 +21,7 @@ if sys.platform == "win32":
     import msvcrt
 
     def _lock(descriptor: int) -> None:
-        # A byte beyond any file's end: on Windows others can not read locked bytes.
+        # A byte beyond any file's end, as on Windows others cannot read locked bytes.
         os.lseek(descriptor, 1 << 40, os.SEEK_SET)
         msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mends weights: exactly those vertices, and no group that the artist has locked."""
+"""Mends the weights of chosen vertices, without changing groups that the artist has locked."""
 
 from __future__ import annotations
 
@@ -9,35 +9,36 @@ import numpy as np
 
 from .influences import GroupWeights
 
-# Of vertices that are mended: the weight in each group, by its index, in stored order.
+# For each mended vertex: the weight in each group, by the group's index, in stored order.
 Rows = dict[int, dict[int, float]]
 SMOOTH_STEPS, SMOOTH_FACTOR = 5, 0.5
-# What smoothing leaves of a group that is hardly there.
+# Smaller weights are dropped after smoothing.
 LEAST_WEIGHT = 1e-3
 
 
 class WeightMender:
-    """Other weights for some vertices of a mesh. Groups that belong to no bone are never changed, and neither
-    are those that are locked; what is scaled to a sum of 1 is scaled in the others."""
+    """Computes new weights for some vertices of a mesh. Groups without a bone and locked groups never change;
+    to get a sum of 1, only the other groups are scaled."""
 
     def __init__(self, weights: GroupWeights, is_bone: np.ndarray, is_locked: np.ndarray) -> None:
-        """is_bone, is_locked  bool [groups]"""
+        """is_bone, is_locked: bool [groups]."""
         self._weights = weights
         self._is_bone = is_bone
         self._is_free = is_bone & ~is_locked
         self._starts = np.concatenate([[0], np.cumsum(weights.counts)])
 
     def limited(self, vertices: Iterable[int], limit: int) -> Rows:
-        """At most `limit` bones each: the smallest weights go, and the others are scaled to a sum of 1."""
+        """Limits vertices to `limit` bones each: the smallest weights are removed, and the others scaled to a
+        sum of 1."""
         return {vertex: self._limited(self._row(vertex), limit) for vertex in vertices}
 
     def normalized(self, vertices: Iterable[int]) -> Rows:
-        """Weights with a sum of 1; a vertex without any keeps none."""
+        """Scales weights to a sum of 1; a vertex without weights keeps none."""
         return {vertex: self._normalized(self._row(vertex)) for vertex in vertices}
 
     def smoothed(self, vertices: Sequence[int], edges: np.ndarray, limit: int) -> Rows:
-        """Each weight goes half of the way to the mean of the neighbours', SMOOTH_STEPS times; the other
-        vertices stay. Afterwards at most `limit` bones.
+        """Moves each weight half of the way to the mean of its neighbours', SMOOTH_STEPS times, while the
+        other vertices are fixed. Afterwards at most `limit` bones.
 
         edges  int [edges, 2]
         """
@@ -54,8 +55,8 @@ class WeightMender:
         return {vertex: self._limited(rows[vertex], limit) for vertex in vertices}
 
     def filled(self, vertices: Sequence[int], edges: np.ndarray, limit: int) -> Rows:
-        """The mean of the weights of the neighbours that have any, inwards from the border of the vertices;
-        those that no weighted vertex is connected to are left out.
+        """Fills in the mean of the neighbours that have weights, from the border of the vertices inwards;
+        vertices that are not connected to any weighted vertex are left out.
 
         edges  int [edges, 2]
         """
@@ -75,9 +76,9 @@ class WeightMender:
             open_ones -= layer.keys()
 
     def mirrored(self, sources: Mapping[int, int], mirror_of: Sequence[int]) -> Rows:
-        """The weights of other vertices, each in the group of the other side.
+        """Copies the weights of other vertices, each to the group of the other side.
 
-        sources    the vertex on the other side, by the vertex that is mended
+        sources    the vertex on the other side, by the mended vertex
         mirror_of  [groups], the group of the other side, or the group itself
         """
         rows = {}
@@ -94,7 +95,7 @@ class WeightMender:
     def _row(self, vertex: int) -> dict[int, float]:
         own = slice(self._starts[vertex], self._starts[vertex + 1])
         groups, weights = self._weights.groups[own].tolist(), self._weights.weights[own].tolist()
-        # A mesh whose groups were deleted can still have indices of groups past the last.
+        # A mesh whose groups were deleted can still have indices beyond the last group.
         return {g: w for g, w in zip(groups, weights, strict=True) if g < len(self._is_bone)}
 
     def _free_sum(self, row: Mapping[int, float]) -> float:
@@ -115,13 +116,13 @@ class WeightMender:
         return {g: w * scale if self._is_free[g] else w for g, w in row.items()}
 
     def _replaced(self, row: Mapping[int, float], weights: Mapping[int, float]) -> dict[int, float]:
-        """A row with other weights in its free groups."""
+        """Returns the row with other weights in its free groups."""
         kept = {g: w for g, w in row.items() if not self._is_free[g]}
         return kept | {g: w for g, w in weights.items() if self._is_free[g]}
 
     def _mixed(self, row: Mapping[int, float], others: Sequence[Mapping[int, float]]) -> dict[int, float]:
         mean = _mean(others)
-        # Its own first, in stored order.
+        # The row's own groups first, in stored order.
         groups = [g for g in dict.fromkeys((*row, *mean)) if self._is_free[g]]
         weights = {
             g: (1.0 - SMOOTH_FACTOR) * row.get(g, 0.0) + SMOOTH_FACTOR * mean.get(g, 0.0) for g in groups

@@ -27,14 +27,14 @@ from .vectors import cross, dots
 
 @dataclass(frozen=True)
 class Metric:
-    """A measure that each vertex has, to be shown as a heat map.
+    """A measure with a value at each vertex, which a heat map can show.
 
-    name       for programs, such as Measured.field
-    label      for people
-    unit       "length" (that of the points), "ratio" or "share"
-    scale      how values become colours: "linear" from 0, "signed" around 0, "log" around 1
-    worst      the entry of a summary by which frames are compared: the largest magnitude is the worst
-    text       one sentence
+    name   for programs, such as Measured.field
+    label  for people
+    unit   "length" (that of the points), "ratio" or "share"
+    scale  how values become colours: "linear" from 0, "signed" around 0, "log" around 1
+    worst  the entry of a summary by which frames are compared: the largest magnitude is the worst
+    text   one sentence
     """
 
     name: str
@@ -95,7 +95,7 @@ METRICS = {
 
 @dataclass(frozen=True)
 class FrameOfRig:
-    """The rest shape and the bones of one frame; all in one space, in whose unit lengths are measured.
+    """The rest shape and the bones of one frame, all in one space, in whose unit lengths are measured.
 
     rest        [vertices, 3], the shape that the bones deform
     rest_axes   [bones, 2, 3], head and tail of each bone that an influence has, at rest
@@ -116,7 +116,8 @@ class FrameOfRig:
 
 @dataclass(frozen=True)
 class Summary:
-    """The numbers of one shape; docs/metrics.md defines each. Lengths in the unit of the points."""
+    """The measures of one shape as numbers; docs/metrics.md defines each. Lengths in the unit of the
+    points."""
 
     distance_max: float
     distance_rms: float
@@ -140,7 +141,7 @@ class Summary:
         return max(self.bulge_max, -self.bulge_min)
 
     def extremes(self, metric: str) -> tuple[float, float]:
-        """Bounds of the values of one of METRICS at all vertices."""
+        """Returns the bounds of one of METRICS over all vertices."""
         if metric == "distance":
             return 0.0, self.distance_max
         if metric == "flips":
@@ -149,12 +150,14 @@ class Summary:
 
 
 def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Volume inside a triangle mesh, in cubed units of `points`; positive where faces look outwards.
+    """Returns the volume inside a triangle mesh, in cubed units of `points`; positive where faces point
+    outwards.
 
     points     [vertices, 3]
     triangles  int [triangles, 3]
 
-    The sum of signed tetrahedra (divergence theorem); holes are closed by fans to the mean of their border.
+    It is the sum of signed tetrahedra (divergence theorem); holes are closed by fans to the mean of their
+    border.
     """
     return Shape(Surface(len(points), triangles, np.empty((0, 2), np.int32)), points).volume
 
@@ -163,7 +166,7 @@ class Gauge:
     """Measures shapes of one mesh against its rest shape."""
 
     def __init__(self, surface: Surface, influences: Influences) -> None:
-        """influences  of every vertex of the surface, over the bones of FrameOfRig's arrays"""
+        """influences: of every vertex of the surface, over the bones of FrameOfRig's arrays."""
         self.surface = surface
         self._rest: Shape | None = None
         self._skin = Skin(surface, influences)
@@ -187,8 +190,8 @@ class Gauge:
     def measure(
         self, points: np.ndarray, other: np.ndarray | Callable[[], np.ndarray] | None = None
     ) -> Measured:
-        """Measures of a shape [vertices, 3] in the frame set last. Distances are to the shape `other`, or to
-        the one that it returns.
+        """Measures a shape [vertices, 3] in the frame set last. Distances are to the shape `other`, or to the
+        one that it returns.
 
         Each measure is computed when it is first read.
         """
@@ -201,7 +204,7 @@ class Skin:
 
     weighted  int [weighted], the vertices that have influences
     starts    int64 [weighted], the index of the first influence of each
-    heaviest  int [weighted], the bone of the largest weight of each, the first of equals
+    heaviest  int [weighted], the bone with the largest weight of each, the first of equals
     """
 
     def __init__(self, surface: Surface, influences: Influences) -> None:
@@ -211,7 +214,8 @@ class Skin:
         self.heaviest = _heaviest_bones(influences, self.weighted, self.starts)
 
     def distances_from_axes(self, points: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        """float64 [weighted]: from the axis of each vertex's heaviest bone, for points [3, vertices]."""
+        """float64 [weighted]: distances of points [3, vertices] from the axis of each vertex's heaviest
+        bone."""
         heads = np.ascontiguousarray(axes[:, 0].T, dtype=np.float64)
         bones = np.ascontiguousarray((axes[:, 1] - axes[:, 0]).T, dtype=np.float64)
         along = bones.take(self.heaviest, axis=1)
@@ -222,7 +226,7 @@ class Skin:
         return np.sqrt(dots(offset, offset))
 
     def rotated_normals(self, normals: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """float32 [3, triangles]: normals, of any length, rotated with the bones of their corners.
+        """float32 [3, triangles]: normals, of any length, rotated by the bones of their corners.
 
         rotations  unit quaternions [4, bones]
         """
@@ -234,7 +238,7 @@ class Skin:
             bones, weights = self._influences.bones, self._influences.weights
             heaviest = np.repeat(self.heaviest, self._influences.counts[self.weighted])
             terms = rotations.take(bones, axis=1)
-            # All in the hemisphere of the heaviest: a sum of two then never cancels.
+            # All are brought into the hemisphere of the heaviest: a sum of two then never cancels.
             terms *= np.where(dots(terms, rotations.take(heaviest, axis=1)) < 0.0, -weights, weights)
             sums = np.add.reduceat(terms, self.starts, axis=1)
             vertex_rotations[:, self.weighted] = sums / np.maximum(
@@ -246,20 +250,20 @@ class Skin:
         total += np.where(dots(first, third) < 0.0, -one, one) * third
         with np.errstate(over="ignore"):
             normals = normals.astype(np.float32)
-        # A face with a coordinate that is not finite has no normal.
+        # A face with a non-finite coordinate has no normal.
         normals[~np.isfinite(normals)] = 0.0
         return rotated(total, normals)
 
 
 class Pose:
-    """What all measures of one frame share; each is computed once, when it is first read."""
+    """What all measures of one frame share; each value is computed when it is first read."""
 
     def __init__(self, skin: Skin, rest: Shape, frame: FrameOfRig) -> None:
         self.skin, self.rest, self.frame = skin, rest, frame
 
     @cached_property
     def rest_distances(self) -> np.ndarray:
-        """float64 [weighted]: from the axes at rest."""
+        """float64 [weighted]: distances from the axes at rest."""
         return self.skin.distances_from_axes(self.rest.points, self.frame.rest_axes)
 
     @cached_property
@@ -275,13 +279,13 @@ class Shape:
     """
 
     def __init__(self, surface: Surface, points: np.ndarray) -> None:
-        """points  [vertices, 3]"""
+        """points: [vertices, 3]."""
         self.surface = surface
         self.points = _by_axis(points)
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """float64 [3, triangles], outwards, twice the triangle's area long."""
+        """float64 [3, triangles], pointing outwards, with a length of twice the triangle's area."""
         a, b, c = (self.points.take(corner, axis=1) for corner in self.surface.corners)
         return cross(b - a, c - a)
 
@@ -301,7 +305,7 @@ class Shape:
     def volume(self) -> float:
         if len(self.surface.triangles) == 0:
             return 0.0
-        # Far from the origin, the terms of a small mesh would be large and cancel.
+        # Relative to the mean: far from the origin, the terms of a small mesh would be large and cancel.
         points = self.points - self.points.mean(axis=1, keepdims=True)
         inside = np.einsum("ij,ij->", points.take(self.surface.corners[0], axis=1), self.normals)
         return (float(inside) + self.surface.caps.volume(points)) / 6.0
@@ -312,7 +316,7 @@ class Shape:
 
     @cached_property
     def diagonal(self) -> float:
-        """Of the bounding box."""
+        """The diagonal of the bounding box."""
         return float(np.linalg.norm(np.ptp(self.points, axis=1))) if self.surface.vertex_count else 0.0
 
 
@@ -320,13 +324,13 @@ class Measured:
     """The measures of one shape: numbers, and the fields of METRICS."""
 
     def __init__(self, pose: Pose, shape: Shape, other: np.ndarray | Callable[[], np.ndarray] | None) -> None:
-        """other  [vertices, 3], or a function that returns it: the shape that distances are measured to"""
+        """other: [vertices, 3], or a function that returns it: the shape that distances are measured to."""
         self.rest, self.shape = pose.rest, shape
         self._pose, self._other = pose, other
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """float64 [vertices]: to the other shape; 0 without one."""
+        """float64 [vertices]: distance to the other shape; 0 without one."""
         if self._other is None:
             return np.zeros(self.shape.surface.vertex_count)
         other = self._other() if callable(self._other) else self._other
@@ -358,7 +362,7 @@ class Measured:
         return _ratios(self.shape.areas, self.rest.areas)
 
     def entry(self, name: str) -> float:
-        """One entry of the summary, or `bulge_worst`, without computing the others."""
+        """Returns one entry of the summary, or `bulge_worst`, without computing the others."""
         return self._ENTRIES[name](self)
 
     def summary(self) -> Summary:
@@ -426,7 +430,7 @@ def bone_axes(bones: Bones, matrices: np.ndarray) -> np.ndarray:
 
     matrices  [bones + joints, 4, 4], of the bones at rest or posed
 
-    The axis of a bendy bone's joint ends at the next joint; that of the last joint ends at the one before.
+    The axis of a bendy bone's joint ends at the next joint; that of the last joint ends at the previous one.
     """
     matrices = matrices.astype(np.float64)
     heads, count = matrices[:, :3, 3], len(bones.names)
@@ -439,12 +443,12 @@ def bone_axes(bones: Bones, matrices: np.ndarray) -> np.ndarray:
 
 
 def _by_axis(points: np.ndarray) -> np.ndarray:
-    """float64 [3, n] of [n, 3]: numpy computes and gathers several times faster on contiguous coordinates."""
+    """float64 [3, n] of [n, 3]: numpy is several times faster on contiguous coordinates."""
     return np.ascontiguousarray(points.T, dtype=np.float64)
 
 
 def _heaviest_bones(influences: Influences, weighted: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """int [weighted]: the bone of the largest weight of each vertex, the first of equals."""
+    """int [weighted]: the bone with the largest weight of each vertex, the first of equals."""
     if len(weighted) == 0:
         return np.empty(0, dtype=np.int64)
     largest = np.repeat(np.maximum.reduceat(influences.weights, starts), influences.counts[weighted])
@@ -460,7 +464,7 @@ def _ratios(values: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
 def _rms(values: np.ndarray, weights: np.ndarray | None = None) -> float:
     if weights is None:
         weights = np.ones_like(values)
-    # Not by `@`: BLAS would start its threads, which takes longer than the sum.
+    # Not with `@`: starting BLAS's threads takes longer than the sum.
     return float(np.sqrt(_share(float((weights * values * values).sum()), float(weights.sum()))))
 
 

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names and patterns of names."""
+"""Patterns of names, and names as file names."""
 
 from __future__ import annotations
 
 import re
 from fnmatch import fnmatchcase
 
-# Path separators and drives, characters that no file's name can have, and text that unquote() would change.
+# Path separators and drives, characters that file names cannot have, and text that unquote() would change.
 _NOT_IN_FILE_NAMES = re.compile(r"[/\\\x00-\x1f\x7f]|^\.+$|(?<=^[A-Za-z]):|%(?=[0-9A-Fa-f]{2})")
 
 
 def fits(name: str, pattern: str) -> bool:
-    """Whether `name` matches a pattern such as "Cape*", or equals it: a name can have brackets."""
+    """Whether `name` matches a pattern such as "Cape*", or equals it, as a name can contain brackets."""
     return name == pattern or fnmatchcase(name, pattern)
 
 
 def as_file_name(name: str) -> str:
-    """Any name as the name of a file: "a/b" becomes "a%2Fb", most names do not change. The inverse is
+    """Converts any name to a file name: "a/b" becomes "a%2Fb", most names are unchanged. The inverse is
     urllib.parse.unquote."""
     return _NOT_IN_FILE_NAMES.sub(lambda found: "".join(f"%{ord(char):02X}" for char in found[0]), name)

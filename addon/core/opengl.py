@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether Blender can draw on this machine."""
+"""Finds out whether Blender can draw on this machine."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _PROBE = (
 
 
 def default_engine(blender: str = "") -> str:
-    """The default engine of pictures: "workbench", or "cycles" where Workbench can not render."""
+    """The default engine for pictures: "workbench", or "cycles" where Workbench cannot render."""
     return "workbench" if has_opengl(blender) else "cycles"
 
 
 def has_opengl(blender: str = "") -> bool:
-    """Whether Workbench can render here. It is tried in a new Blender process, which takes as long as Blender
-    to start: without OpenGL, Blender aborts.
+    """Whether Workbench can render here. Tried in a new Blender process, which takes as long as starting
+    Blender, because Blender aborts without OpenGL.
 
     blender  the program's path; "" where it is a module of this Python
     """

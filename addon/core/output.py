@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes whole files: a reader never finds a half-written one. A failure is reported in one sentence."""
+"""Writes whole files, so that readers never find a half-written one. Failures are reported in one
+sentence."""
 
 from __future__ import annotations
 
@@ -13,21 +14,20 @@ from .errors import SinewError, WrongUse
 
 
 def remove(path: Path) -> None:
-    """Removes a file where it exists and can be removed; on a read-only disk even the attempt raises
-    OSError."""
+    """Removes a file if it exists and can be removed; on a read-only disk even the attempt raises OSError."""
     with suppress(OSError):
         path.unlink(missing_ok=True)
 
 
 def sentence(error: OSError) -> str:
-    """The message of an error of the system, with the file that it is about."""
+    """Returns the message of a system error, with the file that it is about."""
     what = error.strerror or str(error) or type(error).__name__
     return f"{error.filename}: {what}" if error.filename is not None else what
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """A context that raises an OSError as the SinewError that `path` can not be written."""
+    """Context that turns an OSError into the SinewError that `path` cannot be written."""
     try:
         yield
     except OSError as error:
@@ -37,7 +37,7 @@ def writing(path: Path) -> Iterator[None]:
 def folder_to_write(given: str | Path) -> Path:
     """The type of an argument that names a folder to write to.
 
-    Raises SinewError where files can not be written to it, or where it does not exist and can not be made. So
+    Raises SinewError where files cannot be written to it, or where it does not exist and cannot be made: so
     the error comes before a long computation.
     """
     folder = Path(given)
@@ -46,7 +46,7 @@ def folder_to_write(given: str | Path) -> Path:
         what = "a file" if nearest.exists() else "a link to nothing"
         raise SinewError(f"{folder}: can not be written: {nearest} is {what}")
     try:
-        # Permissions do not tell: root has all of them, also on a read-only disk and in /proc.
+        # Permissions are not reliable: root has all of them, even on a read-only disk and in /proc.
         with tempfile.TemporaryFile(dir=nearest):
             pass
     except OSError as error:
@@ -74,12 +74,12 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Calls `write` with a temporary path in the folder of `path`, then renames the file; makes missing
     folders.
 
-    Raises SinewError where it can not be written. After any exception the temporary file is removed.
+    Raises SinewError where it cannot be written. After any exception the temporary file is removed.
     """
-    # With the same suffix: some writers choose the format by it.
+    # With the same suffix, by which some writers choose the format.
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     made = [folder for folder in path.parents if not folder.exists()]
-    # A symbolic link of that name, in a folder made by somebody else, would be followed.
+    # Otherwise a symbolic link of that name, in a folder made by somebody else, would be followed.
     remove(unfinished)
     try:
         with writing(path):
@@ -95,5 +95,5 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes UTF-8. File names on a disk need not be valid text: other bytes become a "?"."""
+    """Writes UTF-8. File names on a disk need not be valid text: invalid bytes become "?"."""
     write_whole(path, lambda unfinished: unfinished.write_bytes(text.encode("utf-8", errors="replace")))

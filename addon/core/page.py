@@ -18,7 +18,7 @@ from .heat import HeatScale
 from .plots import colour_of, line_plot
 from .suggestion import CRITERIA, Suggestion
 
-# Title, unit and entries of the summaries. A plot has a line for each method and entry.
+# Title, unit, and entries of the summaries. A plot has a line for each method and entry.
 PLOTS = (
     ("Distance, largest", "length", ("distance_max",)),
     ("Volume change", "percent", ("volume_change",)),
@@ -40,7 +40,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A heading, a sentence, rows of pictures, and the legend where they show a heat map."""
+    """A heading, a sentence, rows of pictures, and a legend if they show a heat map."""
 
     title: str
     text: str
@@ -49,7 +49,7 @@ class Sheet:
 
 
 def page(comparison: Comparison, sheets: Sequence[Sheet], note: str = "") -> str:
-    """note  one sentence for the top of the page, about what was not possible"""
+    """note: one sentence for the top of the page, about what was not possible."""
     title = f"{comparison.file}: {', '.join(comparison.meshes)}"
     body = [
         f"<h1>{escape(comparison.file)}</h1>",

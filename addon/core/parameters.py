@@ -14,7 +14,7 @@ from .errors import WrongUse
 Value: TypeAlias = float | int | bool | str
 
 OFF = "off"
-"""The value of a parameter that names a method, for none."""
+"""The value "none" of a parameter that names a method."""
 
 SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
@@ -26,8 +26,8 @@ def by_full_name() -> dict[str, sinew.Parameter]:
 
 
 def parse(texts: Iterable[str]) -> dict[str, Value]:
-    """The values of NAME=VALUE texts by full names; later ones win. A stage's name alone is its first
-    parameter.
+    """Returns the values of NAME=VALUE texts by full names; later ones override earlier ones. A stage's name
+    alone stands for its first parameter.
 
     Raises WrongUse.
     """

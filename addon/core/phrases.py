@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences with values in them that the panel can say in the user's language."""
+"""Sentences with values, which the panel can translate."""
 
 from __future__ import annotations
 
 
 class Phrase(str):
-    """A sentence in English that keeps what it was made of: where no panel shows it, it is plain text.
+    """A sentence in English that keeps its template and values; used as plain text outside the panel.
 
     template  the sentence with names in braces
     values    for those names; phrases among them are translated, too

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plots as SVG text for a page, by matplotlib. Blender's own Python does not have it."""
+"""Plots as SVG text for a page, by matplotlib, which Blender's own Python does not have."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from .errors import SinewError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Told apart by people of all kinds of colour vision (M. Okabe, K. Ito, 2008); readable on light and dark.
+# Distinguishable with all kinds of colour vision (M. Okabe, K. Ito, 2008); readable on light and dark.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#7f7f7f")
 
-# Replaced by the page's own colour of text, which is light in a dark page. No other part of a plot has it.
+# Replaced by the page's text colour, which is light in a dark page. No other part of a plot has this colour.
 _TEXT_COLOUR = "#010203"
 
 
 def line_plot(
     title: str, unit: str, frames: Sequence[float], lines: Mapping[str, Sequence[Sequence[float]]]
 ) -> str:
-    """An <svg> with the lines of each method in its colour, in the order of `lines`.
+    """Returns an <svg> with the lines of each method in its colour, in the order of `lines`.
 
-    lines  by method, one or more lines of a value for each frame; values that are not finite leave gaps
+    lines  by method, one or more lines with a value for each frame; values that are not finite leave gaps
 
     Raises SinewError where matplotlib is missing.
     """
@@ -36,7 +36,7 @@ def line_plot(
         axes = figure.add_subplot()
         name = re.sub(r"\W+", "-", title)
         for number, own in enumerate(lines.values()):
-            # Where lines coincide, those below show at both edges of those above.
+            # Where lines coincide, the lower ones remain visible at both edges of the upper ones.
             style: dict[str, Any] = {
                 "color": colour_of(number),
                 "linewidth": 1.6 + 1.4 * min(len(lines) - 1 - number, 3),
@@ -66,7 +66,7 @@ def colour_of(number: int) -> str:
 
 
 def _without_neighbours(line: Sequence[float]) -> list[int]:
-    """The frames, by index, at which a line has a value and no segment."""
+    """Indices of the frames at which a line has a value but no segment."""
     padded = [math.nan, *line, math.nan]
     return [
         i
@@ -79,9 +79,9 @@ def _without_neighbours(line: Sequence[float]) -> list[int]:
 def new_figure(
     salt: str, inches: tuple[float, float], settings: Mapping[str, Any] | None = None
 ) -> Iterator[Figure]:
-    """A context with a figure that needs no screen. Raises SinewError where matplotlib is missing.
+    """Context with a figure that needs no screen. Raises SinewError where matplotlib is missing.
 
-    salt  of the ids in the SVG: they must differ from plot to plot of a page, and be the same in each run
+    salt  of the ids in the SVG: different for each plot of a page, and the same in each run
     """
     try:
         import matplotlib
@@ -106,7 +106,7 @@ def new_figure(
 
 
 def to_svg(figure: Figure) -> str:
-    """The <svg> element alone, without a background, and with no link to anything outside the page."""
+    """Returns the <svg> element alone, without a background or links outside the page."""
     file = io.StringIO()
     metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     figure.savefig(file, format="svg", transparent=True, metadata=metadata)

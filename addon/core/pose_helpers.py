@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones that follow the pose, whatever animation there is: each rotates as the dual quaternion blend
-of the rig's bones around it, with weights of its own. Its head moves as that blend does, or as linear
-blending with the same weights: so it is with optimised centres of rotation (Le and Hodgins 2016), of which
-the head then is one. Blender's Armature constraints, with Preserve Volume and without, are the two.
+"""Helper bones that follow the pose in any animation: each rotates as a dual quaternion blend of the rig's
+bones around it, with weights of its own. Its head moves by that blend, or by linear blending with the same
+weights, as optimised centres of rotation do (Le and Hodgins 2016). In Blender these are Armature constraints
+with and without Preserve Volume.
 
-Motions of these kinds are in the place of those that each frame may choose (helper_bones.py): weights, and
-the place of a centre, are found by Gauss-Newton, damped (Levenberg, Marquardt), while everything else stands
-still.
+Such motions replace those that are independent in each frame (helper_bones.py): weights, and the position of
+a centre, are found by damped Gauss-Newton (Levenberg, Marquardt), while everything else is fixed.
 """
 
 from __future__ import annotations
@@ -20,21 +19,21 @@ import sinew
 from . import helper_bones
 from .helper_bones import Blend, Errors, Helper, Motion, Solution, Solver, Wanted
 
-# So many bones move a helper bone at most.
+# The largest number of bones that move a helper bone.
 _MOST_BONES = 6
 _STEPS, _TRIES = 4, 5
 _DIFFERENCE = 1e-4
 # A centre that moves by this share of the diagonal counts as a weight that changes by 1.
 _UNIT = 0.1
 _DAMPING = 1e-3
-# Of the squares of an error. Methods that are dual quaternion blends leave 1e-12, others 1e-2 and more.
+# Share of the squared error. Methods that are dual quaternion blends leave 1e-12, others 1e-2 and more.
 _NEXT_TO_NOTHING = 1e-3
-# Weights that change by less are found.
+# The search ends when weights change by less.
 _CLOSE = 1e-4
 
 
 def solve(motion: Motion, wanted: Wanted, rest: np.ndarray) -> Generator[float, None, Solution]:
-    """As helper_bones.solve(), with blends of each helper bone.
+    """As helper_bones.solve(), with a blend for each helper bone.
 
     rest  float [bones, 4, 4], the rig's bones at rest, armature space
     """
@@ -42,8 +41,8 @@ def solve(motion: Motion, wanted: Wanted, rest: np.ndarray) -> Generator[float, 
 
 
 def errors_of(solution: Solution, motion: Motion, rest: np.ndarray) -> tuple[Errors, Errors, np.ndarray]:
-    """Of linear blend skinning with the weights that there were, and of a solution, in other poses than it
-    was made from; and its rms error at each vertex, float32 [vertices]."""
+    """Returns the errors of linear blend skinning with the original weights, and of a solution, in other
+    poses than those it was made from; and its rms error at each vertex, float32 [vertices]."""
     solver = _PoseSolver(motion, solution.bones.shape[1], rest_bones=rest)
     before = solver.errors()
     return before, *solver.play(solution)
@@ -51,7 +50,7 @@ def errors_of(solution: Solution, motion: Motion, rest: np.ndarray) -> tuple[Err
 
 @dataclass
 class _PoseSolver(Solver):
-    """rest_bones  float [bones, 4, 4], armature space"""
+    """rest_bones: float [bones, 4, 4], armature space."""
 
     rest_bones: np.ndarray = field(kw_only=True)
 
@@ -60,11 +59,11 @@ class _PoseSolver(Solver):
         motions = np.zeros((*self.motion.bones.shape[:2], 4, 4))
         motions[:, :, :3], motions[:, :, 3, 3] = self.motion.bones, 1.0
         self._length = max(self.motion.diagonal, 1e-30) * _UNIT
-        # Blender splits a bone's scale off, and blends it apart.
+        # Blender separates a bone's scale, and blends it separately.
         self._split = sinew.affine.split_scale(motions, np.asarray(self.rest_bones, dtype=np.float64))
 
     def play(self, solution: Solution) -> tuple[Errors, np.ndarray]:
-        """The errors of a solution that was made of other poses; the rms of each vertex, float32."""
+        """Returns the errors of a solution made from other poses, and the rms of each vertex, float32."""
         nothing = np.empty(0)
         self.helpers = [
             Helper(self._blended(blend), int(parent), nothing, nothing, blend)
@@ -81,7 +80,7 @@ class _PoseSolver(Solver):
         rigid, scale = self._split.rigid[:, bones], self._split.scale[:, bones]
         linear = None
         if self._split.has_scale[:, bones].any():
-            # Scale is about the head; how it moves the head goes with the rigid part.
+            # Scale is about the head; how scale moves the head is part of the rigid motion.
             moved = scale[..., :3, :3] @ head + scale[..., :3, 3] - head
             rigid = rigid.copy()
             rigid[..., :3, 3] += (rigid[..., :3, :3] @ moved[..., None])[..., 0]
@@ -105,7 +104,7 @@ class _PoseSolver(Solver):
         rest = self.rest[vertices]
         rest = weights[:, None, None] * np.concatenate([rest, np.ones((*rest.shape[:2], 1))], axis=2)
         wanted = wanted.reshape(len(vertices), -1, 3)
-        # Of the sum over vertices of |w T p - y|^2: [frames or 1, 4, 4] and [frames, 3, 4].
+        # Terms of the sum over vertices of |w T p - y|^2: [frames or 1, 4, 4] and [frames, 3, 4].
         squares = np.einsum("vfi,vfj->fij", rest, rest)
         if rest.shape[1] == 1:
             products = np.tensordot(wanted, rest[:, 0], axes=(0, 0))
@@ -117,7 +116,7 @@ class _PoseSolver(Solver):
         return motion
 
     def _descended(self, blend: Blend, squares: np.ndarray, products: np.ndarray) -> tuple[Blend, np.ndarray]:
-        """The blend of the least sum over vertices that is found from another on, and its motion.
+        """Minimises the sum over vertices, starting from a blend. Returns the blend and its motion.
 
         squares, products  of the sum, as in _fitted()
         """
@@ -151,7 +150,7 @@ class _PoseSolver(Solver):
         return blend, motion
 
     def _slopes(self, blend: Blend, motion: np.ndarray) -> np.ndarray:
-        """float64 [n, frames, 3, 4]: of its motion, by each of its numbers."""
+        """float64 [n, frames, 3, 4]: derivatives of its motion with respect to each of its numbers."""
         slopes = []
         for at in range(len(blend.bones)):
             more = blend.weights.copy()
@@ -171,11 +170,12 @@ class _PoseSolver(Solver):
         return np.einsum("b,fbij->fij", shares, self.motion.bones[:, blend.bones])
 
     def _numbers(self, blend: Blend) -> np.ndarray:
-        """float64 [n]: what is found of a blend, weights and the place of a centre, all of one size."""
+        """float64 [n]: the unknowns of a blend, weights and the position of a centre, scaled alike."""
         return np.concatenate([blend.weights, blend.head / self._length if blend.is_centre else []])
 
     def _at(self, blend: Blend, numbers: np.ndarray) -> Blend:
-        """A blend with others, as near to these as may be: its weights are not below 0 and of sum 1."""
+        """Returns the blend with other unknowns, as close to these as possible: weights not negative, of sum
+        1."""
         weights, head = np.split(numbers, [len(blend.bones)])
         weights = np.maximum(weights, 0.0)
         total = weights.sum()
@@ -186,7 +186,7 @@ class _PoseSolver(Solver):
         )
 
     def _start(self, vertices: np.ndarray, weights: np.ndarray) -> Blend:
-        """As the vertices themselves are moved, together."""
+        """Returns the blend that moves the vertices together as their own weights do."""
         own = self.own[vertices]
         shares = self.own_weights[vertices] * weights[:, None]
         total = np.bincount(own[own >= 0], shares[own >= 0], minlength=self.motion.bones.shape[1])
@@ -196,7 +196,7 @@ class _PoseSolver(Solver):
         return Blend(bones, total[bones] / total[bones].sum(), head, not self._move_as_blends(vertices))
 
     def _move_as_blends(self, vertices: np.ndarray) -> bool:
-        """Whether dual quaternion blending by the vertices' own weights leaves next to nothing of the error
+        """Whether dual quaternion blending by the vertices' own weights leaves almost nothing of the error
         that linear blending has."""
         left = linear = 0.0
         for vertex in vertices:
@@ -207,7 +207,7 @@ class _PoseSolver(Solver):
             linear += np.square(self._moved(self._linear(own), at) - self.targets[at]).sum()
         return bool(left <= _NEXT_TO_NOTHING * linear)
 
-    def _go_on(self, helper: Helper, old: Helper, further: float) -> None:
+    def _extrapolate(self, helper: Helper, old: Helper, further: float) -> None:
         assert helper.blend is not None
         assert old.blend is not None
         numbers = self._numbers(helper.blend)

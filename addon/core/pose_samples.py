@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that a rig can take, at random: joints rotate within their limits, or about as far as is seen."""
+"""Random poses that a rig can take: joints rotate within their limits, or slightly more than in given
+poses."""
 
 from __future__ import annotations
 
@@ -8,19 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 import sinew
 
-# What a joint is seen to rotate, it may by this share more to either side, and by this angle more.
+# A joint's range in given poses is extended on both sides by this share, and by this angle.
 _MORE, _AT_LEAST = 0.25, np.radians(10.0)
-# Methods that blend rotations have no blend of half a turn.
+# Methods that blend rotations are not defined at 180 degrees.
 _MOST = np.radians(170.0)
 
 
 @dataclass(frozen=True)
 class Joints:
-    """
+    """The joints of a rig.
+
     rest     float [bones, 4, 4], armature space; bones come after their parents
     parents  int [bones]; -1 for none
-    limits   float [bones, 3, 2]: least and largest rotation about each of a bone's axes, in radians; nan
-             where there is none
+    limits   float [bones, 3, 2]: smallest and largest rotation about each of a bone's axes, in radians; nan
+             for no limit
     """
 
     rest: np.ndarray
@@ -29,13 +31,13 @@ class Joints:
 
 
 def sampled(poses: np.ndarray, joints: Joints, count: int, seed: int) -> np.ndarray:
-    """float64 [count, bones, 4, 4], armature space: each is one of `poses`, in turns, in which every bone has
-    a random rotation against its parent. Bones without a parent, all distances and all scale stay.
+    """Returns float64 [count, bones, 4, 4], armature space: `poses` in turns, in which every bone gets a
+    random rotation relative to its parent. Bones without a parent, all distances and all scale are unchanged.
 
-    poses  float [frames, bones, 4, 4], armature space; what joints are seen to rotate is in them, too
+    poses  float [frames, bones, 4, 4], armature space; joints without limits take their range from these
 
-    Rotations are vectors, an angle about an axis, whose three numbers are in a box: that of the limits, or
-    that of the poses and of rest, and some more.
+    Rotation vectors (axis times angle) are sampled from a box: that of the limits, or the extended box of the
+    poses and rest.
     """
     rng = np.random.default_rng(seed)
     relative = _relative(poses, joints)
@@ -58,18 +60,18 @@ def sampled(poses: np.ndarray, joints: Joints, count: int, seed: int) -> np.ndar
 
 
 def _relative(poses: np.ndarray, joints: Joints) -> np.ndarray:
-    """float64 [frames, bones, 4, 4]: each bone's motion from where its parent alone would have it."""
+    """float64 [frames, bones, 4, 4]: each bone's motion relative to its parent's."""
     result = np.tile(np.identity(4), (*poses.shape[:2], 1, 1))
     for bone, parent in enumerate(joints.parents):
         if parent >= 0:
             at_rest = np.linalg.inv(joints.rest[parent].astype(np.float64)) @ joints.rest[bone]
-            # A parent can be scaled to nothing.
+            # A parent can be scaled to zero.
             result[:, bone] = np.linalg.pinv(poses[:, parent] @ at_rest) @ poses[:, bone]
     return result
 
 
 def _range(vectors: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """float64 [bones, 3] twice"""
+    """float64 [bones, 3], twice: the smallest and the largest rotation vectors."""
     least, most = np.minimum(vectors.min(axis=0), 0.0), np.maximum(vectors.max(axis=0), 0.0)
     more = _MORE * (most - least) + _AT_LEAST
     has_limits = np.isfinite(limits).all(axis=2)
@@ -84,6 +86,6 @@ def _vectors(rigid: np.ndarray) -> np.ndarray:
 
 
 def _matrices(vectors: np.ndarray) -> np.ndarray:
-    """float64 [.., 3, 3]; longer than _MOST they are shortened to it."""
+    """float64 [.., 3, 3]; vectors longer than _MOST are shortened to it."""
     angles = np.minimum(np.linalg.norm(vectors, axis=-1), _MOST)
     return np.asarray(sinew.affine.from_axis_angle(vectors, angles))[..., :3, :3]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Precomputations: run once for each hash of what they take, beside the artist's work or at once."""
+"""Precomputations: run once for each hash of their inputs, on a thread or while the caller waits."""
 
 from __future__ import annotations
 
@@ -14,25 +14,24 @@ import numpy as np
 from .file_cache import FileCache
 
 Progress: TypeAlias = Callable[[float], bool]
-"""Takes the share that is done, 0 to 1. False: the work is to end."""
+"""Takes the progress, 0 to 1. Returns False when the work has to end."""
 
 Make: TypeAlias = Callable[[Progress], np.ndarray | None]
-"""None where it was told to end."""
+"""Returns None if it was told to end."""
 
-# What takes longer is kept in the folder.
+# Results that took longer are stored in the folder.
 SECONDS_WORTH_A_FILE = 0.1
 # Bytes of results that are kept in memory, so that undo finds them.
 MEMORY = 256 * 2**20
 
 
 class Precomputation:
-    """One run, on a thread of its own or on the one that waits for it.
+    """One run, on its own thread or on the one that waits for it.
 
-    make  sees numpy arrays alone, which nobody writes to
-
-    result           None until it has ended well
-    error            what make raised
-    progress         the share that is done, 0 to 1
+    make      uses only numpy arrays, which nobody writes to
+    result    None until it has ended successfully
+    error     the exception of make
+    progress  0 to 1
     """
 
     def __init__(self, key: str, make: Make, ended: Callable[[Precomputation], None]) -> None:
@@ -42,7 +41,7 @@ class Precomputation:
         self.error: Exception | None = None
         self.seconds = 0.0
         self._make = make
-        self._tell_end = ended
+        self._on_end = ended
         self._cancelled = threading.Event()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="Sinew precomputation", daemon=True)
@@ -59,7 +58,7 @@ class Precomputation:
         self._thread.start()
 
     def run_here(self) -> None:
-        """Instead of start()."""
+        """Runs on this thread, instead of start()."""
         self._run()
 
     def cancel(self) -> None:
@@ -78,12 +77,12 @@ class Precomputation:
         except Exception as error:
             self.error = error
         except BaseException:
-            # Ctrl-C on the thread that waits.
+            # For example Ctrl-C on the thread that waits.
             self._cancelled.set()
             raise
         finally:
             self.seconds = time.perf_counter() - started
-            self._tell_end(self)
+            self._on_end(self)
             self._ended.set()
 
     def _note_progress(self, done: float) -> bool:
@@ -92,10 +91,10 @@ class Precomputation:
 
 
 class Precomputations:
-    """All of a process. Any thread may ask.
+    """All precomputations of a process. Any thread may use it.
 
-    waits    who needs a result has it computed at once and waits: nobody watches, or a render needs it
-    cache    the folder that keeps results, None for none
+    waits    results are computed at once while the caller waits: nobody watches, or a render needs them
+    cache    the folder that stores results, None for none
     stopped  the keys that the artist has stopped
     """
 
@@ -113,7 +112,7 @@ class Precomputations:
             return list(self._running.values())
 
     def find(self, key: str) -> np.ndarray | None:
-        """The result of an earlier run, of this process or another."""
+        """Returns the result of an earlier run, in this process or another; None where there is none."""
         with self._lock:
             if key in self._made:
                 self._made.move_to_end(key)
@@ -124,7 +123,7 @@ class Precomputations:
         return found
 
     def start(self, key: str, make: Make) -> Precomputation:
-        """On a thread of its own; the one that runs already where there is one of this key."""
+        """Starts a run on its own thread, or returns the one that already runs with this key."""
         run, is_new = self._run_of(key, make)
         if is_new:
             self.stopped.discard(key)
@@ -140,12 +139,12 @@ class Precomputations:
             run.wait()
             if run.error is not None:
                 raise run.error
-            # Else somebody cancelled the run that was waited for.
+            # Otherwise somebody cancelled the run.
             if run.result is not None:
                 return run.result
 
     def cancel_all(self) -> None:
-        """Ends all runs, and returns when their threads are gone."""
+        """Ends all runs, and returns when their threads have ended."""
         running = self.running
         for run in running:
             run.cancel()
@@ -153,8 +152,8 @@ class Precomputations:
             run.wait()
 
     def stop(self) -> None:
-        """As cancel_all(); none of these keys is started again on a thread of its own, until it is taken out
-        of `stopped`."""
+        """Cancels all runs. None of these keys is started again on a thread until it is removed from
+        `stopped`."""
         self.stopped |= {run.key for run in self.running}
         self.cancel_all()
 
@@ -167,9 +166,9 @@ class Precomputations:
             return run, True
 
     def _ended(self, run: Precomputation) -> None:
-        """On the thread that ran it."""
+        """Called on the thread that ran it."""
         if run.result is not None:
-            # Found from now on, before it is no longer running.
+            # Stored before it is no longer listed as running, so that it is always found.
             self._keep(run.key, run.result)
             if self.cache is not None and run.seconds > SECONDS_WORTH_A_FILE:
                 self.cache.store(run.key, run.result)
@@ -186,4 +185,4 @@ class Precomputations:
 
 
 precomputations = Precomputations()
-"""Of this process. In a window, deform/precomputing.py decides who waits."""
+"""The one of this process. In a window, deform/precomputing.py sets `waits`."""

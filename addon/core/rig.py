@@ -28,8 +28,8 @@ class Bones:
     segments      int32 [bones], 1 for a bone that does not bend
     curved        bool [bones], those that map vertices along their curve
     first_joints  int32 [bones], the index in `rest` of the first of a bendy bone's segments + 1 joints
-    envelopes     the reach of every bone
-    complete      false where Blender had not computed the joints yet; bendy bones then count as straight
+    envelopes     of all bones
+    complete      False where Blender had not computed the joints yet; bendy bones then count as straight
     """
 
     names: tuple[str, ...]
@@ -62,8 +62,9 @@ class Bones:
 
     @cached_property
     def rest_axes(self) -> np.ndarray:
-        """`rest`, the joints' with axes of unit length, as they can be scaled. A bone's own stay as Blender
-        rounds them: up to 4e-5 off, which it then takes for scale."""
+        """`rest`, where the joints have axes of unit length, as they can be scaled. Axes of bones are
+        unchanged: Blender's rounding makes them up to 4e-5 too long or short, and Blender takes that for
+        scale."""
         axes = self.rest.copy()
         of_joints = axes[len(self.names) :, :3, :3]
         lengths = np.linalg.norm(of_joints, axis=1, keepdims=True)
@@ -81,12 +82,12 @@ class Bones:
         )
 
     def groups_without_bone(self, group_names: Sequence[str]) -> list[str]:
-        """The groups that have no bone's name."""
+        """Returns the groups without a bone of the same name."""
         names = set(self.names)
         return [name for name in group_names if name not in names]
 
     def of_groups(self, group_names: list[str]) -> np.ndarray:
-        """int32 [groups]: the deforming bone of each group's name, -1 for none."""
+        """int32 [groups]: the deforming bone with each group's name, -1 for none."""
         index = {name: bone for bone, name in enumerate(self.names) if self.deform[bone]}
         return np.array([index.get(name, -1) for name in group_names], dtype=np.int32).reshape(-1)
 
@@ -113,9 +114,8 @@ class Weighting:
         return self.entries.influences()
 
     def influences(self, points: np.ndarray) -> Influences:
-        """Influences of bones, for rest points float [vertices, 3]: in armature space where
-        depends_on_points,
-        else in any."""
+        """Returns influences of bones, for rest points float [vertices, 3]; in armature space if
+        depends_on_points, otherwise in any space."""
         entries, envelopes = self.entries, self.bones.envelopes
         multiply = envelopes.multiply[entries.bones].any() if envelopes.multiply.any() else False
         if not multiply and not self.use_envelopes:
@@ -127,7 +127,7 @@ class Weighting:
         return entries.influences()
 
     def influences_over_joints(self, points: np.ndarray) -> Influences:
-        """Influences of bones and of the joints of bendy bones."""
+        """Returns influences of bones and of the joints of bendy bones."""
         influences, bones = self.influences(points), self.bones
         if not bones.bend:
             return influences
@@ -144,7 +144,7 @@ class Weighting:
 
 @dataclass(frozen=True)
 class RigFacts:
-    """The facts of a bound mesh that `sinew info` and the panel show."""
+    """Facts about a bound mesh, shown by `sinew info` and the panel."""
 
     vertices: int
     bones: int
@@ -158,7 +158,7 @@ class RigFacts:
 
 
 def describe_rig(weighting: Weighting, points: np.ndarray, boneless: Sequence[str]) -> RigFacts:
-    """Counts and warnings. `weighted_bones` is the number of bones that move at least one vertex.
+    """Returns counts and warnings. `weighted_bones` is the number of bones that move at least one vertex.
 
     points    [vertices, 3], rest points: see Weighting.influences
     boneless  names of groups that belong to no bone and have no other use

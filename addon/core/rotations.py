@@ -16,7 +16,8 @@ def rotations_of(motions: np.ndarray) -> np.ndarray:
 
 
 def rotated(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Vectors [3, n] rotated by quaternions [4, n] of any length but 0, both of one element type."""
+    """Returns vectors [3, n] rotated by quaternions [4, n] of any length except 0; both have the same element
+    type."""
     pairs = np.zeros((quaternions.shape[1], 7), quaternions.dtype)
     pairs[:, :4] = quaternions.T
     rows = sinew.quat_vec.transform_vector(sinew.quat_vec.normalized(pairs), np.ascontiguousarray(vectors.T))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Temporary folders, in the system's temporary folder.
 
-A run that is killed can not remove its folder; the next run does. A file lock tells whether a run is alive:
-it works across containers that share the temporary folder, which the number of a process does not.
+A killed run cannot remove its folder, so the next run does. A file lock shows whether a run is alive; unlike
+a process id, it works across containers that share the temporary folder.
 """
 
 from __future__ import annotations
@@ -22,16 +22,13 @@ LOCK = ".lock"
 
 
 class ScratchFolder:
-    """A folder that exists until remove(), or until a later run finds that its process has ended.
-
-    Raises OSError where it can not be made.
-    """
+    """A folder that exists until remove(), or until a later run finds that its process has ended. Raises
+    OSError where it cannot be made."""
 
     def __init__(self) -> None:
         _remove_leftovers()
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
-        # Named last, so that another run finds only a file that is locked. Windows can not rename an open
-        # file.
+        # Renamed last, so that another run only ever finds a locked file. Windows cannot rename an open file.
         name = self.path / (LOCK if os.name == "nt" else f"{LOCK}.new")
         try:
             self._lock = name.open("wb")
@@ -59,7 +56,7 @@ def scratch_folder() -> Iterator[Path]:
 
 @cache
 def _remove_leftovers() -> None:
-    """Removes the folders of this user's runs that were killed; once in a process."""
+    """Removes this user's folders of killed runs; once per process."""
     with suppress(OSError):
         for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
             with suppress(OSError):
@@ -72,6 +69,7 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _is_dead(folder: Path) -> bool:
-    """Whether no process has its lock. Raises OSError without a lock file: older versions made none."""
+    """Whether no process has its lock. Raises OSError without a lock file, which older versions did not
+    make."""
     with (folder / LOCK).open("r+b") as lock:
         return try_lock(lock.fileno())

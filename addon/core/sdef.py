@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the method sdef keeps of each vertex, from the shape keys that mmd_tools stores."""
+"""Vertex data of the method sdef, from the shape keys that mmd_tools stores."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ MISSING = phrase(
 )
 
 ELSEWHERE = "mmd_sdef_skinning"
-"""The shape key by which mmd_tools itself deforms what it has taken from the Armature modifier by a mask."""
+"""The shape key with which mmd_tools itself deforms the vertices that it excludes from the Armature modifier
+by a mask."""
 
 
 def vertex_data(
@@ -28,8 +29,8 @@ def vertex_data(
 ) -> np.ndarray:
     """float32 [vertices, 10], as sinew.Binding takes it: C, R0, R1, then 1, or 0 where they are not used.
 
-    As in mmd_tools a vertex uses them where C differs from it and two bones move it, and R0 belongs to the
-    bone whose vertex group comes first. To the library it is that of the first influence.
+    As in mmd_tools, a vertex uses them where C differs from it and two bones move it, and R0 belongs to the
+    bone whose vertex group comes first. The library takes R0 as that of the first influence.
 
     points         float32 [vertices, 3] of the basis, object space
     keys           float32 [3, vertices, 3], the same space
@@ -46,6 +47,6 @@ def vertex_data(
 
 
 def group_of_bone(bone_names: tuple[str, ...], group_names: list[str]) -> np.ndarray:
-    """int [bones]: the index of the vertex group of each bone's name, -1 for none."""
+    """int [bones]: the index of the vertex group with each bone's name, -1 for none."""
     index = {name: group for group, name in enumerate(group_names)}
     return np.array([index.get(name, -1) for name in bone_names], dtype=np.int64)

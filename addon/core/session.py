@@ -21,21 +21,21 @@ from .stages import StagesAfter, StageValues
 from .vertex_data import PROVIDERS, VertexData
 
 LINEAR = "lbs"
-# The purpose of the deformer that gives a mesh its shape, where it is one alone.
+# The purpose of the deformer that gives a mesh its shape, where there is only one.
 MOTION = "motion"
 NO_STAGES: StageValues = MappingProxyType({})
 
 
 @dataclass
 class Frame:
-    """All that the shape of one frame depends on.
+    """Everything that the shape of one frame depends on.
 
     method            name of a method
     pose              float32 [bones + joints, 4, 4], armature space, as Blender gives it
-    bones_from_model  float64 [4, 4], takes the mesh's object space to armature space
+    bones_from_model  float64 [4, 4], from the mesh's object space to armature space
     rest_points       float32 [vertices, 3], object space, shape keys applied
     scale_rule        name of a scale rule
-    mix               name of the second method, which the binding's mix weights mix in; empty for none
+    mix               name of the second method, mixed in by the binding's mix weights; empty for none
     parameters        values of parameters of both methods, by their full names
     """
 
@@ -50,9 +50,9 @@ class Frame:
 
 @dataclass(slots=True)
 class _Bound:
-    """A deformer, what it was made for, and the rest points that it has.
+    """A deformer, what it was made for, and its rest points.
 
-    method, mix  as in Frame: a deformer's own take longer to ask for
+    method, mix  as in Frame: reading the deformer's own takes longer
     """
 
     deformer: sinew.Deformer
@@ -64,8 +64,8 @@ class _Bound:
 class Binding:
     """A mesh bound to bones. It computes only frames that differ from the last.
 
-    mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for none of it
-    vertex_data  what methods keep of each vertex; None where none that does is used
+    mix_weights  float32 [vertices] from 0 to 1: the share of a frame's second method; None for no share
+    vertex_data  the methods' vertex data; None where no method that has any is used
     """
 
     def __init__(
@@ -79,21 +79,21 @@ class Binding:
         self.vertex_data = vertex_data
         self.bones = weighting.bones
         self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
-        # The packed mesh for each purpose and the methods that keep numbers of vertices, with the rest points
-        # that it has; the deformer for each purpose.
+        # The packed mesh with its rest points, for each purpose and set of methods with vertex data; the
+        # deformer for each purpose.
         self._packed: dict[tuple[str, frozenset[str]], tuple[sinew.Binding, np.ndarray]] = {}
         self._bound: dict[str, _Bound] = {}
-        # Normals that move with the skin, with the deformer and the normals that they were made for.
+        # Skinned normals, with the deformer and the rest normals that they were made for.
         self._skinned: tuple[sinew.SkinnedNormals, sinew.Deformer, np.ndarray] | None = None
         self._last: Frame | None = None
-        # That of the vertex data which the packed meshes have.
+        # The version of the vertex data in the packed meshes.
         self._data_version = 0
         self._points = np.empty((len(weighting.entries.counts), 3), dtype=np.float32)
         # The last frame was written to another array than _points.
         self._points_outdated = False
 
     def another(self) -> Binding:
-        """The same for shapes of its own."""
+        """Returns a copy with results of its own."""
         return Binding(self.weighting, self.mix_weights, self.vertex_data)
 
     @cached_property
@@ -114,15 +114,15 @@ class Binding:
         """The shape of the last frame, float32 [vertices, 3], object space."""
         if self._points_outdated and self._last is not None:
             self._shape(self._last, self._points)
-            # The last frame was written to another array than _points.
         self._points_outdated = False
         return self._points
 
     def deform(self, frame: Frame, out: np.ndarray | None = None) -> bool:
-        """Computes `points`; false where the frame equals the last one.
+        """Computes `points`. Returns False where the frame equals the last one.
 
-        out   float32 [vertices, 3], C-contiguous: written in any case, instead of `points`, which are then
-              computed when they are read
+        out  float32 [vertices, 3], C-contiguous: always written, instead of `points`, which are then computed
+             when
+             they are read
 
         Raises ValueError where `out` has another shape.
         """
@@ -137,12 +137,12 @@ class Binding:
     def write_skinned_normals(
         self, points: np.ndarray, rest_normals: np.ndarray, vertices: np.ndarray | None, out: np.ndarray
     ) -> bool:
-        """Writes normals that are moved by the blends of their vertices in the last frame; false where the
-        shape is not of one blend.
+        """Writes normals moved by the blends of their vertices in the last frame. Returns False where the
+        shape is not made by a single blend.
 
         points        float32 [vertices, 3], object space, of that frame
         rest_normals  float32 [n, 3], object space
-        vertices      int32 [n], the vertex of each; None: one normal a vertex
+        vertices      int32 [n], the vertex of each; None: one normal per vertex
         out           float32 [n, 3], C-contiguous
         """
         frame = self._last
@@ -179,14 +179,14 @@ class Binding:
         if weights is None or not (frame.mix and are_of_two_kinds):
             self._shape_with_one_kind(frame, out, MOTION)
             return
-        # Under these rules linear blending takes other bone matrices than the other methods.
+        # With these rules linear blending takes other bone matrices than the other methods.
         self._shape_with_one_kind(replace(frame, mix=""), out, MOTION)
         second = np.empty_like(out)
         self._shape_with_one_kind(replace(frame, method=frame.mix, mix=""), second, "second motion")
         out += weights[:, None] * (second - out)
 
     def _shape_with_one_kind(self, frame: Frame, out: np.ndarray, purpose: str) -> None:
-        """Writes the shape by methods that take the same kind of bone matrices."""
+        """Writes the shape for methods that take the same kind of bone matrices."""
         rest_points, bones = frame.rest_points, frame.pose
         rest_inverses: np.ndarray | None = self._rest_from_armature
         if frame.scale_rule != BLENDER_4.name:
@@ -235,7 +235,7 @@ class Binding:
         )
 
     def _take_new_data(self, frame: Frame) -> bool:
-        """Whether methods keep other numbers of vertices since: then meshes are packed anew."""
+        """Whether the methods' vertex data has changed; meshes are then packed again."""
         if self.vertex_data is None:
             return False
         if frame.method in PROVIDERS or frame.mix in PROVIDERS:
@@ -258,7 +258,7 @@ class Binding:
         )
 
     def _vertex_data_of(self, frame: Frame) -> dict[str, np.ndarray]:
-        """By the name of the method."""
+        """Returns the data by the name of the method."""
         if self.vertex_data is None:
             return {}
         for name in (frame.method, frame.mix):
@@ -297,8 +297,8 @@ def _same(a: Frame, b: Frame) -> bool:
 class SkinStage:
     """One of the Armature modifiers that deform a mesh one after the other.
 
-    mask   float32 [vertices], the share of the deformation each vertex takes; None for all of it
-    multi  a Multi Modifier: it starts from what the modifier before it started from
+    mask   float32 [vertices], the share of the deformation that each vertex gets; None for all of it
+    multi  a Multi Modifier: it has the same input as the modifier before it
     """
 
     binding: Binding
@@ -308,7 +308,7 @@ class SkinStage:
 
 @dataclass
 class SkinStageFrame:
-    """All that the deformation by a link depends on in one frame: see Frame."""
+    """Everything that the deformation by a skin stage depends on in one frame: see Frame."""
 
     method: str
     pose: np.ndarray
@@ -319,7 +319,7 @@ class SkinStageFrame:
 
 
 class SkinStack:
-    """The links of one mesh, in the order of its modifiers, and the stages that follow the last.
+    """The skin stages of one mesh, in the order of its modifiers, and the stages that follow the last.
 
     stages_after  None for none
     """
@@ -327,7 +327,7 @@ class SkinStack:
     def __init__(self, skin_stages: Sequence[SkinStage], stages_after: StagesAfter | None = None) -> None:
         self.skin_stages = skin_stages
         self.stages_after = stages_after
-        # The last active link, if it has no mask: its points are the result.
+        # The last active skin stage, if it has no mask: its points are the result.
         self._end: Binding | None = None
         self._points: np.ndarray | None = None
         self._rest_points: np.ndarray | None = None
@@ -336,7 +336,7 @@ class SkinStack:
         self._values = NO_STAGES
         # The shape of the last frame after the stages; None where they are off, or it was not needed yet.
         self._staged: np.ndarray | None = None
-        # The stages' mesh is another one since the last frame.
+        # The stages' mesh has changed since the last frame.
         self._has_other_mesh = False
 
     @property
@@ -351,16 +351,16 @@ class SkinStack:
 
     @property
     def _skin_points(self) -> np.ndarray | None:
-        """Those before the stages."""
+        """The points before the stages."""
         return self._points if self._end is None else self._end.points
 
     def another(self) -> SkinStack:
-        """The same for shapes of its own."""
+        """Returns a copy with results of its own."""
         stages = [SkinStage(one.binding.another(), one.mask, one.multi) for one in self.skin_stages]
         return SkinStack(stages, None if self.stages_after is None else self.stages_after.another())
 
     def set_stage_mesh(self, mesh: StageMesh) -> None:
-        """For a mesh of other points or faces."""
+        """Sets a mesh with other points or faces."""
         if self.stages_after is not None and self.stages_after.set_mesh(mesh) and self._values:
             self._has_other_mesh = True
 
@@ -371,10 +371,10 @@ class SkinStack:
         out: np.ndarray | None = None,
         values: StageValues = NO_STAGES,
     ) -> bool:
-        """Computes `points`; false where nothing differs from the last call.
+        """Computes `points`. Returns False where nothing differs from the last call.
 
         rest_points  float32 [vertices, 3], object space
-        frames       one for each link, None for one that is switched off or has no pose
+        frames       one for each skin stage, None for one that is switched off or has no pose
         out          see Binding.deform
         values       the parameters of the stages that follow
         """
@@ -392,7 +392,7 @@ class SkinStack:
     def write_skinned_normals(
         self, points: np.ndarray, rest_normals: np.ndarray, vertices: np.ndarray | None, out: np.ndarray
     ) -> bool:
-        """As of Binding; false also where several links, a mask or stages made the shape."""
+        """As Binding's; also returns False where several skin stages, a mask or stages made the shape."""
         is_one = self._end is not None and sum(frame is not None for frame in self._frames) == 1
         if self._values or self._end is None or not is_one:
             return False
@@ -406,7 +406,7 @@ class SkinStack:
     def _deform_skin(
         self, rest_points: np.ndarray, frames: Sequence[SkinStageFrame | None], out: np.ndarray | None
     ) -> bool:
-        """The links alone."""
+        """Deforms by the skin stages alone."""
         active = [number for number, frame in enumerate(frames) if frame is not None]
         changed = self._rest_points is None or active != self._active
         if active:
@@ -426,7 +426,7 @@ class SkinStack:
         active: list[int],
         out: np.ndarray | None,
     ) -> bool:
-        """active  the numbers of the links that have a frame, at least one"""
+        """active: the numbers of the skin stages that have a frame, at least one."""
         changed, result = False, rest_points
         starts: dict[int, np.ndarray] = {}
         last = self.skin_stages[active[-1]]
@@ -434,7 +434,7 @@ class SkinStack:
         for number in active:
             skin_stage, frame = self.skin_stages[number], frames[number]
             assert frame is not None
-            # The Multi Modifiers right behind this link start from the same shape as it does.
+            # The Multi Modifiers directly behind this skin stage have the same input.
             for behind in range(number + 1, len(self.skin_stages)):
                 if not self.skin_stages[behind].multi or behind in starts:
                     break
@@ -449,7 +449,7 @@ class SkinStack:
             if skin_stage.mask is not None:
                 result = result + skin_stage.mask[:, None] * (skin_stage.binding.points - result)
             elif not is_end:
-                # The next link compares its input with the last one: it must not be an array that is
+                # A copy, as the next skin stage compares its input with the last one: the array must not be
                 # overwritten.
                 result = skin_stage.binding.points.copy()
         self._points = result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a mesh is shaded, and its normals."""
+"""The shading of a mesh, and its normals."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _DOMAINS = {"POINT": "vertex", "CORNER": "corner"}
 
 @dataclass(frozen=True)
 class Shading:
-    """What decides the normals of a mesh beside its points and faces; None where there is none of it.
+    """What the normals of a mesh depend on, apart from its points and faces; None where it is not set.
 
     sharp_edges  bool [edges]
     sharp_faces  bool [faces], which are flat
-    custom       int16 [corners, 2], custom normals in relation to those that are computed
+    custom       int16 [corners, 2], custom normals relative to the computed ones
     """
 
     sharp_edges: np.ndarray | None = None
@@ -37,8 +37,8 @@ class Shading:
 
 
 class SurfaceNormals:
-    """Computes the normals of a mesh as Blender defines them; zeros, which say that there are none, of one
-    that is not valid, as faces whose edges are missing."""
+    """Computes the normals of a mesh as Blender defines them. For an invalid mesh, as one whose faces lack
+    edges, they are zeros, which mean no normals."""
 
     def __init__(self, count: int, topology: Topology, shading: Shading) -> None:
         try:
@@ -55,9 +55,10 @@ class SurfaceNormals:
             self._normals = None
 
     def write(self, points: np.ndarray, domain: str, out: np.ndarray) -> None:
-        """
+        """Computes the normals.
+
         points  float32 [vertices, 3]
-        domain  POINT or CORNER: what has a normal of its own
+        domain  POINT or CORNER: the elements that have normals
         out     float32 [vertices or corners, 3], C-contiguous
         """
         if self._normals is None:

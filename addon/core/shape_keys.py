@@ -15,8 +15,8 @@ from .arrays import are_equal
 class ShapeKeys:
     """The relative shape keys of a mesh.
 
-    names  of all keys, in order
-    basis  float32 [vertices, 3]
+    names   of all keys, in order
+    basis   float32 [vertices, 3]
     deltas  one for each key: None for the basis, else float32 [vertices, 3], its offsets at value 1
     """
 

@@ -41,9 +41,9 @@ class Column:
 
 
 def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str], path: Path) -> None:
-    """Puts the pictures side by side, labelled, into one PNG.
+    """Writes the pictures side by side, labelled, to one PNG.
 
-    Requires Pillow. Raises SinewError where the file can not be written.
+    Requires Pillow. Raises SinewError where the file cannot be written.
     """
     from PIL import Image, ImageDraw, ImageFont
 
@@ -52,7 +52,7 @@ def write_sheet(title: str, columns: Sequence[Column], row_titles: Sequence[str]
     cell = max(picture.width for column in pictures for picture in column)
     heights = [picture.height for picture in pictures[0]]
     head, label, row_label = 24 + 2 * MARGIN, 24 + 17 + 2 * MARGIN, 17 + MARGIN
-    # Even numbers: video encoders need them.
+    # Video encoders need even numbers.
     width = _even(len(columns) * (cell + MARGIN) + MARGIN)
     height = _even(head + label + len(row_titles) * row_label + sum(heights) + MARGIN)
     sheet = Image.new("RGB", (width, height), BACKGROUND)

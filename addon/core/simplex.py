@@ -5,22 +5,24 @@ from __future__ import annotations
 
 import numpy as np
 
-# A gram matrix of equal candidates is singular: this share of its mean diagonal is added.
+# Added to the diagonal, as a share of its mean: the Gram matrix of equal candidates is singular.
 _RIDGE = 1e-10
-# What counts as a gain, as a share of the objective's scale.
+# The least improvement that counts, as a share of the objective's scale.
 _TOLERANCE = 1e-9
 
 
 def sparse_weights(grams: np.ndarray, allowed: np.ndarray, most: int) -> np.ndarray:
-    """For each row, weights w that make w G w small: of sum 1, none below 0, at most `most` above 0.
+    """For each row, finds weights w that make w G w small: of sum 1, none below 0, at most `most` above 0.
 
     grams    float64 [rows, candidates, candidates], G: products of the candidates' errors
     allowed  bool [rows, candidates], at least one in each row
-    Returns float64 [rows, candidates]. Where `most` is no limit they are the best there are; else the better
-    of two searches: candidates added one by one, and the largest of the best unlimited ones.
 
-    The point of the convex hull of the errors that is nearest to 0: P. Wolfe, *Finding the nearest point in a
-    polytope* (1976).
+    Returns float64 [rows, candidates]. Where `most` is no limit they are optimal; otherwise they are the
+    better result of two searches: adding candidates one by one, and keeping the largest of the best unlimited
+    weights.
+
+    This is the point of the convex hull of the errors that is nearest to 0: P. Wolfe, *Finding the nearest
+    point in a polytope* (1976).
     """
     size = np.trace(grams, axis1=1, axis2=2) / grams.shape[1]
     scaled = grams / np.where(size > 0.0, size, 1.0)[:, None, None]
@@ -39,7 +41,7 @@ def objective(grams: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 def _limited(grams: np.ndarray, allowed: np.ndarray, unlimited: np.ndarray, most: int) -> np.ndarray:
     grown = _nearest_point(grams, allowed, most)
-    # What a candidate's loss would move the vertex by is its weight times the size of its error.
+    # Losing a candidate moves the vertex by its weight times the size of its error.
     effect = unlimited * np.sqrt(np.einsum("rii->ri", grams))
     kept = np.zeros_like(allowed)
     np.put_along_axis(kept, np.argpartition(-effect, most - 1, axis=1)[:, :most], True, axis=1)
@@ -49,7 +51,7 @@ def _limited(grams: np.ndarray, allowed: np.ndarray, unlimited: np.ndarray, most
 
 
 def _nearest_point(grams: np.ndarray, allowed: np.ndarray, most: int) -> np.ndarray:
-    """Wolfe's algorithm, which adds no further candidate while `most` are in use."""
+    """Wolfe's algorithm; it adds no more candidates once `most` are in use."""
     rows, candidates = allowed.shape
     diagonal = np.where(allowed, np.einsum("rii->ri", grams), np.inf)
     weights = np.zeros((rows, candidates))
@@ -73,7 +75,8 @@ def _nearest_point(grams: np.ndarray, allowed: np.ndarray, most: int) -> np.ndar
 
 
 def _best_of_used(grams: np.ndarray, weights: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """The best weights of the used candidates; those that would be below 0 leave, one after another."""
+    """The best weights of the used candidates; those that would be negative are removed, one after
+    another."""
     result = weights.copy()
     open_rows = np.arange(len(grams))
     for _step in range(grams.shape[1]):
@@ -83,7 +86,7 @@ def _best_of_used(grams: np.ndarray, weights: np.ndarray, used: np.ndarray) -> n
         room = np.where(below, now / np.where(below, now - aim, 1.0), np.inf)
         share = np.minimum(room.min(axis=1), 1.0)
         moved = np.maximum(now + share[:, None] * (aim - now), 0.0)
-        # Exactly 0 where it leaves, in spite of rounding.
+        # Exactly 0 for removed candidates, in spite of rounding.
         leaves = below & (room <= share[:, None])
         moved[leaves] = 0.0
         result[open_rows] = moved / moved.sum(axis=1, keepdims=True)
@@ -95,14 +98,14 @@ def _best_of_used(grams: np.ndarray, weights: np.ndarray, used: np.ndarray) -> n
 
 
 def _affine_minimum(grams: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """The smallest w G w of weights of sum 1, of any sign, that are 0 where a candidate is not used: in the
+    """The smallest w G w for weights of sum 1, of any sign, that are 0 for unused candidates: in the
     direction of the solution of G w = 1."""
     rows, count = len(used), int(used.sum(axis=1).max())
-    # Few are used: the others would only make the systems larger.
+    # Only used candidates: the others would make the systems larger.
     slots = np.argsort(~used, axis=1, kind="stable")[:, :count]
     at = np.arange(rows)[:, None]
     is_used = used[at, slots].T
-    # With the rows last: [candidates, candidates, rows].
+    # The rows are the last axis: [candidates, candidates, rows].
     own = grams[at[:, :, None], slots[:, :, None], slots[:, None, :]].transpose(1, 2, 0)
     both = is_used[:, None] & is_used[None]
     system = np.where(both, own, np.identity(count)[:, :, None] * ~is_used)
@@ -113,9 +116,10 @@ def _affine_minimum(grams: np.ndarray, used: np.ndarray) -> np.ndarray:
 
 
 def _solved(system: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Many small positive definite systems, [n, n, rows] and [n, rows], by elimination; both are written to.
+    """Solves many small positive definite systems, [n, n, rows] and [n, rows], by elimination; overwrites
+    both.
 
-    Not by LAPACK: numpy's uses threads even for these, which wait for each other on a busy machine.
+    Not with LAPACK: numpy's uses threads even for these, which wait for each other on a busy machine.
     """
     count = len(system)
     for pivot in range(count):

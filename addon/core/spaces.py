@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms of points to other spaces."""
+"""Transforms points to other spaces."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ SAME_SPACE = np.identity(4)
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """`points` [n, 3] after `matrix` [4, 4], an affine transform; float64 [n, 3]."""
-    # Not by numpy's product: its BLAS uses threads even for so small a matrix, and these wait for each other,
-    # up to a hundred times as long on a busy machine.
+    """Returns `points` [n, 3] transformed by `matrix` [4, 4], affine; float64 [n, 3]."""
+    # Not with numpy's product: its BLAS uses threads even for so small a matrix, and these wait for each
+    # other, which takes up to a hundred times as long on a busy machine.
     return sinew.affine.transform_point(matrix.astype(np.float64), points.astype(np.float64))
 
 

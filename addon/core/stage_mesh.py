@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What stages know of the mesh that they are bound to."""
+"""What stages know about the mesh that they are bound to."""
 
 from __future__ import annotations
 
@@ -34,22 +34,24 @@ class Topology:
 
 @dataclass(frozen=True)
 class StageMesh:
-    """
-    topology     as it comes to the first Armature modifier
-    rest_points  float32 [vertices, 3], object space: the mesh's own, without shape keys and modifiers; None
-                 where modifiers in front give it other vertices: then each frame's rest points are taken
-    weightings   of the Armature modifiers
-    link_masks   float32 [vertices], the share of the deformation that each vertex takes from each of them,
-                 None for all of it; empty: none has a mask
+    """The mesh of a stage.
+
+    topology        as the first Armature modifier gets it
+    rest_points     float32 [vertices, 3], object space: the mesh's own, without shape keys and modifiers;
+                    None where upstream modifiers change the number of vertices: then each frame's rest points
+                    are used
+    weightings      of the Armature modifiers
+    modifier_masks  float32 [vertices], the share of each Armature modifier's deformation that each vertex
+                    gets, None for all of it; empty: none has a mask
     """
 
     topology: Topology
     rest_points: np.ndarray | None
     weightings: Sequence[Weighting]
-    link_masks: Sequence[np.ndarray | None] = ()
+    modifier_masks: Sequence[np.ndarray | None] = ()
 
     def equals(self, other: StageMesh) -> bool:
-        """Of the same Armature modifiers."""
+        """Whether both have the same points and faces; both belong to the same Armature modifiers."""
         points, known = self.rest_points, other.rest_points
         if points is None or known is None:
             return points is known and self.topology.equals(other.topology)

@@ -15,11 +15,12 @@ from .delta_mush import DeltaMush
 from .stage_mesh import StageMesh
 
 StageValues = Mapping[str, Mapping[str, Any]]
-"""For each stage that is on its parameters by their ids, but for vertex groups."""
+"""For each stage that is on, its parameters by their ids, without vertex groups."""
 
 
 class Stage(Protocol):
-    """Made of a StageMesh and the weights of the stage's vertex group: float32 [vertices], None for none."""
+    """Made from a StageMesh and the weights of the stage's vertex group: float32 [vertices], None for
+    none."""
 
     def apply(
         self, points: np.ndarray, values: Mapping[str, Any], rest_points: np.ndarray, frames: Sequence[Any]
@@ -27,7 +28,7 @@ class Stage(Protocol):
         """Changes `points` in place: float32 [vertices, 3], object space, C-contiguous.
 
         values       of its parameters in this frame
-        rest_points  float32 [vertices, 3], what the bones deformed
+        rest_points  float32 [vertices, 3], the points that the bones deformed
         frames       a SkinStageFrame for each Armature modifier, None for one that took no part
         """
 
@@ -36,14 +37,14 @@ STAGES: dict[str, Callable[[StageMesh, np.ndarray | None], Stage]] = {
     "bulge_limit": BulgeLimit,
     "delta_mush": DeltaMush,
 }
-"""Those that follow the blend; the library's list has their order."""
+"""The stages that follow the blend; the library's list has their order."""
 
 ORDER = [stage.name for stage in sinew.stages() if stage.name in STAGES]
 
 
 @dataclass
 class StagesAfter:
-    """All stages of one mesh that follow the blend, each made where it is first used.
+    """All stages of one mesh that follow the blend, each made when it is first used.
 
     masks  float32 [vertices], the weights of the stage's vertex group, by the stage's name
     """
@@ -53,11 +54,11 @@ class StagesAfter:
     _made: dict[str, Stage] = field(default_factory=dict)
 
     def another(self) -> StagesAfter:
-        """The same for a thread, or a shape, of its own."""
+        """Returns a copy for another thread or shape."""
         return StagesAfter(self.mesh, self.masks)
 
     def set_mesh(self, mesh: StageMesh) -> bool:
-        """False where it equals the one before."""
+        """Sets the mesh. Returns False where it equals the previous one."""
         if mesh.equals(self.mesh):
             return False
         self.mesh = mesh
@@ -67,7 +68,7 @@ class StagesAfter:
     def apply(
         self, points: np.ndarray, values: StageValues, rest_points: np.ndarray, frames: Sequence[Any]
     ) -> None:
-        """As Stage.apply(), by all that are in `values`."""
+        """Applies all stages that are in `values`; see Stage.apply()."""
         for name in ORDER:
             if name in values:
                 if name not in self._made:

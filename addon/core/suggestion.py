@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which method is best at what, over some frames. No measure says which shape is beautiful."""
+"""Which method is best at what, over some frames. No measure says which shape looks best."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Criterion:
 
     name   for programs
     label  for people
-    entry  of a metrics.Summary, or "" for what is counted apart; the nearer to 0 the better
+    entry  of a metrics.Summary, or "" for what is counted separately; the nearer to 0 the better
     unit   "share", "length" or "count"
     text   one sentence
     """
@@ -34,7 +34,7 @@ CRITERIA = (
         "crossings", "Crossings", "", "count", "How many triangles cross others that they do not at rest"
     ),
 )
-# Values that differ by less are equally good: as a part of the best, and absolutely.
+# Values that differ by less are equally good: as a share of the best, and absolutely.
 SAME_PART = 0.02
 SAME = {"share": 1e-4, "length": 1e-4, "count": 0.5}
 
@@ -47,12 +47,12 @@ class Worst:
 
 @dataclass
 class Suggestion:
-    """What methods are worst by.
+    """The worst values of each method.
 
     methods   name -> label, in order
     frames    that were measured
-    diagonal  of the rest shape: lengths are judged as parts of it
-    worst     by method and criterion: the largest magnitude over the frames, and where it is; none of a
+    diagonal  of the rest shape: lengths are judged relative to it
+    worst     by method and criterion: the largest magnitude over the frames, and its frame; missing for a
               criterion that could not be measured
     """
 
@@ -62,13 +62,14 @@ class Suggestion:
     worst: dict[tuple[str, str], Worst] = field(default_factory=dict)
 
     def add(self, method: str, criterion: str, value: float, frame: float) -> None:
-        """NaN, as the volume of a flat mesh, is none."""
+        """Adds a value. NaN, as the volume of a flat mesh, does not count."""
         known = self.worst.get((method, criterion))
         if value == value and (known is None or abs(value) > abs(known.value)):
             self.worst[method, criterion] = Worst(value, frame)
 
     def best(self, criterion: Criterion) -> list[str]:
-        """The methods that are best at it; none where all are equally good, or it was not measured."""
+        """Returns the methods that are best at it; empty where all are equally good, or it was not
+        measured."""
         values = {
             m: abs(self.worst[m, criterion.name].value) for m in self.methods if self._has(m, criterion)
         }
@@ -80,7 +81,7 @@ class Suggestion:
         return chosen if len(chosen) < len(values) else []
 
     def rank(self) -> list[str]:
-        """The methods, the one that is best at the most criteria first; equals stay in order."""
+        """Returns the methods, the one that is best at the most criteria first; equals stay in order."""
         wins = dict.fromkeys(self.methods, 0)
         for criterion in CRITERIA:
             for method in self.best(criterion):
@@ -89,7 +90,7 @@ class Suggestion:
 
     @property
     def text(self) -> str:
-        """Which methods are best at what, one sentence."""
+        """One sentence about which methods are best at what."""
         best = [
             f"{criterion.label.lower()}: {', '.join(self.methods[method] for method in self.best(criterion))}"
             for criterion in CRITERIA

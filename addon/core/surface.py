@@ -20,7 +20,7 @@ class Surface:
     triangles     int32 [triangles, 3], counter-clockwise seen from outside
     edges         int32 [edges, 2], the mesh's own: no diagonals of its quads
     coincident    int [vertices], the first vertex at the same position at rest; None where no two coincide.
-                  Files for games split vertices at seams of texture coordinates: those are no holes
+                  Game files split vertices at seams of texture coordinates, which are no holes
     """
 
     vertex_count: int
@@ -30,7 +30,7 @@ class Surface:
 
     @cached_property
     def corners(self) -> np.ndarray:
-        """int64 [3, triangles]: each corner's vertex, in memory corner by corner."""
+        """int64 [3, triangles]: each corner's vertex, stored corner by corner."""
         return np.ascontiguousarray(self.triangles.T, dtype=np.int64)
 
     @cached_property
@@ -48,7 +48,7 @@ class Surface:
     @cached_property
     def _directed_edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Directed edges of triangles as int64 [n], start * vertex_count + end: those without an opposite
-        one, as often as it is missing, and those that occur more than once."""
+        edge, as often as it is missing, and those that occur more than once."""
         corners = self.corners if self.coincident is None else self.coincident[self.corners]
         starts, stops = corners.ravel(), np.roll(corners, -1, axis=0).ravel()
         keys, counts = np.unique(starts * self.vertex_count + stops, return_counts=True)
@@ -56,7 +56,7 @@ class Surface:
         at = np.searchsorted(keys, opposite).clip(max=max(len(keys) - 1, 0))
         found = keys[at] == opposite if len(keys) else np.zeros(0, dtype=bool)
         missing = counts - np.where(found, counts[at], 0)
-        # Faces that shrank to an edge or a point at rest.
+        # Faces that are an edge or a point at rest.
         missing[keys == opposite] = 0
         return np.repeat(keys, missing.clip(min=0)), keys[counts > 1]
 
@@ -78,7 +78,7 @@ class EdgesAround:
     """The edges at each vertex, vertex by vertex.
 
     vertices  int64 [n], those that have edges
-    starts    int64 [n], the index in `edges` of the first of each
+    starts    int64 [n], the index in `edges` of the first edge of each
     edges     int64 [2 edges]
     """
 
@@ -137,7 +137,7 @@ class Caps:
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:
-    """Several meshes as one; vertices are concatenated."""
+    """Returns several meshes as one; vertices are concatenated."""
     triangles, edges, coincident, first = [], [], [], 0
     for surface in surfaces:
         triangles.append(surface.triangles + first)
@@ -149,7 +149,7 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
 
 
 def coincident_vertices(points: np.ndarray) -> np.ndarray:
-    """int [vertices]: for each of `points` [vertices, 3] the first one with exactly the same coordinates."""
+    """int [vertices]: for each of `points` [vertices, 3], the first one with exactly the same coordinates."""
     # Adding zero turns -0.0 into 0.0.
     rows = np.ascontiguousarray(points + 0.0).view([("", points.dtype)] * 3).ravel()
     _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)

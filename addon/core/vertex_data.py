@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What methods keep of each vertex of one bound mesh, made where a method is first used and kept."""
+"""Vertex data that methods need for one bound mesh, computed when a method is first used, and kept."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ METHODS = {method.name: method for method in sinew.methods()}
 
 @dataclass(frozen=True)
 class Provider:
-    """What makes the data of a method.
+    """What computes the data of a method.
 
-    what        it is called, for people
-    version     part of the hash: another one where the same mesh gives other data
-    make        of rest points, influences, triangles and progress, and of `parameters` by name
-    parameters  ids of those of the method, all numbers, that the data is made with
+    what        its name, for people
+    version     part of the hash: raised when the same mesh gives other data
+    make        takes rest points, influences, triangles and progress, and `parameters` by name
+    parameters  ids of the method's parameters, all numbers, that the data depends on
     """
 
     what: str
@@ -61,13 +61,13 @@ _ALL = {
     "cor": Provider("centres of rotation", 1, _centres),
     "ddm": Provider("smoothed weights", 2, _moments, ("radius",)),
 }
-# A build may be without one of them.
+# A build may lack one of them.
 PROVIDERS = {name: provider for name, provider in _ALL.items() if name in METHODS}
 
 
 @dataclass
 class _Entry:
-    """The data of one method. Where it is outdated, `made` has that of the mesh as it was before."""
+    """The data of one method. If outdated, `made` has that of the mesh before it changed."""
 
     key: str = ""
     make: Make | None = None
@@ -80,15 +80,16 @@ _versions = itertools.count(1)
 
 
 class VertexData:
-    """Of a mesh at rest, without shape keys. Any thread may ask; nobody writes to the arrays.
+    """The vertex data of a mesh at rest, without shape keys. Any thread may use it; nobody writes to the
+    arrays.
 
     weighting  of the bones that move the mesh
     points     float32 [vertices, 3], object space
     triangles  int32 [triangles, 3]; None where no method that needs them was chosen
     stored     what the file has, by its key
-    before     of the same object as it was: where it has as many vertices, its data serves until there is
-               other
-    given      what is not made here but read from the mesh, by the name of the method
+    before     of the same object before it changed: with the same number of vertices, its data is used until
+               there is new data
+    given      data read from the mesh instead of computed here, by the name of the method
     """
 
     def __init__(
@@ -103,9 +104,9 @@ class VertexData:
         self.weighting = weighting
         self.points = points
         self.triangles = triangles
-        # The data differs where this does; 0 as long as there is none.
+        # Changes whenever the data does; 0 as long as there is none.
         self.version = 0
-        # Methods that were asked for and could not be had.
+        # Methods whose data was needed and not available.
         self.missed: set[str] = set()
         self.read_at = time.monotonic()
         self._given = dict(given or {})
@@ -123,7 +124,7 @@ class VertexData:
             self._parameters = dict(before._parameters)
             for method, entry in before._entries.items():
                 if entry.run is not None:
-                    # Made of a mesh that is no longer there.
+                    # Computed for a mesh that no longer exists.
                     entry.run.cancel()
                 if entry.made is not None and len(before.points) == len(self.points):
                     self._entries[method] = _Entry(made=entry.made, is_outdated=True)
@@ -131,7 +132,7 @@ class VertexData:
 
     @property
     def made(self) -> dict[str, tuple[str, np.ndarray]]:
-        """The key and the data of each method that has some of this mesh."""
+        """The key and the data of each method that has current data."""
         with self._lock:
             entries = self._entries.items()
             return {
@@ -141,14 +142,14 @@ class VertexData:
             }
 
     def add_triangles(self, triangles: np.ndarray) -> None:
-        """Those of the mesh, where they were not read before."""
+        """Sets the mesh's triangles, if they were not read before."""
         if self.triangles is None:
             self.triangles = triangles
 
     def take_parameters(self, method: str, values: Mapping[str, Value]) -> None:
-        """Data that was made with others than these is outdated.
+        """Sets the parameters of a method. Data made with other values becomes outdated.
 
-        values  by full names; where one is not there, its default
+        values  by full names; missing ones have their default
         """
         if method not in PROVIDERS or not PROVIDERS[method].parameters:
             return
@@ -166,8 +167,8 @@ class VertexData:
             self._entries[method] = _Entry(made=entry.made, is_outdated=entry.made is not None)
 
     def is_ready(self, method: str) -> bool:
-        """Whether of() has something without making it, be it outdated; true for a method that keeps nothing.
-        Where precomputations are waited for, whether of() can make it."""
+        """Whether of() can return data without computing it, even if outdated; True for a method without
+        vertex data. Where precomputations are waited for: whether of() can compute it."""
         if method not in PROVIDERS:
             return True
         with self._lock:
@@ -175,7 +176,7 @@ class VertexData:
             made = None if entry is None else entry.made
             is_ready = made is not None
             if precomputations.waits:
-                # What is outdated is then made anew, which takes triangles.
+                # Outdated data is then computed again, which needs triangles.
                 is_outdated = entry is not None and entry.is_outdated
                 is_ready = self.triangles is not None or (is_ready and not is_outdated)
             if not is_ready:
@@ -183,7 +184,7 @@ class VertexData:
             return is_ready
 
     def has(self, method: str) -> bool:
-        """Whether the data is there, be it outdated; true for a method that keeps nothing."""
+        """Whether there is data, even if outdated; True for a method without vertex data."""
         if method not in PROVIDERS:
             return True
         with self._lock:
@@ -191,28 +192,29 @@ class VertexData:
             return entry is not None and entry.made is not None
 
     def is_current(self, method: str) -> bool:
-        """Whether the data is there, and of this mesh."""
+        """Whether there is data of this mesh."""
         with self._lock:
             entry = self._entries.get(method)
             return entry is not None and entry.made is not None and not entry.is_outdated
 
     def running(self, method: str) -> Precomputation | None:
-        """What makes the data now."""
+        """Returns the running computation, if there is one."""
         with self._lock:
             entry = self._entries.get(method)
             return None if entry is None else entry.run
 
     def is_stopped(self, method: str) -> bool:
-        """Whether the artist stopped what makes the data."""
+        """Whether the artist stopped the computation."""
         with self._lock:
             entry = self._entries.get(method)
             return entry is not None and bool(entry.key) and entry.key in precomputations.stopped
 
     def of(self, method: str, bones_from_model: np.ndarray) -> np.ndarray | None:
-        """float32 [vertices or rows, Method.vertex_floats], object space; None for a method that keeps
-        nothing. Made here where there is none.
+        """Returns float32 [vertices or rows, Method.vertex_floats], object space; None for a method without
+        vertex data. Computes it where there is none.
 
-        bones_from_model  float64 [4, 4], where weights depend on where vertices are: the first call decides
+        bones_from_model  float64 [4, 4], used where weights depend on the vertices' positions; the first call
+                          decides
         """
         if method not in PROVIDERS:
             return self._given.get(method)
@@ -229,8 +231,8 @@ class VertexData:
         return made
 
     def request(self, method: str, bones_from_model: np.ndarray) -> None:
-        """Has the data found or, where precomputations are waited for, made; else its making starts on a
-        thread, unless the artist stopped it. Raises what the making raises."""
+        """Finds the data, or computes it where precomputations are waited for; otherwise starts to compute it
+        on a thread, unless the artist stopped it. Raises what the computation raises."""
         if method not in PROVIDERS or self.is_current(method):
             return
         if precomputations.waits:
@@ -245,8 +247,8 @@ class VertexData:
                 entry.run = precomputations.start(entry.key, make)
 
     def take_result(self, method: str) -> bool:
-        """Whether what made the data has ended since; its result is the data from now on. Raises what the
-        making raised."""
+        """Takes the result of a computation that has ended. Returns whether one has. Raises what the
+        computation raised."""
         with self._lock:
             entry = self._entries.get(method)
             if entry is None or entry.run is None or not entry.run.has_ended:
@@ -259,7 +261,7 @@ class VertexData:
             return True
 
     def _prepare(self, entry: _Entry, method: str, bones_from_model: np.ndarray) -> Make:
-        """Finds what was made before; else what makes it. Under the lock."""
+        """Finds earlier data; returns what computes it otherwise. Called under the lock."""
         if entry.make is not None:
             return entry.make
         if self.triangles is None:
@@ -292,7 +294,8 @@ class VertexData:
 
 
 def _values_of(method: str, values: Mapping[str, Value]) -> dict[str, float]:
-    """By the ids of parameters. As Blender's properties round them: a default equals what it was set to."""
+    """Returns values by the ids of parameters, rounded as Blender's properties are, so that a default equals
+    the stored value."""
     defaults = {each.id: each.default for each in METHODS[method].parameters}
     names = PROVIDERS[method].parameters
     return {name: float(np.float32(values.get(f"{method}.{name}", defaults[name]))) for name in names}
@@ -306,7 +309,7 @@ def _key(
     influences: Influences,
     triangles: np.ndarray,
 ) -> str:
-    """The hash of all that the data of a method is made from."""
+    """Returns the hash of everything that the data of a method is computed from."""
     of_method = " ".join([method, str(version), *map(repr, values.values())])
     digest = hashlib.blake2b(of_method.encode(), digest_size=16)
     for array in (points, influences.offsets, influences.bones, influences.weights, triangles):

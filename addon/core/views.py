@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-# A little to the character's left and above, from Blender's front (-Y).
+# A little from the character's left and from above, relative to Blender's front view (-Y).
 VIEW_DIRECTION = np.array([0.45, -1.0, 0.22])
-# Close-ups show this part of the mesh's diagonal.
+# The share of the mesh's diagonal that close-ups show.
 CLOSE_UP = 0.28
 
 
@@ -19,10 +19,10 @@ class View:
     """An orthographic camera.
 
     direction  unit, from the target towards the camera
-    target     what the camera looks at
-    width      of what is seen, from left to right
-    height     of what is seen, from bottom to top
-    depth      how far in front of and behind the target is seen
+    target     the point in the centre of the picture
+    width      of the visible region, from left to right
+    height     of the visible region, from bottom to top
+    depth      how far before and behind the target is visible
     """
 
     direction: np.ndarray
@@ -38,7 +38,7 @@ class View:
 
 
 def whole_view(extents: Sequence[np.ndarray]) -> View:
-    """A view from the front of everything within `extents`, each as seen_extent returns it."""
+    """Returns a view from the front of everything within `extents`, each as seen_extent() returns it."""
     direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
     low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
     centre = (low + high) / 2
@@ -59,8 +59,7 @@ def seen_extent(points: np.ndarray) -> np.ndarray:
 
 
 def of_one_size(views: Sequence[View]) -> list[View]:
-    """The views, each as wide, high and deep as the largest, so that what they show can be compared by
-    eye."""
+    """Returns the views, each as wide, high and deep as the largest, so that they can be compared by eye."""
     largest = {name: max(getattr(view, name) for view in views) for name in ("width", "height", "depth")}
     return [replace(view, **largest) for view in views]
 
@@ -68,7 +67,7 @@ def of_one_size(views: Sequence[View]) -> list[View]:
 def most_different_vertex(meshes: Sequence[np.ndarray]) -> int | None:
     """The vertex at which the methods differ most; None where they do not differ.
 
-    meshes  one [vertices, 3] for each method, of one topology
+    meshes  one [vertices, 3] for each method, of the same topology
     """
     first = meshes[0]
     difference = np.max([np.linalg.norm(points - first, axis=1) for points in meshes], axis=0)
@@ -77,8 +76,8 @@ def most_different_vertex(meshes: Sequence[np.ndarray]) -> int | None:
 
 
 def close_view(points: np.ndarray, targets: np.ndarray) -> View:
-    """A view close to all of `targets` [n, 3], from the direction in which fewest of `points` [m, 3] are in
-    front.
+    """Returns a view close to all of `targets` [n, 3], from the direction in which the fewest of `points` [m,
+    3] are in front.
 
     targets  the positions of one vertex under each method: all are in the picture
     """
@@ -112,7 +111,7 @@ def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
 
 
 def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Right and up of a camera in `direction` from its target, up as near to +Z as possible."""
+    """Right and up of a camera in `direction` from its target, with up as near to +Z as possible."""
     world_up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
     right = np.cross(world_up, direction)
     right /= np.linalg.norm(right)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Processes that Windows ends with this one, also where it is killed: Linux does so at the child's own wish.
+"""Has Windows end child processes with this one, even if it is killed; on Linux the child asks for that
+itself.
 
-A job object ends what was assigned to it when its last handle is closed, which the system does for a process
-that ends (Microsoft: JOBOBJECT_BASIC_LIMIT_INFORMATION, JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE).
+A job object ends the processes assigned to it when its last handle is closed, which the system does for a
+process that ends (Microsoft: JOBOBJECT_BASIC_LIMIT_INFORMATION, JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE).
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ if sys.platform == "win32":
 
     @cache
     def _job() -> int | None:
-        """The job of this process's children, which it never closes; None where there can be none."""
+        """Returns the job of this process's children, which is never closed; None where there can be none."""
         kernel = ctypes.WinDLL("kernel32", use_last_error=True)
         kernel.CreateJobObjectW.restype = wintypes.HANDLE
         kernel.CreateJobObjectW.argtypes = [wintypes.LPVOID, wintypes.LPCWSTR]
@@ -66,4 +67,4 @@ if sys.platform == "win32":
 else:
 
     def end_with_this_process(process: subprocess.Popen) -> None:
-        """Does nothing: elsewhere it is the child that asks for it, where it can (worker.py)."""
+        """Does nothing: on other systems the child asks for it, where it can (worker.py)."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew after Blender's evaluation: the points go into an object of the file, and Blender evaluates again."""
+"""Sinew after Blender's evaluation: the points go into an object of the file, and Blender evaluates once
+more."""
 
 from __future__ import annotations
 
@@ -22,11 +23,11 @@ def deform(
     is_inspected: bool,
     is_first: bool,
 ) -> None:
-    """Writes the points of this evaluation for the next one, where they differ from those that are there.
+    """Writes the points of this evaluation for the next one, where they differ from those stored.
 
-    is_inspected  the object itself may have changed, and with it what holds its points
-    is_first      the object was not deformed after the update before, or what it is deformed from is another:
-                  what holds its points has others, or other normals
+    is_inspected  the object itself may have changed, and with it the storage of its points
+    is_first      the object was not deformed after the last update, or is deformed from other data: the
+                  stored points or normals are not valid
     """
     # Binding is not part of a frame's time: it happens once.
     started, before = time.perf_counter(), skinned.shown.rest_points
@@ -38,7 +39,7 @@ def deform(
         is_reshaped = before is not None and shown.rest_points is not before
         skinned.dirtied_by_frames = is_reshaped or obj.session_uid in changes.moved
     count = len(shown.rest_points) + skinned.normal_count
-    # A view layer that is seen again may have others.
+    # A view layer that is shown again may have other points.
     is_known = changes.complete and not is_inspected
     is_stored = is_known or point_store.are_written(obj, depsgraph, count)
     if differs or is_first or not is_stored:
@@ -55,17 +56,18 @@ def _store(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
 
 
 def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool | None:
-    """Brings the stack's points up to this evaluation.
+    """Computes the skin stack's points for this evaluation.
 
-    Whether they differ from the last ones; None where what decides them is unknown, and the last stay.
+    Returns whether they differ from the last ones; None where their inputs are unknown, and the last points
+    stay.
     """
     replaced_modifiers = properties.of(obj).replaced_modifiers
     armatures = [each.armature and each.armature.evaluated_get(depsgraph) for each in replaced_modifiers]
     evaluated = obj.evaluated_get(depsgraph)
     settings = properties.of(evaluated)
     if [each.name for each in settings.replaced_modifiers] != [each.name for each in replaced_modifiers]:
-        # Sinew was put on, or modifiers moved, since Blender evaluated it: what animation makes of the
-        # settings comes with the next time.
+        # Sinew was added, or modifiers were moved, since Blender evaluated the object: animated settings are
+        # available only after the next evaluation.
         settings = properties.of(obj)
     modifiers = list(zip(settings.replaced_modifiers, armatures, strict=False))
     frames = pose.read(evaluated, settings, modifiers, skinned, depsgraph.mode)
@@ -81,10 +83,10 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
 
 
 def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:
-    """What is known of a mesh that its Armature modifiers deform becomes that of this evaluation, for those
-    who measure or bake it; of others it is. Changes nothing in Blender.
+    """Updates what is known of a mesh that its Armature modifiers deform to this evaluation, for measuring or
+    baking it; other meshes are up to date. Changes nothing in Blender.
 
-    Raises SinewError where the mesh has become one that can not be deformed.
+    Raises SinewError where the mesh has become one that cannot be deformed.
     """
     if not skinned.uses_builtin:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brings an object in line with its plan: its modifiers, their pointers, and what holds its points."""
+"""Applies a plan to an object: its modifiers, their armature pointers, and the storage of its points."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from ..attach import (
 )
 from ..core.errors import SinewError
 from . import safe_mode, small_meshes
-from .plan import MODES_OF_THE_MODIFIER, ObjectFacts, Plan, State, plan
+from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State, plan
 
 log = logging.getLogger("sinew")
 
 
 def plan_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> Plan:
-    """What is to become of a skinned object as it is now.
+    """Returns the plan for a skinned object as it is now.
 
-    failure    what failed when Sinew deformed it within Blender's evaluation
+    failure    the error when Sinew deformed it within Blender's evaluation
     waits_for  what its method needs and is not computed yet
     """
     return plan(facts_of(obj, failure, waits_for))
@@ -36,7 +36,7 @@ def plan_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> Pl
 
 def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> ObjectFacts:
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
-    # While Sinew is off, the modifiers have the flags that it would keep.
+    # While Sinew is off, the modifiers themselves have the flags that it would otherwise store.
     flags = [replaced if settings.replaces_modifiers else modifier for modifier, replaced in pairs]
     gives_normals = normals.are_given(settings)
     domain = normals.domain_of(mesh) if gives_normals else ""
@@ -67,14 +67,14 @@ def facts_of(obj: bpy.types.Object, failure: str = "", waits_for: str = "") -> O
 
 
 def apply(obj: bpy.types.Object, wanted: Plan) -> None:
-    """Raises SinewError where what stands in front can not be evaluated apart."""
+    """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
     if wanted.uses_builtin:
         attach.switch(obj, on=False)
         attach.keep_out_of_chain(obj)
         attach.adopt_pointers(obj)
         if wanted.state is State.OFF:
             point_store.remove_point_attributes(obj)
-        elif obj.mode not in MODES_OF_THE_MODIFIER:
+        elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
         if wanted.state is State.BUILT_IN and _shows_nearest_volume(obj):
             attach.use_nearest_volume(obj)
@@ -88,22 +88,23 @@ def apply(obj: bpy.types.Object, wanted: Plan) -> None:
 
 
 def _mode_of(obj: bpy.types.Object) -> str:
-    """That of another object, too, where both have one mesh."""
+    """Returns its mode. Edit mode counts also where another object with the same mesh is in it."""
     return "EDIT" if obj.data.is_editmode else obj.mode
 
 
 def _shows_nearest_volume(obj: bpy.types.Object) -> bool:
-    """Whether it is in a mode in which its Armature modifiers, by Preserve Volume, have the shape that Sinew
-    is set to."""
-    return _mode_of(obj) in MODES_OF_THE_MODIFIER and small_meshes.has_builtin_shape(obj)
+    """Whether its mode uses the Armature modifiers, and these can give the shape that Sinew is set to, by
+    Preserve Volume."""
+    return _mode_of(obj) in ARMATURE_MODIFIER_MODES and small_meshes.has_builtin_shape(obj)
 
 
 def has_lost_modifier(obj: bpy.types.Object) -> bool:
-    """Whether Sinew's modifier, or the one that deforms the mesh meanwhile, is gone."""
+    """Whether Sinew's modifier is gone, or the Armature modifier that deforms in its place."""
     if obj.data.is_editmode:
         return False
     settings = properties.of(obj)
-    # One that was switched off because its Armature modifier is gone stays, with the sentence that says so.
+    # An object that was switched off because its Armature modifier is gone stays, with the error that says
+    # so.
     uses_builtin = not (settings.replaces_modifiers or settings.error)
     return stack.sinew_modifier(obj) is None or (uses_builtin and stack.armature_modifier(obj) is None)
 
@@ -111,10 +112,10 @@ def has_lost_modifier(obj: bpy.types.Object) -> bool:
 def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:
     """Takes Sinew off an object that has lost its modifier.
 
-    Applied, or converted to a mesh, its shape is the mesh's own, and the Armature modifiers in whose place
-    it stood go as they would have gone; deleted, it gives the mesh back to them.
+    If the modifier was applied or the object converted to a mesh, the mesh has the deformed shape: then the
+    replaced Armature modifiers are removed too. If the modifier was deleted, they deform the mesh again.
 
-    rest, shown  float32 [vertices, 3], as the mesh was bound, and its last shape; None where unknown
+    rest, shown  float32 [vertices, 3], the points as bound, and the last shape; None where unknown
     """
     if point_store.are_applied(obj, rest, shown):
         applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
@@ -128,8 +129,11 @@ def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.nda
 
 
 def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
-    """Whether an object had Sinew's modifier without its settings, as Copy Modifiers leaves it. It gets Sinew
-    as the object has that it came from, or its Armature modifiers alone."""
+    """Handles Sinew's modifier on an object without Sinew's settings, as Copy Modifiers leaves it. The object
+    gets Sinew as the original has it, or else only its Armature modifiers.
+
+    Returns whether there was such a modifier.
+    """
     nodes = stack.sinew_modifier(obj)
     if nodes is None:
         return False
@@ -143,7 +147,7 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
             continue
         if modifier.object is None:
             modifier.object = replaced.armature
-        # Where Sinew is off, or an animation sets them, they are the artist's own.
+        # Where Sinew is off, or an animation sets the flags, they are the artist's own.
         if properties.of(origin).replaces_modifiers and not replaced.visibility_is_keyed:
             modifier.show_viewport, modifier.show_render = replaced.show_viewport, replaced.show_render
     if origin is None or attach.armature_of(obj) is None:
@@ -166,8 +170,9 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
 def _origin_of(
     nodes: bpy.types.NodesModifier, armatures: list[bpy.types.ArmatureModifier]
 ) -> bpy.types.Object | None:
-    """The skinned object that the modifiers were copied from: the one whose points they name, else the active
-    one, which Blender's own commands copy from, else one with modifiers of these names and armatures."""
+    """Returns the skinned object that the modifiers were copied from: the one whose point buffer they name;
+    else the active one, which Blender's commands copy from; else one with modifiers of the same names and
+    armatures."""
     names = {modifier.name for modifier in armatures}
     alike = [
         obj

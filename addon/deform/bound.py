@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is read of an object once, to deform it on every frame: mesh, weights, bones, modifiers' options."""
+"""What is read from an object once, to deform it on every frame: mesh, weights, bones, modifiers' options."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from .source import Source
 
 @dataclass(frozen=True)
 class Bound:
-    """Never changed: another takes its place where any of it may be out of date.
+    """Immutable: it is replaced where any of it may be out of date.
 
     armatures   the session_uid of each Armature modifier's armature, 0 for none
     options     of each Armature modifier
     source      rest points and weights
-    skin_stack  deforms by them: one stage for each Armature modifier, then those of the library's list
-    facts       of mesh and rig, for the panel
+    skin_stack  deforms them: one stage for each Armature modifier, then those of the library's list
+    facts       about mesh and rig, for the panel
     groups      the vertex group of each stage of the library's list that has one, by the stage's name
     """
 
@@ -52,12 +52,13 @@ class Bound:
 
     @property
     def data_versions(self) -> list[int]:
-        """Of what methods keep of vertices, for each Armature modifier."""
+        """The version of the methods' vertex data, for each Armature modifier."""
         data = (stage.binding.vertex_data for stage in self.skin_stack.skin_stages)
         return [0 if each is None else each.version for each in data]
 
     def lacks(self, methods: Iterable[str]) -> list[str]:
-        """A sentence for each of the methods that does without something which the mesh lacks."""
+        """Returns a sentence for each of the methods that has to work without something that the mesh
+        lacks."""
         lacks_keys = sdef.METHOD in methods and self.source.sdef_keys is None
         triangles = self.source.triangles
         return [
@@ -76,14 +77,15 @@ class Bound:
     def write_normals(
         self, points: np.ndarray, rest_points: np.ndarray, given: Normals, out: np.ndarray
     ) -> None:
-        """
+        """Computes the normals that belong to the points.
+
         points       float32 [vertices, 3], the shape of the last frame
-        rest_points  float32 [vertices, 3], what it was deformed from
-        out          float32 [vertices or corners, 3], C-contiguous: zeros, which say that there are none,
-                     where what stands in front made a mesh that has others
+        rest_points  float32 [vertices, 3], the points it was deformed from
+        out          float32 [vertices or corners, 3], C-contiguous; zeros, which mean no normals, where the
+                     mesh from upstream has normals of another domain
         """
         source = self.source
-        if source.from_front and source.normals_domain != given.domain:
+        if source.from_upstream and source.normals_domain != given.domain:
             out[:] = 0.0
             return
         if given.are_skinned:
@@ -95,14 +97,16 @@ class Bound:
 
     @property
     def binding(self) -> Binding:
-        """Of the first Armature modifier."""
+        """That of the first Armature modifier."""
         return self.skin_stack.skin_stages[0].binding
 
 
 def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | None = None) -> Bound:
-    """Binds anew what comes out other than it was; the same object where nothing did.
+    """Reads the object. Binds again only what has changed; returns the same skin stack where nothing has.
 
-    old  where neither modifiers nor their options changed since. Requires source.is_ready().
+    old  given where neither modifiers nor their options changed since
+
+    Requires source.is_ready().
     """
     read_now = source.read(obj, depsgraph, method_needs.needs_surface(obj))
     pairs = attach.replaced_modifiers(obj)
@@ -115,7 +119,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
             for stage in old.skin_stack.skin_stages:
                 stage.binding.vertex_data = _vertex_data(stage.binding.weighting, read_now, stage)
         if np.array_equal(read_now.points, old.source.points):
-            # The same array tells that nothing moved.
+            # An identical array signals that nothing moved.
             read_now.points = old.source.points
         old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skin_stages))
         return replace(old, source=read_now)
@@ -137,7 +141,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
 
 
 def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | None) -> VertexData:
-    """before  of the same modifier as it was"""
+    """before: the stage of the same modifier as it was last bound."""
     old = None if before is None else before.binding.vertex_data
     given = {}
     if read_now.sdef_keys is not None:
@@ -149,9 +153,9 @@ def _vertex_data(weighting: Weighting, read_now: Source, before: SkinStage | Non
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound) -> Bound:
-    """The same with the mesh's triangles, without reading its weights again: that takes far longer.
+    """Returns the same with the mesh's triangles, without reading weights again, which takes far longer.
 
-    Requires that the mesh is the one that was read, and source.is_ready().
+    Requires source.is_ready(), and that the mesh is the one that was read.
     """
     read_now = source.with_surface(obj, depsgraph, old.source)
     read_now.keep_normals_of(old.source)
@@ -161,12 +165,12 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
 
 
 def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
-    """Whether a method was chosen since that needs the mesh's triangles."""
+    """Whether a method that needs the mesh's triangles was chosen since."""
     return bound.source.triangles is None and method_needs.needs_surface(obj)
 
 
 def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
-    """Whether it was bound to other armatures, by other options or with other vertex groups of stages."""
+    """Whether it was bound to other armatures, options or vertex groups of stages."""
     pairs = attach.replaced_modifiers(obj)
     return (
         bound.armatures != [uid(replaced.armature) for _modifier, replaced in pairs]
@@ -178,9 +182,10 @@ def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound) -> bool:
 def have_bones_changed(
     obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph, changes: Changes | None
 ) -> bool:
-    """Whether one of the armatures has other bones than those read; one in edit mode has not.
+    """Whether the bones of one of the armatures differ from those read. An armature in edit mode counts as
+    unchanged.
 
-    changes  None where they are not known, as what happened while Sinew was off
+    changes  None where they are unknown, as after Sinew was off
     """
     changed = False
     for stage, replaced in zip(
@@ -196,7 +201,7 @@ def have_bones_changed(
 
 
 def uid(data: bpy.types.ID | None) -> int:
-    """0 for none."""
+    """Returns the session_uid, or 0 for None."""
     return 0 if data is None else data.session_uid
 
 
@@ -208,8 +213,8 @@ def _equals_but_for_points(old: Bound, read_now: Source, bones: list[Bones]) -> 
 
 
 def _masks(obj: bpy.types.Object, read_now: Source, groups: dict[str, str]) -> dict[str, np.ndarray]:
-    """float32 [vertices], 0 to 1, by the stage's name. None of a group that the object lacks, nor of a mesh
-    without weights, as Blender's modifiers have it."""
+    """Returns float32 [vertices], 0 to 1, by the stage's name. As with Blender's modifiers, there is no mask
+    for a missing group or for a mesh without weights."""
     found = {stage: obj.vertex_groups.get(name) for stage, name in groups.items() if name}
     has_weights = len(read_now.weights.groups) > 0
     return {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender says changed in an update."""
+"""What Blender reports as changed in an update."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from .originals import Find
 class Changes:
     """The data touched since the last update, by session_uid.
 
-    touched    objects, meshes and shape keys that were touched in any way
-    objects    whose geometry was touched
-    moved      that were moved
-    meshes     whose own geometry was touched: points, weights, topology, shape keys; not those that only
-               follow their shape keys' animation
-    armatures  whose bones may differ
-    edited     the objects themselves that were touched so, and not by a change of frame
-    structure  objects may have come, gone or been hidden
-    frame      this is a change of frame
-    complete   whatever is not listed is as it was at the last update; else all may have changed
-    lost       something listed is no longer found, as a handler deleted or renamed it: any mesh may have
-               changed
-    after_step  they are those of a step of undo or redo: what is listed was read anew, however little of it
-               Blender says to be touched
+    touched     objects, meshes and shape keys that were touched in any way
+    objects     objects whose geometry was touched
+    moved       objects that were moved
+    meshes      meshes whose own geometry was touched: points, weights, topology, shape keys; not those that
+                only follow their shape keys' animation
+    armatures   armatures whose bones may differ
+    edited      the `objects` themselves, unless a change of frame touched them
+    structure   objects may have been added, removed or hidden
+    frame       this is a change of frame
+    complete    everything not listed is as it was at the last update; otherwise anything may have changed
+    lost        something listed cannot be found, as a handler deleted or renamed it: any mesh may have
+                changed
+    after_step  these are the changes of an undo or redo step: what is listed was read anew, however little of
+                it Blender reports as touched
     """
 
     touched: set[int] = field(default_factory=set)
@@ -45,9 +45,9 @@ class Changes:
 
     @staticmethod
     def are_of_meshes_only(depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether nothing changed but meshes, and what animation moves: all that an artist changes of an
-        object or of its data makes Blender list the mesh, the armature or the scene, too (seen on 4.2 and
-        5.2)."""
+        """Whether nothing changed but meshes and what animation moves. For anything else that an artist
+        changes about an object or its data, Blender also lists the mesh, the armature or the scene (seen on
+        4.2 and 5.2)."""
         changed = depsgraph.id_type_updated
         return not (changed("ARMATURE") or changed("SCENE") or changed("COLLECTION"))
 
@@ -57,8 +57,8 @@ class Changes:
 
     @staticmethod
     def meshes_in(depsgraph: bpy.types.Depsgraph, original: Find) -> set[int] | None:
-        """As `meshes`, without reading all the rest, with GONE where one is no longer found; None where no
-        mesh was touched in any way."""
+        """Returns the same as `meshes` without reading all updates, with GONE where one cannot be found; None
+        where no mesh was touched in any way."""
         if not depsgraph.id_type_updated("MESH"):
             return None
         return _changed_meshes(depsgraph.updates, _uid_by(original))
@@ -72,7 +72,7 @@ class Changes:
         original: Find,
         after_step: bool = False,
     ) -> Changes:
-        """original: what finds originals."""
+        """original: a function that finds originals (originals.py)."""
         updates = depsgraph.updates
         meshes = _changed_meshes(updates, _uid_by(original)) - {GONE}
         changes = cls(frame=frame, complete=complete, after_step=after_step, meshes=meshes)
@@ -107,7 +107,7 @@ class Changes:
                 self.moved.add(uid)
 
     def add(self, other: Changes) -> None:
-        """Makes these the changes of both evaluations."""
+        """Adds the changes of another evaluation to these."""
         self.touched |= other.touched
         self.objects |= other.objects
         self.moved |= other.moved
@@ -121,14 +121,14 @@ class Changes:
 
 
 def names_of_changed_meshes(depsgraph: bpy.types.Depsgraph) -> set[str]:
-    """The full name of each mesh of Changes.meshes, from evaluated data alone: the originals may be gone by
-    now, as handlers deleted them."""
+    """Returns the full name of each mesh of Changes.meshes, read from evaluated data alone: handlers may have
+    deleted the originals."""
     if not depsgraph.id_type_updated("MESH"):
         return set()
     return _changed_meshes(depsgraph.updates, lambda evaluated: evaluated.name_full)
 
 
-# In the place of the session_uid of what is gone; Blender's are positive.
+# Stands for the session_uid of deleted data; Blender's are positive.
 GONE = 0
 
 
@@ -141,8 +141,8 @@ def _uid_by(original: Find) -> Callable[[bpy.types.ID], int]:
 
 
 def _changed_meshes(updates: bpy.types.bpy_prop_collection, identity: Callable) -> set:
-    """Shape keys that an animation sets touch the geometry of their mesh, and nothing else of it; so does
-    little that an artist does, and then the keys are not listed (seen on 4.2 and 5.2)."""
+    """Returns the meshes whose own geometry was touched. Animated shape keys touch only the geometry of their
+    mesh. Few edits do the same, and for these Blender does not list the keys (seen on 4.2 and 5.2)."""
     keys, meshes = set(), []
     for update in updates:
         if isinstance(update.id, bpy.types.Key):

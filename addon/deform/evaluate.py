@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Final points of evaluated meshes, and the method they are deformed with."""
+"""Puts methods on meshes, and reads the final points of evaluated meshes."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def check_methods(names: Iterable[str]) -> None:
 
 
 def deformed_meshes(scene: bpy.types.Scene, name: str | None = None) -> list[bpy.types.Object]:
-    """The scene's meshes that an armature deforms, all or the one called `name`; visible from now on, for
-    Blender does not evaluate what is hidden. Raises SinewError where there are none."""
+    """Returns the scene's meshes that an armature deforms, all or the one called `name`, and makes them
+    visible, as Blender does not evaluate hidden objects. Raises SinewError where there are none."""
     meshes = attach.deformed_meshes(list(scene.objects))
     if name is not None:
         meshes = [obj for obj in meshes if obj.name == name]
@@ -57,14 +57,14 @@ def show(meshes: list[bpy.types.Object]) -> None:
         obj.hide_render = False
         if obj.name in bpy.context.view_layer.objects:
             obj.hide_set(False)
-    # Their collection is shown with all others.
+    # Copies of a comparison stay hidden, though their collection is now shown.
     for copy in filter(properties.is_copy, bpy.context.scene.objects):
         copy.hide_viewport = copy.hide_render = True
 
 
 @contextmanager
 def shown(meshes: list[bpy.types.Object]) -> Iterator[None]:
-    """Makes meshes of the scene visible as show() does, and as they were afterwards."""
+    """Context in which meshes of the scene are visible as by show(); afterwards they are as before."""
     layers = list(_layers(bpy.context.view_layer.layer_collection))
     flags = [
         *((layer, name, getattr(layer, name)) for layer in layers for name in ("exclude", "hide_viewport")),
@@ -87,14 +87,14 @@ def shown(meshes: list[bpy.types.Object]) -> Iterator[None]:
 
 
 def use_method(obj: bpy.types.Object, method: str) -> None:
-    """Deforms a mesh with one of method_names(). Raises SinewError where Sinew can not deform it."""
+    """Deforms a mesh with one of method_names(). Raises SinewError where Sinew cannot deform it."""
     error = use_methods([(obj, method)])[0]
     if error is not None:
         raise error
 
 
 def use_methods(wanted: Sequence[tuple[bpy.types.Object, str]]) -> list[SinewError | None]:
-    """The same for many, evaluated once: for each what keeps Sinew from driving it, if anything does."""
+    """The same for many meshes, evaluated once. Returns for each the error that prevents it, or None."""
     return _use_methods(wanted, session.changing)
 
 
@@ -103,13 +103,13 @@ def use_methods_for_file(
     scales: Mapping[bpy.types.Object, str | None],
     values: Mapping[bpy.types.Object, Mapping[str, Value]],
 ) -> list[SinewError | None]:
-    """The same for a file that was opened to be saved so (see session.changing_for_file), and with the names
-    of their scale rules, where None leaves an object its own, and their parameters."""
+    """The same for a file that was opened to be saved so (see session.changing_for_file). Also sets
+    parameters, and the scale rules by name, where None leaves an object its own."""
     return _use_methods(wanted, session.changing_for_file, scales, values)
 
 
 def set_parameters(values: Mapping[str, Value]) -> None:
-    """From now on every mesh on which a method is put has these, as of core.parameters.parse()."""
+    """From now on every mesh that is given a method gets these values, as from core.parameters.parse()."""
     _values_of_all.clear()
     _values_of_all.update(values)
 
@@ -129,7 +129,7 @@ def _use_methods(
             try:
                 _choose(obj, method, values.get(obj, _values_of_all))
                 if scales.get(obj) is not None:
-                    # As of the method: what is asked for wins over keys in the file.
+                    # As for the method: what the caller asks for overrides keys in the file.
                     setting_animation.remove_keys(obj, "sinew.scale_rule")
                     properties.of(obj).scale_rule = scales[obj]
                 errors.append(None)
@@ -148,7 +148,7 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
         return
     _check_groups(values)
     attach.add(obj, method)
-    # What is asked for wins over keys in the file.
+    # What the caller asks for overrides keys in the file.
     setting_animation.remove_keys(obj, "sinew.method")
     attach.use_one_method(obj, method)
     for name, value in values.items():
@@ -160,7 +160,7 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
 
 
 def _check_groups(values: Mapping[str, Value]) -> None:
-    """Raises SinewError for a vertex group that no mesh of the file has; single ones may lack it."""
+    """Raises SinewError for a vertex group that no mesh of the file has; some meshes may lack it."""
     known = parameters.by_full_name()
     for name, value in values.items():
         if known[name].kind == "vertex_group" and value:
@@ -175,10 +175,11 @@ def use_method_on(meshes: Iterable[bpy.types.Object], method: str) -> None:
             raise error
 
 
-def drivable_meshes(
+def deformable_meshes(
     scene: bpy.types.Scene, path: Path, methods: Iterable[str], name: str | None = None
 ) -> tuple[list[bpy.types.Object], list[str]]:
-    """Those of deformed_meshes that take all `methods`, and a sentence for each of the others.
+    """Returns those of deformed_meshes() that all `methods` can deform, and a sentence for each of the
+    others.
 
     Raises SinewError that names the file `path` where there is none.
     """
@@ -200,7 +201,7 @@ def drivable_meshes(
 
 
 def length_unit(scene: bpy.types.Scene) -> str:
-    """What one unit of Blender is called in the file: "m", or "units" where it is no metre."""
+    """The name of Blender's unit of length in the file: "m", or "units" where it is not a metre."""
     units = scene.unit_settings
     return "m" if units.system != "NONE" and units.scale_length == 1.0 else "units"
 
@@ -214,7 +215,7 @@ def set_frame(scene: bpy.types.Scene, frame: float) -> None:
 def whole_views(
     meshes: list[bpy.types.Object], methods: Iterable[str], frames: Iterable[float]
 ) -> list[View]:
-    """For each frame a view that holds the final meshes under all methods; all of one size."""
+    """For each frame, a view that contains the final meshes under all methods; all views have one size."""
     extents: dict[float, list[np.ndarray]] = {frame: [] for frame in frames}
     for method in methods:
         use_method_on(meshes, method)
@@ -230,8 +231,8 @@ def final_points(obj: bpy.types.Object) -> np.ndarray:
 
 
 def world_points(objects: list[bpy.types.Object]) -> np.ndarray:
-    """Final vertices of several meshes, one after the other, in world space, float64 [vertices, 3]; in memory
-    axis by axis, as measuring wants them."""
+    """Final vertices of several meshes, concatenated, in world space, float64 [vertices, 3]; stored axis by
+    axis, as measuring needs them."""
     parts = []
     for obj in objects:
         matrix = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender calls at its events: the lists of bpy.app.handlers."""
+"""Sinew's functions in Blender's lists of handlers, bpy.app.handlers."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from collections.abc import Callable, Mapping
 
 import bpy
 
-# Blender 4.2 has no event for objects that come from another file: there each frame has to be checked.
+# Blender 4.2 has no event for imported objects: there each frame has to be checked.
 IMPORTS_ARE_ANNOUNCED = hasattr(bpy.app.handlers, "blend_import_post")
 
 
-# What Sinew does at a change of frame, by event (handlers.py): only where there is something to do.
+# Sinew's functions at a change of frame, by event (handlers.py); subscribed only where there is something to
+# do.
 FRAME_HANDLERS: dict[str, Callable] = {}
-# What suspends modifiers after all other functions and restores them before any, where there are some.
+# Functions that suspend modifiers after all other functions, and restore them before any other.
 GATE_HANDLERS: dict[str, Callable] = {}
 
 _OURS = __package__.rpartition(".")[0]
 
-# At these others can change meshes while Sinew works.
+# At these events others can change meshes while Sinew works.
 _CHANGING_EVENTS = (
     "depsgraph_update_pre",
     "depsgraph_update_post",
@@ -30,14 +31,14 @@ _CHANGING_EVENTS = (
 
 
 def others_are_subscribed() -> bool:
-    """Whether Blender calls others than Sinew while Sinew changes settings or the file is saved."""
+    """Whether Blender calls functions of others while Sinew changes settings or the file is saved."""
     return any(
         not _is_ours(function) for event in _CHANGING_EVENTS for function in getattr(bpy.app.handlers, event)
     )
 
 
 def others_follow(event: str, function: Callable) -> bool:
-    """Whether Blender calls others than Sinew after one of its functions."""
+    """Whether Blender calls functions of others after this one of Sinew's."""
     functions = getattr(bpy.app.handlers, event)
     if function not in functions:
         return False
@@ -45,7 +46,7 @@ def others_follow(event: str, function: Callable) -> bool:
 
 
 def others_precede(event: str, function: Callable) -> bool:
-    """Whether Blender calls others than Sinew before one of its functions."""
+    """Whether Blender calls functions of others before this one of Sinew's."""
     for each in getattr(bpy.app.handlers, event):
         if each is function:
             return False
@@ -59,14 +60,14 @@ def _is_ours(function: Callable) -> bool:
 
 
 def subscribe(event: str, function: Callable) -> None:
-    """Has Blender call the function; once, however often this is."""
+    """Has Blender call the function. Subscribing it again changes nothing."""
     functions = getattr(bpy.app.handlers, event)
     if function not in functions:
         functions.append(function)
 
 
 def call_first(event: str, function: Callable) -> None:
-    """Has Blender call it before all others. Not to be called while Blender goes through the functions."""
+    """Has Blender call it before all others. Must not be called while Blender iterates over the functions."""
     functions = getattr(bpy.app.handlers, event)
     if not functions or functions[0] is not function:
         unsubscribe(event, function)
@@ -74,7 +75,7 @@ def call_first(event: str, function: Callable) -> None:
 
 
 def call_last(event: str, function: Callable) -> None:
-    """Has Blender call it after all others. Called from one of them, it holds at once."""
+    """Has Blender call it after all others. If one of these functions calls this, it applies at once."""
     if not is_last(event, function):
         unsubscribe(event, function)
         subscribe(event, function)
@@ -86,7 +87,7 @@ def is_last(event: str, function: Callable) -> bool:
 
 
 def unsubscribe(event: str, function: Callable) -> None:
-    """Not to be called while Blender goes through the event's functions: it would leave one out."""
+    """Must not be called while Blender iterates over the event's functions: Blender would skip one."""
     functions = getattr(bpy.app.handlers, event)
     if function in functions:
         functions.remove(function)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's exporters of skins need Armature modifiers that deform, and bring the mesh itself to rest by
-them: for the time of an export the file is as a saved one.
+"""Wraps Blender's exporters of skins: they need Armature modifiers that deform, and use them to bring the
+mesh to rest. During an export the file is therefore as in a saved state.
 
-The glTF exporter calls extensions before an export and after one that did not fail. The FBX exporter, in
-Python too, calls nobody (seen on 4.2 to 5.2). So both operators are wrapped.
+The glTF exporter calls extensions before an export, but afterwards only if it did not fail. The FBX exporter,
+also written in Python, calls nobody (seen on 4.2 to 5.2). So both operators are wrapped.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def _on_loaded(*_args: object) -> None:
 
 
 def _wrap() -> None:
-    """Those that are registered and not wrapped yet."""
+    """Wraps those that are registered and not wrapped yet."""
     for name in (_FBX, _GLTF):
         operator = getattr(bpy.types, name, None)
         if operator is not None and not hasattr(operator.execute, "__wrapped__"):
@@ -48,7 +48,7 @@ def _wrap() -> None:
 
 
 def _without_sinew(execute: Callable, announced: bool) -> Callable:
-    """announced: it calls before_export() itself."""
+    """announced: the exporter itself calls before_export()."""
 
     @functools.wraps(execute)
     def execute_without_sinew(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps Blender from evaluating a mesh twice where a change of frame itself makes it dirty.
 
-Where Sinew deforms after the update, Blender evaluates on a change of frame, calls Sinew, and evaluates
-again what Sinew wrote. A mesh that moves, or whose shape keys do, comes up in the first round too, with the
-points of the last frame: all for nothing. So its modifiers are suspended until the points are there. To
-suspend them has the mesh read anew: a mesh that is only posed keeps its modifiers, and is evaluated twice.
+Where Sinew deforms after the update, Blender evaluates on a change of frame, calls Sinew, and evaluates again
+what Sinew wrote. A mesh that moves, or whose shape keys do, is evaluated in the first round, too, with the
+points of the last frame: wasted time. So its modifiers are suspended until the points are there. Suspending
+them makes Blender read the mesh again: so a mesh that is only posed keeps its modifiers, and is evaluated
+twice.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from ..io.animation_paths import animated_paths, curves_of, is_visibility_animat
 
 @dataclass(frozen=True)
 class _Suspended:
-    """A modifier, known by what no other add-on changes in between: it may rename, move or delete it."""
+    """A modifier, identified so that another add-on may rename, move or delete it in between."""
 
     obj: bpy.types.Object
     uid: int
@@ -30,7 +31,7 @@ class _Suspended:
     def restore(self) -> None:
         for modifier in self.obj.modifiers:
             if modifier.persistent_uid == self.uid:
-                # What somebody switched on meanwhile stays so.
+                # A modifier that somebody switched on meanwhile stays on.
                 modifier.show_viewport |= self.show_viewport
                 modifier.show_render |= self.show_render
 
@@ -42,8 +43,8 @@ class Gate:
         self._suspended: list[_Suspended] = []
 
     def suspend(self, obj: bpy.types.Object, is_playing: bool) -> None:
-        """is_playing: for a window that plays, whose animation Blender writes to the originals, too. Nothing
-        says whether another change of frame is a view's, a render's or an exporter's."""
+        """is_playing: a window plays the animation, so Blender writes its values to the originals, too. Other
+        changes of frame cannot be told apart: a view's, a render's or an exporter's."""
         if not is_playing and _is_animated(obj.data):
             return
         for modifier in obj.modifiers:
@@ -65,14 +66,14 @@ class Gate:
                 each.restore()
 
 
-# What a copy keeps, or Sinew works out itself.
+# Values that a new copy keeps, or that Sinew computes itself.
 _STAYING = ("location", "rotation_", "scale", "delta_", "sinew.")
 
 
 def _is_animated(mesh: bpy.types.Mesh) -> bool:
-    """Whether animation sets anything of an object that has the mesh, or shape keys that several have. To set
-    a modifier of one of these objects has Blender (4.2 to 5.2) copy all of them anew, with what the originals
-    have: in a render or an exporter that of another frame."""
+    """Whether animation sets anything of an object with this mesh, or of shape keys that several objects
+    share. Changing a modifier of one of these objects makes Blender (4.2 to 5.2) copy all of them again from
+    the originals, which in a render or an exporter have the values of another frame."""
     users = [obj for obj in bpy.data.objects if obj.data == mesh]
     if len(users) > 1 and any(curves_of(owner) for owner in (mesh, mesh.shape_keys) if owner is not None):
         return True

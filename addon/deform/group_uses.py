@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which vertex groups have another use than to weigh a bone: a group that is a mask is no fault."""
+"""Finds vertex groups with another use than the weights of a bone: a group without a bone is no fault if it
+is a mask."""
 
 from __future__ import annotations
 
@@ -11,8 +12,8 @@ from ..attach import properties, stage_settings
 
 
 def used(obj: bpy.types.Object, names: Collection[str]) -> set[str]:
-    """Those of the mesh object's groups `names` that something uses: a modifier (the Armature modifier's mask
-    too), a shape key, Sinew's stages, a constraint to the group, or a bone of another of the object's
+    """Returns those of the object's groups `names` that something uses: a modifier (also as the Armature
+    modifier's mask), a shape key, one of Sinew's stages, a constraint, or a bone of another of the object's
     armatures."""
     unused = set(names)
     found: set[str] = set()
@@ -39,14 +40,14 @@ def _in_modifiers(obj: bpy.types.Object) -> Iterator[str]:
 
 
 def _texts(of: bpy.types.bpy_struct, depth: int = 3) -> Iterator[str]:
-    """The texts that are set in a modifier and in what it is made of: each kind names its groups otherwise,
-    and Geometry Nodes have them among their inputs."""
+    """Yields the strings that are set in a modifier and its parts: each kind of modifier has other properties
+    for groups, and Geometry Nodes have them among their inputs."""
     for name, prop in of.bl_rna.properties.items():
         if prop.type == "STRING" and name != "name":
             yield getattr(of, name)
         elif prop.type == "POINTER" and depth and name != "rna_type":
             inner = getattr(of, name)
-            # No other data-block: that has groups of its own.
+            # Not other data-blocks: these have groups of their own.
             if inner is not None and not isinstance(inner, bpy.types.ID):
                 yield from _texts(inner, depth - 1)
 

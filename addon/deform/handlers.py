@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Sinew does at Blender's events: evaluations, changes of frame, undo, loading, saving, rendering."""
+"""Sinew's handlers of Blender's events: evaluations, changes of frame, undo, loading, saving, rendering."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ def before_update(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> N
 
 
 def _take_off_drivers_without_modifier() -> None:
-    """Where Sinew's modifier was applied or deleted: of a driver on an input of it, Blender would warn on its
-    console. The evaluation that comes next is the first without the modifier."""
+    """Removes drivers where Sinew's modifier was applied or deleted: Blender would print a warning for a
+    driver on a missing modifier. The next evaluation is the first without the modifier."""
     with reaction() as may_react:
         if not may_react or current.is_saving or is_rendering_in_window():
             return
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
                 is_missing = state.plan.is_in_depsgraph and obj.modifiers.get(state.modifier) is None
-                # It may have been renamed.
+                # The modifier may have been renamed.
                 if is_missing and obj.is_editable and stack.sinew_modifier(obj) is None:
                     pose_driver.remove(obj)
 
@@ -64,28 +64,28 @@ def before_frame_change(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph
     if is_rendering_in_window():
         return
     if any(state.dirtied_by_frames for state in current.skinned.values()):
-        events.call_last("frame_change_pre", close_gate)
-        events.call_first("frame_change_post", open_gate)
+        events.call_last("frame_change_pre", suspend_modifiers)
+        events.call_first("frame_change_post", restore_modifiers)
     else:
         events.unsubscribe_all(events.GATE_HANDLERS)
 
 
 @persistent
-def close_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
-    """Called last, and open_gate() first, so that other add-ons meet no modifier that Sinew suspends."""
+def suspend_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    """Called last, and restore_modifiers() first, so that other add-ons never see a suspended modifier."""
     if is_rendering_in_window():
         return
     is_playing = is_playing_in_window() and not current.is_rendering
     with reaction() as may_react, contextlib.suppress(ReferenceError):
         for obj in current.objects or () if may_react and not current.is_saving else ():
             state = session.state_of(obj)
-            # What its Armature modifiers deform is not evaluated again for Sinew.
+            # Objects that their Armature modifiers deform are not evaluated twice.
             if state is not None and state.dirtied_by_frames and properties.of(obj).replaces_modifiers:
                 current.gate.suspend(obj, is_playing)
 
 
 @persistent
-def open_gate(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+def restore_modifiers(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
     with reaction():
         current.gate.restore()
 
@@ -112,27 +112,29 @@ def _begin_evaluation() -> None:
         try:
             state.is_only_user = state.mesh_users == obj.data.users
         except ReferenceError:
-            # Deleted since the objects were listed.
+            # The object was deleted since the list was made.
             state.is_only_user = False
 
 
 def _end_event() -> None:
-    """What Blender evaluates from here to the next event is for a handler that changed something."""
+    """Whatever Blender evaluates from here to the next event is caused by a handler that changed
+    something."""
     for _obj, state in current.pairs:
         state.evaluation.is_event_known = state.evaluation.was_tagged
 
 
 def _read_changes(depsgraph: bpy.types.Depsgraph, original: originals.Find, frame: bool) -> Changes:
-    """What an evaluation lists is all only to who saw the one before: a render has a depsgraph of its own."""
+    """An evaluation's list of updates is complete only where the one before was seen, too: a render has a
+    depsgraph of its own."""
     same = current.depsgraph == depsgraph.as_pointer()
     current.depsgraph = depsgraph.as_pointer()
     return Changes.read(depsgraph, frame, same, original, current.is_after_step)
 
 
 def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) -> None:
-    """To an evaluation. What Sinew itself causes, and what Blender evaluates while it saves, is only noted:
-    it may have listed what others changed, too. So is what the window shows while it renders: points that are
-    written after the update are those of the render's frame then."""
+    """Reacts to an evaluation. It is only noted where Sinew itself caused it, where Blender evaluates while
+    saving (others' changes may be in the same list), and for the window during a render: points written after
+    the update would then belong to the render's frame."""
     waits_for_render = is_rendering_in_window() and is_main_thread()
     current.must_refresh |= waits_for_render
     if not may_react or current.is_saving or waits_for_render:
@@ -144,7 +146,7 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     with references.between_steps():
         session.update_all(depsgraph, changes)
     before, current.waiting = current.waiting, session.waiting()
-    # What handlers change Blender evaluates without telling of it. Once for each: what is in another scene
+    # What handlers change, Blender evaluates without an event. Once for each object: one in another scene
     # goes on waiting.
     if current.waiting - before and depsgraph == bpy.context.view_layer.depsgraph:
         _keep_evaluated_shapes(changes)
@@ -152,8 +154,9 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
 
 
 def _keep_evaluated_shapes(changes: Changes) -> None:
-    """Before another evaluation within the handlers of one: where it copies an object anew whose shape is
-    from this one, Blender goes on with the mesh without modifiers and shape keys (seen on 4.2 to 5.2)."""
+    """Keeps shapes before another evaluation within the handlers of one. Where that copies an object again
+    whose shape is from this one, Blender would show the mesh without modifiers and shape keys (seen on 4.2 to
+    5.2)."""
     for obj in bpy.data.objects:
         if obj.session_uid in changes.objects:
             obj.update_tag(refresh={"DATA"})
@@ -163,8 +166,8 @@ def _keep_evaluated_shapes(changes: Changes) -> None:
 
 
 def _subscribe_behind_others(event: str, function: Callable) -> None:
-    """Before an event: has Blender call `_LAST` after all others where some come behind `function`. Two of
-    them, as Blender leaves out the one behind a function that takes itself off."""
+    """Before an event: has Blender call `_LAST` after all other functions, if there are others behind
+    `function`. `_LAST` has two functions, as Blender skips the one behind a function that removes itself."""
     if current.seen is not None or events.is_last(event, function):
         return
     are_there = events.is_last(event, _LAST[-1])
@@ -178,18 +181,19 @@ def _subscribe_behind_others(event: str, function: Callable) -> None:
 
 
 def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
-    """At the end of Sinew's own reaction to an event."""
+    """Called at the end of Sinew's own reaction to an event."""
     are_called = events.is_last(event, _LAST[-1])
     current.seen = names_of_changed_meshes(depsgraph) if are_called else None
 
 
 @persistent
 def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """What handlers behind Sinew's change, Blender evaluates without telling anybody, but has it in its list
-    of updates at once. A mesh that was there before they were called may have changed once more.
+    """Reacts to what handlers behind Sinew's change: Blender evaluates it without an event, but lists it
+    among the updates at once. A mesh that was listed before these were called may have changed again.
 
-    What they pose or move is seen with the next event, where Sinew deforms after the update: to have Blender
-    evaluate within a handler can crash it (4.2)."""
+    Where Sinew deforms after the update, what they pose or move is handled at the next event: evaluating
+    within a handler can crash Blender (4.2).
+    """
     seen, current.seen = current.seen, None
     if seen is None:
         return
@@ -199,7 +203,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
                 if not state.is_as_noted(obj):
-                    # Its modifiers, say: that decides who computes its normals.
+                    # For example its modifiers, which decide who computes its normals.
                     new.objects.add(obj.session_uid)
                 if obj.data.name_full not in names:
                     continue
@@ -209,7 +213,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     new.meshes.add(obj.data.session_uid)
         if new.meshes or new.objects:
             new.touched |= new.meshes | new.objects
-            # What Sinew does itself came before them.
+            # Sinew's own changes came before these handlers.
             current.expected -= new.meshes
             _react(depsgraph, new, may_react)
         for obj in unread:
@@ -217,7 +221,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                 state = session.state_of(obj)
                 if state is not None:
                     state.needs_recheck = True
-                    # What stands in front is evaluated anew only now.
+                    # The upstream proxy is evaluated again only now.
                     state.evaluation.changed_unannounced |= obj.data.name_full not in seen
     _end_event()
 
@@ -228,8 +232,8 @@ def after_others_again(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -
 
 
 def check_unannounced() -> float:
-    """What Blender evaluates without telling anybody, in a window is seen to a moment later: what another
-    add-on's handler changed behind Sinew's, and a view layer that is shown for the first time."""
+    """Timer of a window for what Blender evaluates without an event: what another add-on's handler changed
+    behind Sinew's, and a view layer that is shown for the first time."""
     if any(state.evaluation.changed_unannounced for _obj, state in current.pairs):
         session.refresh_between_steps(bpy.context)
     if session.needs_first_evaluations():
@@ -256,7 +260,7 @@ def before_undo(*_args: object) -> None:
         between = list(filter(properties.has_sinew, references.noted()))
         session.forget_for_step({obj.session_uid for obj in between})
         for obj in between:
-            point_store.let_go(obj)
+            point_store.clear_references(obj)
         references.forget()
 
 
@@ -268,7 +272,7 @@ def on_undone(*_args: object) -> None:
 
 @persistent
 def on_data_replaced(*_args: object) -> None:
-    """Loading: every reference is void and what holds points has others."""
+    """On loading: every reference is invalid, and the point buffers are others."""
     with reaction():
         current.is_saving = False
         session.forget()
@@ -278,16 +282,16 @@ def on_data_replaced(*_args: object) -> None:
 def on_loaded(*_args: object) -> None:
     with reaction():
         session.forget()
-        # Its first step of undo comes after this.
+        # The file's first undo step comes after this.
         references.forget()
-        overrides.take_back()
+        overrides.restore()
         note.remove()
         if not session.objects_with_sinew(Changes()):
             current.all_use_builtin = True
             session.unsubscribe_from_frames()
             return
-        # This evaluation is the file's first: as the one that Blender makes otherwise it is one of time, too,
-        # or poses that differ from their keys would stay.
+        # This is the file's first evaluation. Like the one that Blender would make, it has to be one of time,
+        # too, or poses that differ from their keys would stay.
         for obj in bpy.data.objects:
             if obj.animation_data is not None:
                 obj.update_tag(refresh={"TIME"})
@@ -296,17 +300,17 @@ def on_loaded(*_args: object) -> None:
 
 @persistent
 def on_imported(*_args: object) -> None:
-    """Scripts can go to another frame without any other event."""
+    """Importing scripts can change the frame without any other event."""
     session.subscribe_to_frames()
 
 
 @persistent
 def on_save(*_args: object) -> None:
-    """From here to on_saved() nothing of Sinew's changes the file, whatever Blender evaluates for it, such as
-    its thumbnail."""
+    """From here to on_saved() Sinew changes nothing in the file, even if Blender evaluates it, as for its
+    thumbnail."""
     with reaction() as may_react:
         if may_react and not current.is_idle:
-            # What the artist changed last is seen apart from what is changed for the file.
+            # So that the artist's last changes are seen separately from those made for saving.
             bpy.context.evaluated_depsgraph_get()
             session.prepare_for_save()
             current.is_saving = True
@@ -322,7 +326,7 @@ def on_saved(*_args: object) -> None:
 
 
 def begin_export() -> None:
-    """From here to end_export() the file is as a saved one, and frames go on without Sinew."""
+    """From here to end_export() the file is as in a saved state, and frames do without Sinew."""
     with reaction() as may_react:
         if may_react and not (current.is_idle or current.is_saving):
             bpy.context.evaluated_depsgraph_get()
@@ -330,7 +334,7 @@ def begin_export() -> None:
             note.remove()
             current.is_saving = True
             if not bpy.app.background:
-                # An exporter that fails does not say that it has ended.
+                # An exporter that fails does not announce its end.
                 bpy.app.timers.register(end_export, first_interval=0.0)
 
 
@@ -349,7 +353,7 @@ def on_render_start(*_args: object) -> None:
 
 @persistent
 def on_render_end(*_args: object) -> None:
-    """In the render's thread, where it has one: what waited for its end is for the main one."""
+    """Runs in the render's thread, if it has one: what waited for its end is left to the main thread."""
     with reaction():
         current.is_rendering = False
         precomputations.waits = bpy.app.background
@@ -372,7 +376,7 @@ def _after_render() -> float | None:
 
 _LAST = (after_others, after_others_again)
 events.FRAME_HANDLERS.update(frame_change_pre=before_frame_change, frame_change_post=on_frame_change)
-events.GATE_HANDLERS.update(frame_change_pre=close_gate, frame_change_post=open_gate)
+events.GATE_HANDLERS.update(frame_change_pre=suspend_modifiers, frame_change_post=restore_modifiers)
 _HANDLERS = {
     "depsgraph_update_pre": before_update,
     "depsgraph_update_post": on_depsgraph_update,
@@ -395,7 +399,7 @@ if events.IMPORTS_ARE_ANNOUNCED:
 
 def register() -> None:
     precomputing.begin()
-    subscribers.precomputation_asked.append(precompute_watch.begin)
+    subscribers.precomputation_requested.append(precompute_watch.begin)
     session.forget()
     properties.listeners.method_changed = session.setting_changed
     properties.listeners.enabled_changed = session.enabled_changed
@@ -408,11 +412,11 @@ def register() -> None:
 
 def adopt_open_file() -> None:
     """Takes over the objects of a file that was open before Sinew was registered."""
-    # While Blender starts, its data is out of reach, and loading the first file takes care of it.
+    # While Blender starts, its data is not accessible, and loading the first file does this.
     if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
         note.remove()
         for obj in filter(properties.has_sinew, bpy.data.objects):
-            # Without Sinew, Blender went on without what keys set of its settings.
+            # Without Sinew, Blender did not evaluate the keys of its settings.
             if any(path.startswith("sinew.") for path in animated_paths(obj)):
                 obj.update_tag(refresh={"TIME"})
         session.refresh(bpy.context)
@@ -420,9 +424,9 @@ def adopt_open_file() -> None:
 
 def unregister() -> None:
     precomputing.end()
-    subscribers.precomputation_asked.remove(precompute_watch.begin)
-    if bpy.app.timers.is_registered(precompute_watch.look):
-        bpy.app.timers.unregister(precompute_watch.look)
+    subscribers.precomputation_requested.remove(precompute_watch.begin)
+    if bpy.app.timers.is_registered(precompute_watch.check):
+        bpy.app.timers.unregister(precompute_watch.check)
     session.forget()
     if bpy.app.timers.is_registered(check_unannounced):
         bpy.app.timers.unregister(check_unannounced)

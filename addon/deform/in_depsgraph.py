@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew within Blender's own evaluation: the driver of pose_driver requests a mesh's points, after the poses
-and before the modifiers, and they are written into evaluated data.
+"""Sinew within Blender's evaluation: pose_driver's driver requests a mesh's points after the poses and before
+the modifiers, and they are written into evaluated data.
 
-Blender evaluates on many threads, and for a render beside the window. So only evaluated data is read here:
-an original may go at any moment. What is out of the ordinary, such as changed weights, is for the handlers,
-which come afterwards and may change the file.
+Blender evaluates on many threads, and renders beside the window. So this code reads evaluated data only: an
+original may go at any moment. Anything unusual, such as changed weights, is left to the handlers, which run
+afterwards and may change the file.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _NO_NORMALS = np.empty((0, 3), dtype=np.float32)
 
 
 class _Thread(threading.local):
-    """What is kept for each of Blender's threads: the object that was named last.
+    """What is kept for each of Blender's threads: the object named last.
 
-    Blender's threads are none of Python's: each call from one makes a state of Python's for it and takes it
-    away again, 50 to 100 us on two cores. Here it stays until the thread ends.
+    Python does not know Blender's threads: each call from one creates a Python thread state and removes it
+    again, which takes 50 to 100 us on two cores. Here the state stays until the thread ends.
     """
 
     def __init__(self) -> None:
@@ -38,13 +38,13 @@ class _Thread(threading.local):
 
 
 class DepsgraphRequests:
-    """What the driver's last variables call: the first names the object, the second, on the same thread, its
-    mesh."""
+    """The functions that the driver's last variables call: the first names the object, the second, on the
+    same thread, its mesh."""
 
     def __init__(self) -> None:
         self._thread = _Thread()
-        # By the object's name, which its evaluated copies have too. Replaced, never changed: other threads
-        # may be reading it.
+        # By the object's name, which its evaluated copies share. The dict is replaced, never changed, as
+        # other threads may be reading it.
         self._objects: dict[str, SkinnedObject] = {}
 
     def set_objects(self, objects: dict[str, SkinnedObject]) -> None:
@@ -56,7 +56,7 @@ class DepsgraphRequests:
     def mesh_requested(self, evaluated_mesh: bpy.types.Mesh) -> None:
         evaluated, self._thread.requesting = self._thread.requesting, None
         if evaluated is None or not (evaluated.is_evaluated and evaluated_mesh.is_evaluated):
-            # Somebody else reads the property.
+            # Something other than the driver reads the property.
             return
         skinned = self._objects.get(evaluated.name)
         if skinned is None:
@@ -64,14 +64,14 @@ class DepsgraphRequests:
         try:
             deform(evaluated, evaluated_mesh, skinned)
         except Exception as error:
-            # The handlers see to it, and the panel says so.
+            # The handlers deal with it, and the panel shows it.
             skinned.evaluation.fail(error)
 
 
 def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> None:
     """Writes the points into the evaluated mesh, or into the evaluated point buffer.
 
-    Does nothing where something is out of the ordinary, and notes why: that is for update().
+    If anything is unusual it writes nothing and notes the reason, for update().
     """
     if not skinned.plan.is_in_depsgraph:
         return
@@ -82,7 +82,7 @@ def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedOb
 
 
 def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> str:
-    """Why it is for update() to see to; empty where the points are written."""
+    """Returns why update() has to deal with the object; empty where the points are written."""
     started, settings, bound = time.perf_counter(), evaluated.sinew, skinned.bound
     # Evaluated ones, as the driver reads them.
     modifiers = [(replaced, replaced.armature) for replaced in settings.replaced_modifiers]
@@ -116,14 +116,14 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     shown.first_point = out[0].tobytes()
     skinned.evaluation.succeed(mesh)
     shown.milliseconds = 1000.0 * (time.perf_counter() - started)
-    # Asked for only once an animation chooses the method.
+    # An animation can choose a method whose data has not been requested yet.
     is_new_need = skinned.plan.state is not State.WAITING and pose.lacks_data(bound, frames)
     return "what its method needs is not computed" if is_new_need else ""
 
 
 def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
-    """Another add-on's handler touched the mesh, for which there is no event: it is a new copy, without the
-    points that were written last."""
+    """Notes a mesh that another add-on's handler changed, for which there is no event: the evaluated mesh is
+    a new copy, without the points that were written last."""
     evaluation, first_point = skinned.evaluation, skinned.shown.first_point
     if not (evaluation.is_event_known or skinned.plan.in_buffer) and first_point is not None:
         evaluation.changed_unannounced |= out[0].tobytes() != first_point
@@ -133,8 +133,8 @@ def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
 def _memory_to_write(
     settings: properties.SinewSettings, mesh: bpy.types.Mesh, skinned: SkinnedObject
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Of the points and of the normals, none where Blender computes these: in the evaluated mesh, or in the
-    evaluated point buffer. None where it is not there, or not for as many."""
+    """The memory of the points and of the normals (empty where Blender computes these), in the evaluated mesh
+    or in the evaluated point buffer. None where it does not exist or has another size."""
     points, count = len(skinned.bound.source.points), skinned.normal_count
     if not skinned.plan.in_buffer:
         to_points = mesh_io.vectors_in(mesh, skinned.attribute)
@@ -146,7 +146,7 @@ def _memory_to_write(
             return None
         return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None
     buffer = settings.point_buffer
-    # What an evaluated object has as its data, Blender does not always mark as evaluated.
+    # Blender does not always mark an evaluated object's data as evaluated, so the object itself is checked.
     if buffer is None or not buffer.is_evaluated:
         return None
     stored = mesh_io.vectors_in(buffer.data, mesh_io.POSITION)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which methods an object is deformed by, and what they need of its mesh."""
+"""The methods that deform an object, and what they need of its mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..io.animation_paths import animated_paths
 
 
 def methods_of(obj: bpy.types.Object) -> list[str]:
-    """Those that its settings name now, each once."""
+    """Returns the methods that its settings name now, each once."""
     settings = properties.of(obj)
     own = (replaced.method for replaced in list(settings.replaced_modifiers)[1:])
     named = [settings.method, settings.mixed_method, *own]
@@ -19,10 +19,10 @@ def methods_of(obj: bpy.types.Object) -> list[str]:
 
 
 def is_method_animated(obj: bpy.types.Object) -> bool:
-    """Whether keys or drivers choose one of them."""
+    """Whether keys or drivers choose one of the methods."""
     return any(path.startswith("sinew.") and path.endswith("method") for path in animated_paths(obj))
 
 
 def needs_surface(obj: bpy.types.Object) -> bool:
-    """Whether one of its methods needs the mesh's triangles; of animated ones, any could be set."""
+    """Whether one of its methods needs the mesh's triangles. If methods are animated, any could be chosen."""
     return any("topology" in METHODS[name].needs for name in methods_of(obj)) or is_method_animated(obj)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The originals of what an evaluation lists.
+"""Finds the originals of what an evaluation lists.
 
-What a handler deletes, Blender frees at once, and goes on listing its evaluated copy: `original` of that
-leads nowhere, and to read on can crash Blender.
+Blender frees at once what a handler deletes, but goes on listing its evaluated copy. The `original` of that
+is a dangling pointer, and reading it can crash Blender.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ _LISTS = (
 
 
 def finder(event: str, function: Callable) -> Find:
-    """What finds the original of an evaluated object, mesh, shape key, armature or action within a function
-    that Blender calls at an event: None where a function of others may have deleted or renamed it."""
+    """Returns a function that finds the original of an evaluated object, mesh, shape key, armature or action,
+    for use in `function`, which Blender calls at the event. The function returns None where another add-on's
+    function may have deleted or renamed the original."""
     return _by_name if events.others_precede(event, function) else _at_once
 
 

@@ -1,33 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What decides how an object is deformed: one function of plain facts, without Blender."""
+"""Decides how an object is deformed: one pure function of plain facts, without Blender."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
 
-# Tools of these modes work through the Armature modifier, which deforms the mesh meanwhile.
-MODES_OF_THE_MODIFIER = frozenset({"EDIT", "SCULPT"})
+# In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
+ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
 
 
 class State(Enum):
     """Who deforms an object, and when."""
 
-    OFF = "off"  # the user switched Sinew off, or it failed
+    OFF = "off"  # the user switched Sinew off, or Sinew failed
     BUILT_IN = "built-in"  # the Armature modifier deforms, while Sinew is on
-    WAITING = (
-        "waiting"  # Sinew, by the Armature modifier's method until what the chosen one needs is computed
-    )
-    IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the rule
+    WAITING = "waiting"  # Sinew, with the Armature modifier's method until the chosen one's data is computed
+    IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the usual case
     AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
 
 
 @dataclass(frozen=True)
 class Normals:
-    """Those that Sinew gives with the points.
+    """The normals that Sinew gives along with the points.
 
-    domain       POINT or CORNER: what has a normal of its own; empty for none: Blender computes them
-    are_skinned  they move with the skin, instead of being those of the deformed surface
+    domain                  POINT or CORNER: the elements that have normals; empty where Blender computes them
+    are_skinned             skinned from the rest normals, not computed from the deformed surface
     are_for_viewport_alone  in renders Blender computes them
     """
 
@@ -38,11 +36,13 @@ class Normals:
 
 @dataclass(frozen=True)
 class Plan:
-    """reason        one clause for the panel; empty for the rule and for what the user chose
-    in_buffer     an object of their own stores the points (point_buffer.py), not an attribute of the mesh
-    after_update  where Sinew deforms: not within Blender's evaluation
-    normals       those that it gives with the points
-    normals_reason  why Blender does, though Sinew was to; a clause for the panel
+    """Who deforms an object, when, and where its points and normals are stored.
+
+    reason          one clause for the panel; empty for the usual case and for what the user chose
+    in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
+    after_update    Sinew deforms after Blender's evaluation, not within it
+    normals         the normals given along with the points
+    normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
     """
 
     state: State
@@ -64,25 +64,26 @@ class Plan:
 
 @dataclass(frozen=True)
 class ObjectFacts:
-    """What plan() has to know of an object.
+    """What plan() has to know about an object.
 
-    is_linked            it belongs to another file, without a library override
-    builtin_is_faster    its Armature modifiers have the same shape in less time
-    has_upstream         modifiers, absolute shape keys or a parent change the mesh ahead of Sinew
-    upstream_changes_weights  and can change its weights from frame to frame
-    mesh_is_shared       other objects use the mesh
-    mesh_is_editable     attributes can be added to the mesh: it is not linked
-    is_comparison_copy   a copy that a comparison shows
-    visibility_is_keyed  an animation decides when one of the Armature modifiers is on
-    views_differ         one of them is on in the viewport alone or in renders alone
-    safe_mode            nothing of Sinew may run within Blender's evaluation
-    failure              what failed there; empty where nothing did
-    waits_for            what its method needs and is not computed yet, as a clause; empty where nothing is
-    gives_normals        the user chose that Sinew computes normals
-    skins_normals        and that they move with the skin
-    normals_domain       POINT or CORNER: which draw the mesh; empty where Blender computes them in any case
-    normals_obstacle     why Blender has to, as a clause; empty where it need not
-    normals_for_viewport_alone  a modifier that is on in renders alone needs Blender's
+    is_linked                   it belongs to another file, without a library override
+    builtin_is_faster           its Armature modifiers give the same shape in less time
+    has_upstream                modifiers, absolute shape keys or a parent change the mesh before Sinew
+    upstream_changes_weights    these can also change its weights from frame to frame
+    mesh_is_shared              other objects use the mesh
+    mesh_is_editable            attributes can be added to the mesh: it is not linked
+    is_comparison_copy          it is a copy that a comparison shows
+    visibility_is_keyed         an animation switches one of the Armature modifiers on and off
+    views_differ                an Armature modifier is on only in the viewport or only in renders
+    safe_mode                   nothing of Sinew may run within Blender's evaluation
+    failure                     the error within Blender's evaluation; empty if there was none
+    waits_for                   what its method needs and is not computed yet, as a clause; empty if nothing
+    gives_normals               the user chose that Sinew computes normals
+    skins_normals               the user chose that normals are skinned
+    normals_domain              POINT or CORNER: the normals that draw the mesh; empty where Blender always
+                                computes them
+    normals_obstacle            why Blender has to compute the normals, as a clause; empty where it need not
+    normals_for_viewport_alone  a modifier that is on only in renders needs Blender's normals
     """
 
     enabled: bool = True
@@ -115,9 +116,9 @@ def plan(facts: ObjectFacts) -> Plan:
             "Linked from another file: its Armature modifier deforms it; make a library override to use Sinew"
         )
         return Plan(State.BUILT_IN, reason)
-    if facts.mode in MODES_OF_THE_MODIFIER:
+    if facts.mode in ARMATURE_MODIFIER_MODES:
         return Plan(State.BUILT_IN, "In this mode the Armature modifier deforms it")
-    # Its tools look for bones behind an Armature modifier that is on: which is not Sinew's to decide here.
+    # Weight Paint finds bones through an Armature modifier that is on, and here the animation switches it.
     if facts.mode == "WEIGHT_PAINT" and facts.visibility_is_keyed:
         reason = "The visibility of its Armature modifier is animated: in this mode that shows its own shape"
         return Plan(State.BUILT_IN, reason)
@@ -128,7 +129,7 @@ def plan(facts: ObjectFacts) -> Plan:
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
     normals, normals_reason = _normals(facts)
-    # The route stays while it waits: when that ends, its method is all that changes.
+    # The route does not change while it waits: afterwards only the method changes.
     state = State.AFTER_UPDATE if reason else State.IN_DEPSGRAPH
     if facts.waits_for:
         state = State.WAITING
@@ -143,7 +144,7 @@ def plan(facts: ObjectFacts) -> Plan:
 
 
 def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
-    """Plan.normals and Plan.normals_reason."""
+    """Returns Plan.normals and Plan.normals_reason."""
     if not (facts.gives_normals and facts.normals_domain):
         return Normals(), ""
     reasons = (
@@ -157,7 +158,7 @@ def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
-    """Empty where Sinew can deform within Blender's evaluation."""
+    """Returns the reason; empty where Sinew can deform within Blender's evaluation."""
     reasons = (
         (facts.safe_mode, "Safe mode"),
         (bool(facts.failure), f"Within Blender's evaluation it failed: {facts.failure}"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What decides the part of each Armature modifier in one evaluation's shape: pose, method, scale rule."""
+"""Reads the inputs of each Armature modifier in one evaluation: pose, method, scale rule."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .bound import Bound
 from .skinned_object import SkinnedObject
 
 Modifiers = list[tuple[properties.SinewReplacedModifier, bpy.types.Object | None]]
-"""What is kept of each Armature modifier, and its armature."""
+"""What Sinew stores about each Armature modifier, and its armature."""
 
 Frames = list[SkinStageFrame | None]
 """One for each Armature modifier, None for one that takes no part."""
@@ -32,12 +32,13 @@ def read(
     skinned: SkinnedObject,
     mode: str,
 ) -> Frames | None:
-    """None where it is unknown, and the last shape stays.
+    """Returns None where the pose is unknown, and the last shape stays.
 
     settings   the object's, evaluated
     modifiers  evaluated
     mode       the depsgraph's
-    Raises SinewError where a driver sets a method or a scale rule that there is not.
+
+    Raises SinewError where a driver sets a method or a scale rule that does not exist.
     """
     method, scale_rule = settings.method, settings.scale_rule
     if not (method and scale_rule):
@@ -55,7 +56,7 @@ def read(
             continue
         space = armature_io.bones_from_model(evaluated, armature)
         if space is None:
-            # An armature scaled to nothing for a moment.
+            # An armature can be scaled to zero for a moment.
             return None
         pose = armature_io.read_pose(armature, stage.binding.bones)
         own = method if not frames else properties.method_of_modifier(method, replaced.method, is_first=False)
@@ -63,7 +64,7 @@ def read(
         mix = settings.mixed_method if is_mixed else ""
         data = stage.binding.vertex_data
         if data is not None and not data.is_ready(own):
-            # As the modifier itself has it, until what the method needs is computed.
+            # The modifier's own method, until what the chosen one needs is computed.
             own, mix = attach.method_of(evaluated.modifiers[replaced.name]), ""
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
@@ -73,7 +74,7 @@ def read(
 
 
 def of_modifiers(obj: bpy.types.Object, frames: Frames) -> Frames:
-    """The same poses as its Armature modifiers themselves deform by them, without a stage behind."""
+    """Returns the same poses with the methods of the Armature modifiers themselves, without stages."""
     methods = [attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj)]
     return [
         frame and replace(frame, method=method, mix="", parameters={}, scale_rule=BLENDER_4.name)
@@ -96,7 +97,7 @@ def _parameters(
 
 
 def lacks_data(bound: Bound, frames: Frames | None) -> bool:
-    """Whether one of the methods was asked for numbers of vertices that it does not have."""
+    """Whether one of the methods needed vertex data that it does not have."""
     for stage, frame in zip(bound.skin_stack.skin_stages, frames or (), strict=False):
         data = stage.binding.vertex_data
         if data is not None and data.missed and frame is not None and not all(map(data.has, data.missed)):
@@ -105,10 +106,11 @@ def lacks_data(bound: Bound, frames: Frames | None) -> bool:
 
 
 def stage_values(settings: properties.SinewSettings) -> StageValues:
-    """The parameters of the stages that are on and follow the blend.
+    """Returns the parameters of the active stages that follow the blend.
 
     settings  the object's, evaluated
-    Raises SinewError where a driver sets a choice that there is not.
+
+    Raises SinewError where a driver sets a choice that does not exist.
     """
     names = stage_settings.names_on(settings, among=ORDER)
     if not names:

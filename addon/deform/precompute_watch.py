@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A timer of the window's that sees to precomputations as long as one runs, and gives objects what comes of
-it."""
+"""A timer of the window that watches precomputations while one runs, and gives objects their results."""
 
 from __future__ import annotations
 
@@ -16,30 +15,30 @@ from .session import current
 from .skinned_object import SkinnedObject
 
 SECONDS = 0.1
-# As long nothing may have changed before data is made anew of a mesh that changed.
+# A changed mesh's data is computed again after so many seconds without a change.
 PAUSE = 0.4
 _STROKES = ("PAINT_OT_", "SCULPT_OT_")
 
 
 def begin() -> None:
-    """As long as there is something to see to."""
-    if not bpy.app.background and not bpy.app.timers.is_registered(look):
-        bpy.app.timers.register(look, first_interval=SECONDS, persistent=True)
+    """Starts the timer, which runs as long as there is something to watch."""
+    if not bpy.app.background and not bpy.app.timers.is_registered(check):
+        bpy.app.timers.register(check, first_interval=SECONDS, persistent=True)
 
 
-def look() -> float | None:
-    """Seconds to the next time; None where nothing is to be seen to any more."""
+def check() -> float | None:
+    """Returns the seconds to the next call; None where nothing is left to watch."""
     if current.is_saving or current.is_rendering:
         return SECONDS
     has_ended = is_outdated = False
     for obj, skinned in list(current.pairs):
         try:
-            # A render may have made it meanwhile.
+            # A render may have computed it meanwhile.
             if precomputing.take_results(obj, skinned) or skinned.has_new_data:
                 has_ended = skinned.needs_apply = True
             is_outdated |= _see_to_outdated(obj, skinned)
         except ReferenceError:
-            # Deleted since the objects were listed.
+            # The object was deleted since the list was made.
             continue
     if has_ended:
         session.refresh_between_steps(bpy.context)
@@ -49,7 +48,7 @@ def look() -> float | None:
 
 def _see_to_outdated(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
     depsgraph = bpy.context.view_layer.depsgraph
-    # While an object is off, nothing of it is read that its data could be made from.
+    # While an object is off, nothing that its data could be computed from is read.
     if depsgraph is None or skinned.plan.state is State.OFF:
         return False
     before = 0.0 if _is_painting() else time.monotonic() - PAUSE
@@ -57,7 +56,7 @@ def _see_to_outdated(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
 
 
 def _is_painting() -> bool:
-    """Whether a stroke goes on."""
+    """Whether a paint or sculpt stroke is in progress."""
     windows = bpy.context.window_manager.windows
     return any(
         operator.bl_idname.startswith(_STROKES) for window in windows for operator in window.modal_operators
@@ -65,18 +64,18 @@ def _is_painting() -> bool:
 
 
 def stop() -> None:
-    """What runs, the artist does not want; it starts again by go_on()."""
+    """Stops what runs, because the artist does not want it; resume() starts it again."""
     precomputations.stop()
     _refresh()
 
 
-def go_on() -> None:
+def resume() -> None:
     precomputing.forget_stopped()
     _refresh()
 
 
 def finish(context: bpy.types.Context) -> None:
-    """Returns when all objects have what their methods need: for operators that go through frames."""
+    """Returns when all objects have what their methods need; for operators that go through frames."""
     if not all(precomputing.has_all(obj, skinned) for obj, skinned in current.pairs):
         with precomputing.waiting():
             session.refresh(context)

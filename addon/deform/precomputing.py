@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What methods need computed before their first frame: asked for, and watched while a thread computes it.
+"""Requests what methods need computed before their first frame, and takes the results of the threads that
+compute it.
 
-In a window it is computed beside the artist's work; the object meanwhile has its Armature modifier's shape,
-or the one by data of the mesh as it was. Scripts, commands and renders can not look later: they wait.
+In a window it is computed while the artist works; meanwhile the object has its Armature modifier's shape, or
+the shape from the data of the mesh before it changed. Scripts, commands and renders wait for it instead.
 """
 
 from __future__ import annotations
@@ -30,32 +31,33 @@ from .method_needs import is_method_animated, methods_of
 from .skinned_object import SkinnedObject
 
 VARIABLE = "SINEW_CACHE"
-# Of all files in the folder: about a hundred characters of 100,000 vertices under three methods.
+# For all files in the folder: about a hundred characters of 100,000 vertices under three methods.
 CACHE_BYTES = 512 * 2**20
-# Of one mesh in the .blend file.
+# For one mesh in the .blend file.
 MOST_BYTES_IN_FILE = 16 * 2**20
 
 
 def request(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> None:
-    """Has what the object's methods need found, or made. Where it is there for the mesh as it was, the
-    watcher has it made anew once the artist pauses."""
-    is_asked = False
+    """Loads or computes what the object's methods need. Where there is data of the mesh before it changed,
+    the watcher has it computed again once the artist pauses."""
+    is_requested = False
     for armature, data, method in _needed(obj, skinned):
         if data.is_current(method):
             continue
-        is_asked = True
+        is_requested = True
         if precomputations.waits or not data.has(method):
             _request(obj, armature, data, method, depsgraph)
-    if is_asked and not precomputations.waits and is_main_thread():
-        notify(subscribers.precomputation_asked)
+    if is_requested and not precomputations.waits and is_main_thread():
+        notify(subscribers.precomputation_requested)
 
 
 def request_outdated(
     obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, before: float
 ) -> bool:
-    """Starts to make anew what belongs to the mesh as it was. Whether there is such data.
+    """Starts to compute again the data that belongs to the mesh before it changed. Returns whether there is
+    any.
 
-    before  of time.monotonic(): only of meshes that were read before
+    before  time.monotonic(): only for meshes that were read before it
     """
     is_there = False
     for armature, data, method in _needed(obj, skinned):
@@ -67,12 +69,12 @@ def request_outdated(
 
 
 def has_all(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
-    """Whether the data that its methods need is there, of the mesh as it is."""
+    """Whether the data that its methods need is there, for the mesh as it is now."""
     return all(data.is_current(method) for _armature, data, method in _needed(obj, skinned))
 
 
 def take_results(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
-    """Whether what was computed for the object has come to an end."""
+    """Takes finished results. Returns whether a computation for the object has ended."""
     has_ended = False
     for _armature, data, method in _needed(obj, skinned):
         try:
@@ -88,19 +90,19 @@ def take_results(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
 
 
 def running(obj: bpy.types.Object, skinned: SkinnedObject) -> dict[str, Precomputation]:
-    """What is computed for the object now, by what people call it."""
+    """Returns what is being computed for the object now, by its name in the panel."""
     runs = ((PROVIDERS[method].what, data.running(method)) for _arm, data, method in _needed(obj, skinned))
     return {what: run for what, run in runs if run is not None}
 
 
 def stopped(obj: bpy.types.Object, skinned: SkinnedObject) -> list[str]:
-    """What the artist has stopped, as people call it."""
+    """Returns what the artist has stopped, by its name in the panel."""
     found = (PROVIDERS[m].what for _armature, data, m in _needed(obj, skinned) if data.is_stopped(m))
     return list(dict.fromkeys(found))
 
 
 def waits_for(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
-    """What its methods need and do not have, as a clause for the panel; empty where they have all."""
+    """Returns what its methods need and lack, as a clause for the panel; empty where they lack nothing."""
     if skinned is None:
         return ""
     missing = [(data, method) for _armature, data, method in _needed(obj, skinned) if not data.has(method)]
@@ -115,15 +117,15 @@ def waits_for(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
 
 
 def store_in_meshes(pairs: list[tuple[bpy.types.Object, SkinnedObject | None]]) -> None:
-    """Before the file is saved: what objects use goes with their meshes.
+    """Stores the data that objects use in their meshes, before the file is saved.
 
-    pairs  all objects that have Sinew; None for one of which nothing is known now: its mesh keeps what it has
+    pairs  all objects that have Sinew; None where nothing is known of one now: its mesh keeps what it has
     """
     of_meshes: dict[bpy.types.Mesh, dict[str, np.ndarray] | None] = {}
     for obj, skinned in pairs:
         mesh = obj.data
         if properties.is_copy(obj):
-            # It goes with its comparison, and the mesh is the original's.
+            # A copy is removed with its comparison, and its mesh belongs to the original.
             continue
         if skinned is None:
             of_meshes[mesh] = None
@@ -138,7 +140,7 @@ def store_in_meshes(pairs: list[tuple[bpy.types.Object, SkinnedObject | None]]) 
 
 @contextlib.contextmanager
 def waiting() -> Iterator[None]:
-    """Inside, whoever needs a result waits for it."""
+    """Context in which results are waited for."""
     before, precomputations.waits = precomputations.waits, True
     try:
         yield
@@ -152,24 +154,25 @@ def forget_stopped() -> None:
 
 
 def begin() -> None:
-    """On registration."""
+    """Called on registration."""
     precomputations.waits = bpy.app.background
     open_cache()
 
 
 def open_cache() -> None:
-    """In the folder that the environment, or else the preferences name."""
+    """Opens the cache in the folder that the environment or else the preferences name."""
     folder = _cache_folder()
     precomputations.cache = None if folder is None else FileCache(folder, CACHE_BYTES)
 
 
 def end() -> None:
-    """Before Blender's data or Blender itself goes: no thread is at work any more."""
+    """Ends all threads, before Blender's data or Blender itself goes away."""
     precomputations.cancel_all()
 
 
 def _needed(obj: bpy.types.Object, skinned: SkinnedObject) -> list[tuple[bpy.types.Object, VertexData, str]]:
-    """The armature, the data and the method of each Armature modifier, for methods that keep something."""
+    """Returns the armature, the data and the method for each Armature modifier and each method with vertex
+    data."""
     found = []
     methods = methods_of(obj)
     replaced_modifiers = properties.of(obj).replaced_modifiers
@@ -195,7 +198,7 @@ def _request(
     if data.weighting.depends_on_points:
         found = armature_io.bones_from_model(obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
         if found is None:
-            # An armature scaled to nothing for a moment.
+            # An armature can be scaled to zero for a moment.
             return
         space = found
     if data.triangles is not None:
@@ -203,8 +206,8 @@ def _request(
 
 
 def _cache_folder() -> Path | None:
-    """That of the extension where nobody names one, or of the user where Sinew is a package of Python's; None
-    for none."""
+    """Returns the named folder; else that of the extension, or of the user where Sinew is a Python package;
+    None for no cache."""
     given = os.environ.get(VARIABLE)
     if given is not None:
         return Path(given) if given not in ("", "0") else None

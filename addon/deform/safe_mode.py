@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Safe mode: nothing of Sinew runs within Blender's evaluation, on threads of Blender's."""
+"""Safe mode: nothing of Sinew runs within Blender's evaluation, on Blender's threads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def is_on() -> bool:
 
 
 def set_forced(on: bool | None) -> None:
-    """Whatever the environment and the preference say; None: as they say. Takes effect with the next
-    evaluation of an object that changed, or with session.refresh()."""
+    """Overrides the environment and the preference; None: no override. Takes effect with the next evaluation
+    of an object that changed, or with session.refresh()."""
     global _forced
     _forced = on

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All skinned objects of the open file, brought up to date with an evaluation, and made ready for saving."""
+"""All skinned objects of the open file: brings them up to date with an evaluation, and prepares them for
+saving."""
 
 from __future__ import annotations
 
@@ -30,26 +31,26 @@ Pairs = list[tuple[bpy.types.Object, SkinnedObject]]
 
 @dataclass
 class Session:
-    """What is known of the open file. Objects are referred to between events only; undo and loading make all
-    references void: loading forgets everything, undo what undo.py does not keep.
+    """What is known of the open file. References to objects are valid only between events; undo and loading
+    make all of them invalid. Loading forgets everything, undo everything that undo.py does not keep.
 
-    objects           those that have Sinew; None where that has to be found out
+    objects           the objects that have Sinew; None where they have to be found again
     object_count      how many objects the file had then
     skinned           what is known of those that are on, by session_uid
-    pairs             both
-    depsgraph         the address of the one last seen
-    view_layers       those of which an evaluation was seen, as identity_of_layer()
-    waiting           the session_uid of those that wait for another evaluation
+    pairs             these objects, each with what is known of it
+    depsgraph         the address of the depsgraph last seen
+    view_layers       those whose evaluation was seen, as from identity_of_layer()
+    waiting           the session_uid of the objects that wait for another evaluation
     missed            changes of evaluations that were not reacted to
-    expected          meshes that Blender lists as changed because a setting of Sinew's was
+    expected          meshes that Blender lists as changed because Sinew changed one of its settings
     on_before_saving  the objects that Sinew deformed before the file was prepared for saving
-    is_saving         Blender writes the file: nothing may change
+    is_saving         Blender is writing the file: nothing may change
     is_rendering      between the events of a render's start and end
     must_refresh      something waits for the end of a render
     seen              the meshes that had changed before functions behind Sinew's were called
-    is_after_step     no evaluation was seen since a step of undo or redo
-    all_use_builtin   Armature modifiers deform all of them, and only an event that is listened to can change
-                      that
+    is_after_step     no evaluation was seen since the last undo or redo
+    all_use_builtin   Armature modifiers deform all of them, and that can change only with an event that is
+                      listened to
     """
 
     objects: list[bpy.types.Object] | None = None
@@ -72,7 +73,7 @@ class Session:
 
     @property
     def is_idle(self) -> bool:
-        """No object has Sinew, and none has come since that was seen."""
+        """No object has Sinew, and no object has been added since that was found."""
         return self.objects == [] and self.object_count == len(bpy.data.objects)
 
 
@@ -81,7 +82,7 @@ requests = DepsgraphRequests()
 
 
 def forget() -> None:
-    """Everything is read anew with the next event."""
+    """Forgets everything: it is read again at the next event."""
     current.gate.restore()
     current.objects = None
     subscribe_to_frames()
@@ -96,21 +97,21 @@ def forget() -> None:
     _set_pairs([])
 
 
-def forget_for_step(let_go: set[int]) -> None:
-    """Before undo and redo: every reference is void from here on.
+def forget_for_step(changed: set[int]) -> None:
+    """Called before undo and redo, which make every reference invalid.
 
-    let_go  the session_uid of objects that are changed for it
+    changed  the session_uid of objects that are changed for the step
     """
     known, depsgraph = {}, current.depsgraph
     if current.missed is None and not current.is_after_step:
         known = undo.known_before(current.pairs, depsgraph)
     forget()
-    current.skinned = {uid: state for uid, state in known.items() if uid not in let_go}
+    current.skinned = {uid: state for uid, state in known.items() if uid not in changed}
     current.depsgraph, current.is_after_step = depsgraph, True
 
 
 def adopt_after_step() -> None:
-    """After undo and redo: the evaluation that comes next deforms what is still known by it."""
+    """Called after undo and redo: the next evaluation deforms the objects that are still known."""
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
     _set_pairs([(obj, state) for obj in objects if (state := state_of(obj)) is not None])
 
@@ -121,15 +122,15 @@ def _set_pairs(pairs: Pairs) -> None:
 
 
 def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
-    """What is known of an object; None before its first frame, and where it has no Sinew."""
+    """Returns what is known of an object; None before its first frame, and without Sinew."""
     return current.skinned.get(obj.session_uid)
 
 
 def states_of(
     objects: Iterable[bpy.types.Object] | None, depsgraph: bpy.types.Depsgraph | None
 ) -> list[tuple[bpy.types.Object, SkinnedObject]]:
-    """Those of the objects that Sinew deforms now, or would if their Armature modifiers did not, with what is
-    known of them from this evaluation; none without one."""
+    """Returns the objects that Sinew deforms now, or would if their Armature modifiers did not, each with
+    what is known of it in this evaluation. Empty where depsgraph is None."""
     if depsgraph is None:
         return []
     pairs = []
@@ -142,11 +143,11 @@ def states_of(
     return [(obj, state) for obj, state in pairs if state.shown.frames is not None]
 
 
-# --- Which of Blender's changes of frame have to be listened to
+# --- Subscribing to changes of frame
 
 
 def subscribe_to_frames() -> None:
-    """Blender calls at each change of frame, until it is known that there is nothing to do."""
+    """Has Blender call Sinew at each change of frame, until it is known that there is nothing to do."""
     current.all_use_builtin = False
     events.subscribe_all(events.FRAME_HANDLERS)
 
@@ -159,7 +160,7 @@ def _subscribe_to_needed_frames() -> None:
 
 
 def unsubscribe_from_frames() -> None:
-    """Without what is not needed: a function of Python's takes 3 to 10 us of a frame in any case."""
+    """Removes handlers that are not needed: each Python handler takes 3 to 10 us of a frame."""
     if current.is_idle and events.IMPORTS_ARE_ANNOUNCED:
         events.unsubscribe_all(events.FRAME_HANDLERS)
         events.unsubscribe_all(events.GATE_HANDLERS)
@@ -174,12 +175,12 @@ def unsubscribe_from_frames() -> None:
 def refresh(context: bpy.types.Context) -> None:
     """Deforms all skinned objects at the current frame, as after a change of settings."""
     if is_rendering_in_window():
-        # Without waiting for the render's thread, which would make its next frame beside what follows.
+        # Not waiting for the render's thread, which would go on to its next frame during what follows.
         current.must_refresh = True
         return
     with reaction() as may_react:
         if not may_react or current.is_saving:
-            # Suspended, or a handler switched an object off: who did that goes on.
+            # Updates are suspended, or a handler switched an object off: whoever did that goes on from here.
             return
         current.objects = None
         for state in current.skinned.values():
@@ -189,21 +190,22 @@ def refresh(context: bpy.types.Context) -> None:
         unsubscribe_from_frames()
         # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
         if bpy.app.background:
-            # Where nothing waits, only what was just changed is new: that needs no other reaction now.
+            # If no object waits, this evaluation only shows what was just changed: Sinew need not react to
+            # it.
             with contextlib.nullcontext() if waiting() else updates_suspended():
                 context.view_layer.update()
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:
-    """refresh() for handlers and timers: Blender makes no step of undo of what they do."""
+    """Calls refresh() from handlers and timers, for which Blender makes no undo step."""
     with references.between_steps():
         refresh(context)
 
 
 @contextlib.contextmanager
 def changing(context: bpy.types.Context) -> Iterator[None]:
-    """Settings are changed inside, and nothing else; all is deformed by them at the end."""
-    # What others changed before is seen apart from it.
+    """Context in which settings are changed, and nothing else; at its end everything is deformed by them."""
+    # So that changes made by others before are recorded separately.
     context.evaluated_depsgraph_get()
     with updates_suspended():
         yield
@@ -214,11 +216,11 @@ def changing(context: bpy.types.Context) -> Iterator[None]:
 
 @contextlib.contextmanager
 def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
-    """The same for a file that was opened to be saved so: at the end it is prepared for that, too. To go on
-    with it, resume_after_save().
+    """Like changing(), for a file that was opened to be saved with the new settings: at its end the file is
+    also prepared for saving. To work on with the file, call resume_after_save().
 
-    Blender has the poses from opening the file, and has to evaluate only what had Sinew before or has
-    something in front.
+    Blender has the poses from opening the file, so only objects that had Sinew before or have upstream
+    modifiers have to be evaluated.
     """
     with updates_suspended():
         yield
@@ -236,16 +238,16 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
 
 
 def setting_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """One of Sinew's settings of an object was changed: its shape may differ."""
+    """Called when one of an object's Sinew settings was changed: its shape may differ."""
     refresh(context)
-    # Blender touches the object's mesh next. In a window that is an evaluation of its own; a script may
-    # change weights before.
+    # Blender then touches the object's mesh. In a window that is a separate evaluation; a script may change
+    # weights before it.
     if not bpy.app.background:
         _expect_mesh_update(obj)
 
 
 def enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """It was switched on or off."""
+    """Called when Sinew was switched on or off for an object."""
     settings = properties.of(obj)
     if not settings.enabled and not is_rendering_in_window():
         apply_plan.apply(obj, apply_plan.plan_of(obj))
@@ -254,7 +256,7 @@ def enabled_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 
 def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Reads everything of the object anew: mesh, weights, bones. Switches it on again after an error."""
+    """Reads mesh, weights and bones of the object again. Switches it on again after an error."""
     current.skinned.pop(obj.session_uid, None)
     precomputing.forget_stopped()
     settings = properties.of(obj)
@@ -269,7 +271,7 @@ def rebind(obj: bpy.types.Object, context: bpy.types.Context) -> None:
 
 
 def prepare_for_save() -> None:
-    """The file is made one that a Blender without Sinew plays, by the nearest shape that it has."""
+    """Changes the file so that a Blender without Sinew plays it, with the nearest shape that Blender has."""
     current.gate.restore()
     objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj) and obj.is_editable]
     current.on_before_saving = set()
@@ -278,16 +280,16 @@ def prepare_for_save() -> None:
             try:
                 if attach.prepare_for_save(obj):
                     current.on_before_saving.add(obj.session_uid)
-                overrides.keep(obj)
+                overrides.store(obj)
             except Exception as error:
-                # The others are in the same file.
+                # The other objects are in the same file.
                 log.error("%s: not as a Blender without Sinew needs it", obj.name, exc_info=error)
         precomputing.store_in_meshes([(obj, state_of(obj)) for obj in objects])
         note.write([obj for obj in objects if properties.of(obj).has_nearest_volume])
 
 
 def resume_after_save(context: bpy.types.Context) -> None:
-    """The way back from prepare_for_save()."""
+    """Reverses prepare_for_save()."""
     note.remove()
     with updates_suspended():
         for obj in filter(properties.has_sinew, bpy.data.objects):
@@ -303,7 +305,7 @@ def resume_after_save(context: bpy.types.Context) -> None:
 
 
 def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
-    """Brings all objects up to date with an evaluation and what it changed, and tells the subscribers."""
+    """Brings all objects up to date with an evaluation and its changes, and notifies the subscribers."""
     with updates_suspended():
         if depsgraph.mode == "VIEWPORT":
             current.view_layers.add(identity_of_layer(depsgraph.scene, depsgraph.view_layer))
@@ -332,7 +334,7 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
 
 
 def _drop_unknown(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
-    """With the first evaluation after undo or redo."""
+    """Forgets objects that an undo step changed. Called with the first evaluation after undo or redo."""
     current.is_after_step = False
     current.skinned = {
         obj.session_uid: state
@@ -346,20 +348,20 @@ def identity_of_layer(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tup
 
 
 def needs_first_evaluations() -> bool:
-    """Whether an object is not deformed within Blender's evaluation alone, but by who is told of it."""
+    """Whether an object needs handlers to be deformed in an evaluation, not only the driver."""
     with contextlib.suppress(ReferenceError):
         return any(
             (state := state_of(obj)) is None or state.plan.after_update
-            # After undo and redo they have to be found out.
+            # After undo and redo the objects have to be found again.
             for obj in (bpy.data.objects if current.objects is None else current.objects)
             if properties.has_sinew(obj) and properties.of(obj).enabled
         )
-    # Deleted since the objects were listed: an event comes.
+    # The object was deleted since the list was made: an event follows.
     return False
 
 
 def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
-    """Found out anew where objects may have come or gone."""
+    """Returns the objects that have Sinew. Searches again where objects may have been added or removed."""
     if current.objects is None or changes.structure or len(bpy.data.objects) != current.object_count:
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
         if not is_rendering_in_window():
@@ -373,20 +375,20 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
 
 
 def waiting() -> set[int]:
-    """The session_uid of each object that waits for what Blender makes of the modifiers in front."""
+    """Returns the session_uid of each object that waits for Blender to evaluate its upstream proxy."""
     unknown = [(obj, properties.of(obj)) for obj in objects_with_sinew(Changes()) if state_of(obj) is None]
     return {obj.session_uid for obj, settings in unknown if settings.enabled and settings.replaces_modifiers}
 
 
 def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
-    """Whether the evaluation gave all skinned objects their points, and nothing else has to be looked at."""
+    """Whether the evaluation gave all skinned objects their points, and nothing else has to be checked."""
     if (
         current.objects is None
         or current.depsgraph != depsgraph.as_pointer()
         or not Changes.are_of_meshes_only(depsgraph)
     ):
         return False
-    # Objects that use their Armature modifiers do not need to know which they are, and listing takes long.
+    # Objects that use their Armature modifiers do not need the list, which takes long to make.
     meshes = set() if current.all_use_builtin else Changes.meshes_in(depsgraph, original)
     if meshes and GONE in meshes:
         return False
@@ -394,7 +396,7 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
         if not all(_was_deformed(obj, depsgraph, meshes) for obj in current.objects):
             return False
     except ReferenceError:
-        # Deleted since the objects were listed.
+        # The object was deleted since the list was made.
         return False
     notify(subscribers.frame_shown)
     return True
@@ -409,13 +411,13 @@ def _was_deformed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, meshes:
     return (
         state.was_deformed(obj, depsgraph)
         and state.is_untouched_by_frame(obj, meshes)
-        # Up to Blender 5.1 the points are requested for a modifier without its node group, too.
+        # Up to Blender 5.1 the points are requested also for a modifier without its node group.
         and state.is_attached(obj)
     )
 
 
 def _do_all_use_builtin() -> bool:
-    """Whether frames have nothing for Sinew, as long as nothing but poses changes."""
+    """Whether Sinew has nothing to do in a frame, as long as nothing but poses changes."""
     try:
         on = [obj for obj in current.objects or () if properties.of(obj).enabled]
         return all(
@@ -431,7 +433,7 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
         if _follow_removal(obj, changes):
             return
         if not properties.of(obj).enabled:
-            _keep_off(obj, changes)
+            _update_switched_off(obj, changes)
         else:
             state = update(obj, state_of(obj), depsgraph, changes)
             if state is None:
@@ -439,14 +441,14 @@ def _update_or_switch_off(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph,
             else:
                 current.skinned[obj.session_uid] = state
     except ReferenceError:
-        # Deleted since the objects were listed.
+        # The object was deleted since the list was made.
         current.objects = None
     except Exception as error:
         _switch_off(obj, properties.of(obj), error)
 
 
-def _keep_off(obj: bpy.types.Object, changes: Changes) -> None:
-    """An object that is switched off."""
+def _update_switched_off(obj: bpy.types.Object, changes: Changes) -> None:
+    """Handles an object that is switched off."""
     state = state_of(obj)
     if state is not None:
         state.plan, state.needs_apply = Plan(State.OFF), True
@@ -460,7 +462,7 @@ def _keep_off(obj: bpy.types.Object, changes: Changes) -> None:
 
 
 def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
-    """Whether the object has lost Sinew's modifier; then it has no Sinew from now on."""
+    """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
     state = state_of(obj)
     if not _is_named(obj, changes) and (state is None or state.is_attached(obj)):
         return False
@@ -468,7 +470,7 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
         return False
     if not apply_plan.has_lost_modifier(obj):
         return False
-    # The last shape is computed only here: not at each pose.
+    # The last shape is computed only here, not at each pose.
     rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
     apply_plan.follow_removal(obj, rest, shown)
     if state is not None:
@@ -479,12 +481,12 @@ def _follow_removal(obj: bpy.types.Object, changes: Changes) -> bool:
 
 
 def _is_named(obj: bpy.types.Object, changes: Changes) -> bool:
-    """Whether the object's modifiers may be others since."""
+    """Whether the object's modifiers may have changed."""
     return changes.structure or obj.session_uid in changes.objects or not changes.complete
 
 
 def _switch_off(obj: bpy.types.Object, settings: properties.SinewSettings, error: Exception) -> None:
-    """Gives a failing object back to its Armature modifier, and says why once."""
+    """Gives a failing object back to its Armature modifier, and reports the reason once."""
     current.skinned.pop(obj.session_uid, None)
     if is_rendering_in_window():
         log.error("%s: %s; the last shape stays until the end of the render", obj.name, error)
@@ -501,7 +503,7 @@ def _switch_off(obj: bpy.types.Object, settings: properties.SinewSettings, error
 
 def _adopt_copied_modifiers(changes: Changes) -> None:
     for obj in changes.edited if not is_rendering_in_window() else ():
-        # It may have been deleted since.
+        # The object may have been deleted since.
         with contextlib.suppress(ReferenceError):
             is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
             if is_plain and not properties.has_sinew(obj) and not properties.is_copy(obj):
@@ -509,7 +511,7 @@ def _adopt_copied_modifiers(changes: Changes) -> None:
 
 
 def _note_readers(changes: Changes) -> None:
-    """An object that was edited may read others' meshes from now on: that decides who computes normals."""
+    """An edited object may now read other objects' meshes, which decides who computes normals."""
     with contextlib.suppress(ReferenceError):
         if any(normals.may_read_meshes(obj) for obj in changes.edited):
             for state in current.skinned.values():
@@ -517,13 +519,13 @@ def _note_readers(changes: Changes) -> None:
 
 
 def _expect_mesh_update(obj: bpy.types.Object) -> None:
-    """The next evaluation lists the object's mesh for what Sinew does itself."""
+    """Notes that the next evaluation lists the object's mesh because of Sinew's own changes."""
     current.expected.add(obj.data.session_uid)
 
 
 def _drop_expected(changes: Changes) -> set[int]:
-    """Takes the meshes out of the changes that are listed for what Sinew did. They are returned where
-    somebody else may have changed them in the same moment: then they are read with the next event."""
+    """Removes the meshes that are listed because of Sinew's own changes. Returns those that somebody else may
+    have changed at the same time: they are read again at the next event."""
     expected, current.expected = changes.meshes & current.expected, set()
     if changes.frame:
         return set()

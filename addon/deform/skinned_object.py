@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of one skinned object between Blender's events."""
+"""What Sinew knows about one skinned object between Blender's events."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from .plan import Plan, State
 
 @dataclass
 class Shown:
-    """The shape that an object has.
+    """The shape that an object was last given.
 
-    frames        what decided it, for each Armature modifier; None before the first
-    rest_points   float32 [vertices, 3], what it was deformed from
-    stage_values  the parameters of the stages that followed
-    first_point   its first point, by which it is known from one that somebody else wrote
-    number        how many there have been: another shape has another number
-    milliseconds  that it took
+    frames        the inputs of each Armature modifier; None before the first shape
+    rest_points   float32 [vertices, 3], the points it was deformed from
+    stage_values  the parameters of the stages after the blend
+    first_point   its first point; a different one means that somebody else wrote the points
+    number        serial number: each new shape gets another one
+    milliseconds  time that computing it took
     """
 
     frames: list[SkinStageFrame | None] | None = None
@@ -44,17 +44,17 @@ class Shown:
 
 @dataclass
 class Evaluation:
-    """How the last evaluation of Blender's went for an object.
+    """How Blender's last evaluation of an object went.
 
-    mesh                 the address of the evaluated mesh that was given points, or 0: only compared within
+    mesh                 the address of the evaluated mesh that was given points, or 0; compared only within
                          the same event, while Blender keeps the mesh
-    is_event_known       Blender called handlers before it, or Sinew itself caused it
-    was_tagged           Sinew has had Blender evaluate the object since
-    changed_unannounced  the mesh was another one, without any event before it
-    skip_reason          why it was not given points; empty where it was
-    user_error           what the user has to see to before it can be
-    failures, failure    how often it failed, and what failed last
-    failures_in_a_row    how often in a row it was not given points
+    is_event_known       Blender called handlers before the evaluation, or Sinew caused it
+    was_tagged           Sinew has tagged the object for another evaluation since
+    changed_unannounced  the mesh was replaced without any event before the evaluation
+    skip_reason          why the mesh was not given points; empty if it was
+    user_error           what the user has to fix before it can be deformed
+    failures, failure    how often deforming raised an error, and the last error
+    failures_in_a_row    how often in a row the mesh was not given points
     """
 
     mesh: int = 0
@@ -68,7 +68,7 @@ class Evaluation:
     failures_in_a_row: int = 0
 
     def begin_anew(self) -> Evaluation:
-        """None was yet; what failed before still counts."""
+        """Returns the record for a new start; earlier failures still count."""
         return Evaluation(
             failures=self.failures, failure=self.failure, failures_in_a_row=self.failures_in_a_row
         )
@@ -85,27 +85,27 @@ class Evaluation:
 
 @dataclass
 class SkinnedObject:
-    """An object that has Sinew and is on.
+    """An object that has Sinew, switched on.
 
-    bound, shown         what it is deformed by, and its shape; both change under the lock alone, as Blender
+    bound, shown         what it is deformed by, and its shape; both change only under the lock, as Blender
                          may evaluate the object on another thread, or on two for a render
-    plan                 who deforms it; applied to it unless needs_apply
-    name, mode           the object's own, as they were then
+    plan                 who deforms it; already applied to it unless needs_apply
+    name, mode           the object's, when the plan was applied
     modifier             the name of Sinew's modifier, by which it is found again
-    attribute            of the mesh, that has the points; empty where the point buffer has them
-    normals_attribute    that has the normals; empty where none has
-    normals_domain       which normals drew the mesh, as normals.domain_of()
-    mesh_users           how many the mesh had; others could read while it is written
-    is_only_user         it has as many now
-    visibility_keyed     for each Armature modifier, whether an animation decides when it is on
-    object_state         what the artist can change of the object itself, as object_state_of()
-    dependencies         the session_uid of all that the shape depends on
-    builtin_fingerprint  where its Armature modifiers deform it: what decided that; else empty
+    attribute            the mesh's point attribute; empty where the point buffer has the points
+    normals_attribute    the mesh's attribute with the normals; empty where there is none
+    normals_domain       the normals that drew the mesh, as from normals.domain_of()
+    mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
+    is_only_user         the mesh has as many users now
+    visibility_keyed     for each Armature modifier, whether an animation switches it on and off
+    object_state         what the artist can change about the object itself, from object_state_of()
+    dependencies         the session_uid of everything that the shape depends on
+    builtin_fingerprint  why its Armature modifiers deform it (small_meshes.fingerprint()); else empty
     group_losses         how often its modifier had lost its node group
-    needs_recheck        the mesh may have changed since it was read: it is read with the next event, or when
-                         somebody measures it
+    needs_recheck        the mesh may have changed since it was read: it is read again at the next event, or
+                         when it is measured
     dirtied_by_frames    the last change of frame moved the object or its rest points
-    data_versions        of what methods keep of vertices, for each Armature modifier
+    data_versions        versions of the methods' vertex data, for each Armature modifier
     """
 
     bound: Bound
@@ -133,11 +133,11 @@ class SkinnedObject:
 
     @property
     def has_new_data(self) -> bool:
-        """Whether methods keep other numbers of vertices than when the object was last seen to."""
+        """Whether the methods' vertex data changed since the object was last updated."""
         return self.data_versions != self.bound.data_versions
 
     def bind(self, bound: Bound) -> None:
-        """Another shape comes next where the stack of modifiers or its bones are others."""
+        """Sets what the object is deformed by. Drops the shape where modifiers, bones or weights changed."""
         with self.lock:
             if bound.is_of_another_stack(self.bound):
                 self.shown = Shown(number=self.shown.number)
@@ -146,7 +146,7 @@ class SkinnedObject:
             self.bound = bound
 
     def note_object(self, obj: bpy.types.Object, plan: Plan) -> None:
-        """The plan is applied to the object, which is as it is now."""
+        """Notes that the plan was applied, and the state of the object it was applied to."""
         self.plan, self.needs_apply, self.name = plan, False, obj.name
         self.evaluation.was_tagged = True
         self.builtin_fingerprint = small_meshes.fingerprint(obj) if plan.state is State.BUILT_IN else []
@@ -164,7 +164,7 @@ class SkinnedObject:
 
     @property
     def points(self) -> np.ndarray:
-        """The shape of the last frame, float32 [vertices, 3], object space; the stack's own."""
+        """The skin stack's points of the last frame, float32 [vertices, 3], object space."""
         with self.lock:
             return self.bound.skin_stack.points
 
@@ -174,13 +174,15 @@ class SkinnedObject:
         return self.bound.source.normal_count(self.plan.normals.domain)
 
     def take_off_normals(self, mesh: bpy.types.Mesh) -> None:
-        """Gives a mesh that was made of the object's evaluated one the custom normals that this would have
-        without those that Sinew gave."""
+        """Gives a mesh the custom normals that it would have without Sinew's.
+
+        mesh  made from the object's evaluated mesh
+        """
         if self.plan.normals.domain:
             mesh_io.restore_custom_normals(mesh, self.bound.source.shading.custom)
 
     def is_untouched_by(self, changes: Changes) -> bool:
-        """Whether nothing that the shape depends on is among the changes."""
+        """Whether the changes include nothing that the shape depends on."""
         return (
             changes.complete
             and not (changes.structure or changes.armatures)
@@ -188,8 +190,11 @@ class SkinnedObject:
         )
 
     def is_untouched_by_frame(self, obj: bpy.types.Object, meshes: set[int] | None) -> bool:
-        """Whether a change of frame, whose Changes.meshes_in() these are and which changed nothing else, kept
-        what the shape is made of as it was. What Blender deforms has its shape in any case."""
+        """Whether a change of frame left everything that the shape is made from as it was. Always true where
+        Blender deforms.
+
+        meshes  Changes.meshes_in() of this change of frame, which changed nothing else
+        """
         if meshes is None:
             return not self.needs_recheck
         if self.uses_builtin:
@@ -200,7 +205,7 @@ class SkinnedObject:
         return self.mode == obj.mode and self.is_as_noted(obj)
 
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
-        """Whether what the artist can change of the object itself is as it was when the plan was applied."""
+        """Whether the object itself is as it was when the plan was applied."""
         return self.object_state == object_state_of(obj)
 
     def was_deformed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -211,8 +216,8 @@ class SkinnedObject:
         return given != 0 and given == obj.data.evaluated_get(depsgraph).as_pointer()
 
     def is_attached(self, obj: bpy.types.Object) -> bool:
-        """Whether Sinew's modifier is there, with its node group where that is needed: for what another
-        add-on's handler takes away there is no event."""
+        """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's
+        handler can remove them without any event."""
         modifier = obj.modifiers.get(self.modifier)
         if self.uses_builtin:
             return modifier is not None
@@ -220,7 +225,7 @@ class SkinnedObject:
 
 
 def object_state_of(obj: bpy.types.Object) -> list:
-    """What the artist can change of the object itself that decides how it is deformed."""
+    """Everything about the object itself that the artist can change and that decides how it is deformed."""
     settings = properties.of(obj)
     mesh, keys = obj.data, obj.data.shape_keys
     state = [
@@ -236,13 +241,13 @@ def object_state_of(obj: bpy.types.Object) -> list:
     if settings.upstream_proxy is not None:
         state.append(upstream_proxy.signature(obj))
     state += [armature.mode for armature in settings.armatures]
-    # What an animation sets has no other event.
+    # Adding an animation has no event of its own.
     state += sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
     state += obj.vertex_groups.keys()
     for modifier in obj.modifiers:
         state += (modifier.name, modifier.show_viewport, modifier.show_render)
         if modifier.type == "SUBSURF":
-            # With none of them it is off.
+            # With 0 levels a Subdivision modifier is off.
             state += (modifier.levels, modifier.render_levels)
         if modifier.type == "ARMATURE":
             state += (uid(modifier.object), attach.method_of(modifier), *ModifierOptions.values(modifier))

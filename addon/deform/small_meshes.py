@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small meshes, which their Armature modifiers deform where those give the same shape as Sinew: for few
-vertices they take less time than a request for points does by itself.
+"""Small meshes, left to their Armature modifiers where these give the same shape as Sinew: for few vertices
+they take less time than the request for points alone.
 
-Sinew stays on, with all that it measures, bakes and compares; only who deforms from frame to frame differs.
+Sinew stays on and can measure, bake and compare as usual; only who deforms each frame differs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..attach.normals import Kind
 from ..core.scale_rule import BLENDER_4
 from ..io.animation_paths import animated_paths
 
-# Below as many vertices an Armature modifier is the faster one (bench/README.md), by method.
+# With fewer vertices an Armature modifier is faster (bench/README.md), by method.
 VERTICES = {"lbs": 10_000, "dq": 6_000}
 # The same where Sinew gives the normals that draw the mesh, by normals.Kind: these take Blender more time.
 VERTICES_WITH_NORMALS = {
@@ -22,14 +22,14 @@ VERTICES_WITH_NORMALS = {
     Kind.CORNER: {"lbs": 3_000, "dq": 2_500},
     Kind.CUSTOM: {"lbs": 1_500, "dq": 1_500},
 }
-# Commands compare Sinew with the modifier, and save files in which Sinew is at work.
+# Commands set this to False: they compare Sinew with the modifier, and save files in which Sinew deforms.
 is_used = True
 
 
 def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
-    """Whether the Armature modifiers of a skinned object, as they are set, have its shape in less time.
+    """Whether the Armature modifiers of a skinned object, as they are set, give its shape in less time.
 
-    given  the normals that Sinew would give with it; None where Blender computes them
+    given  the normals that Sinew would give along with it; None where Blender computes them
     """
     settings = properties.of(obj)
     limits = VERTICES if given is None else VERTICES_WITH_NORMALS[given]
@@ -37,7 +37,7 @@ def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
         is_used
         and settings.leave_small
         and len(obj.data.vertices) < limits.get(settings.method, 0)
-        # Its colours need the points.
+        # The heat map's colours need the points.
         and not settings.heat
         and has_builtin_shape(obj)
         and not other_volume(obj)
@@ -47,7 +47,7 @@ def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
 
 
 def has_builtin_shape(obj: bpy.types.Object) -> bool:
-    """Whether Armature modifiers, with Preserve Volume set for it, have the shape that Sinew is set to."""
+    """Whether Armature modifiers, with a suitable Preserve Volume, give the shape that Sinew is set to."""
     settings = properties.of(obj)
     methods = {settings.method} | {replaced.method for replaced in settings.replaced_modifiers}
     return (
@@ -58,7 +58,7 @@ def has_builtin_shape(obj: bpy.types.Object) -> bool:
 
 
 def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
-    """Those of its Armature modifiers whose Preserve Volume is not that of Sinew's method."""
+    """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method."""
     method = properties.of(obj).method
     return [
         modifier
@@ -69,7 +69,8 @@ def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
 
 
 def fingerprint(obj: bpy.types.Object) -> list[str]:
-    """Of what decides that, what scripts and animation can set between two frames without any other event."""
+    """Those of the settings behind is_builtin_faster() that scripts and animation can change between two
+    frames without an event."""
     settings = properties.of(obj)
     modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
     methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What comes to an object's first Armature modifier: rest points and weights, as they are read from its mesh,
-or from what the modifiers in front make of it."""
+"""What the first Armature modifier of an object gets: rest points and weights, read from the mesh or from the
+upstream proxy."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ class Source:
     """Read once, and again when it may be out of date.
 
     points            float32 [vertices, 3], object space, without shape keys
-    triangles         int32 [triangles, 3], of surface_points; None where no method needs them: to read them
-                      takes long
-    stored            what the file has of numbers that methods keep of vertices, by its key; read with these
+    triangles         int32 [triangles, 3], of surface_points; None where no method needs them, as reading
+                      them takes long
+    stored            vertex data of methods that is stored in the file, by its key; read along with triangles
     topology          faces and edges
-    shading           what else decides its normals
-    mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, whatever stands in front
-    sdef_keys         float32 [4, vertices, 3], as mesh_io.read_sdef_keys() gives them; None without these
-    from_front        read from what the modifiers in front make of the mesh
-    normals_domain    which normals draw it, as normals.domain_of()
+    shading           what else its normals depend on
+    mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, without upstream
+                      modifiers
+    sdef_keys         float32 [4, vertices, 3], as from mesh_io.read_sdef_keys(); None without them
+    from_upstream     read from the upstream proxy
+    normals_domain    the normals that draw the mesh, as from normals.domain_of()
     key_values        of the shape keys that are mixed in mixed_points
-    known_key_values  of those when changes were looked at last
+    known_key_values  their values when changes were last checked
     """
 
     group_names: list[str]
@@ -47,7 +48,7 @@ class Source:
     shape_keys: ShapeKeys | None
     sdef_keys: np.ndarray | None = None
     shading: Shading = field(default_factory=Shading)
-    from_front: bool = False
+    from_upstream: bool = False
     normals_domain: str = ""
     stored: dict[str, np.ndarray] = field(default_factory=dict)
     key_values: np.ndarray | None = None
@@ -57,13 +58,14 @@ class Source:
 
     @property
     def own_points(self) -> np.ndarray | None:
-        """mesh_points, where what stands in front keeps the vertices."""
+        """mesh_points, where upstream modifiers keep the number of vertices; else None."""
         return self.mesh_points if len(self.mesh_points) == len(self.points) else None
 
     @property
     def surface_points(self) -> np.ndarray:
-        """float32 [vertices, 3]: what methods make numbers of vertices from. The mesh's own points, whatever
-        moves them in front; else those that what stands in front gave it when it was read."""
+        """float32 [vertices, 3], the points that methods compute vertex data from: the mesh's own, even if
+        they are moved upstream; where upstream changes the number of vertices, its points when it was
+        read."""
         return self.points if self.own_points is None else self.own_points
 
     def equals(self, other: Source) -> bool:
@@ -81,11 +83,11 @@ class Source:
         )
 
     def has_same_shading(self, other: Source) -> bool:
-        """Whether the same points have the same normals."""
+        """Whether the same points give the same normals."""
         return self.shading.equals(other.shading) and self.topology.equals(other.topology)
 
     def make_normals(self) -> None:
-        """Where they are not made yet: else the first frame would, which takes as long as some others."""
+        """Prepares the normals. Otherwise the first frame would, which takes as long as several frames."""
         assert self.normals is not None
 
     @cached_property
@@ -93,7 +95,8 @@ class Source:
         return SurfaceNormals(len(self.points), self.topology, self.shading)
 
     def rest_normals(self, rest_points: np.ndarray, domain: str) -> np.ndarray:
-        """float32 [vertices or corners, 3], those of the rest points; the same array for the same points."""
+        """float32 [vertices or corners, 3], the normals of the rest points; the same array for the same
+        points."""
         known = self._rest_normals
         if known is None or known[0] is not rest_points or known[1] != domain:
             found = np.empty((self.normal_count(domain), 3), dtype=np.float32)
@@ -102,13 +105,13 @@ class Source:
         return known[2]
 
     def normal_count(self, domain: str) -> int:
-        """domain  POINT or CORNER; empty for no normals"""
+        """domain: POINT or CORNER; empty for no normals."""
         if not domain:
             return 0
         return len(self.points if domain == "POINT" else self.topology.corner_vertices)
 
     def keep_normals_of(self, other: Source) -> None:
-        """Takes over those that are made already, where they are the same."""
+        """Takes over the prepared normals of the other, where these are the same."""
         made = other.__dict__.get("normals")
         if made is not None and self.has_same_shading(other) and len(self.points) == len(other.points):
             self.__dict__["normals"] = made
@@ -117,8 +120,8 @@ class Source:
         return self.group_names == other.group_names and self.weights.equals(other.weights)
 
     def has_same_surface(self, other: Source) -> bool:
-        """Whether all that methods keep numbers of vertices from, but for weights, is the same; it is where
-        points only move in front."""
+        """Whether everything that methods compute vertex data from, except weights, is the same. It is where
+        upstream only moves points."""
         return np.array_equal(self.mesh_points, other.mesh_points) and all(
             are_equal(mine, its)
             for mine, its in ((self.triangles, other.triangles), (self.sdef_keys, other.sdef_keys))
@@ -126,7 +129,7 @@ class Source:
 
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:
-    """False as long as Blender has not evaluated what stands in front: it was just made, or Sinew was off and
+    """Returns False until Blender has evaluated the upstream proxy: it was just made, or Sinew was off and
     nothing needed it."""
     if properties.of(obj).upstream_proxy is None:
         return True
@@ -134,17 +137,17 @@ def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool
 
 
 def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bool = False) -> Source:
-    """Requires is_ready.
+    """Requires is_ready().
 
-    with_surface  with the triangles, and with what was made from them before
+    with_surface  with the triangles, and with the stored data that was computed from them
     """
     names = [group.name for group in obj.vertex_groups]
-    from_front = properties.of(obj).upstream_proxy is not None
-    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_front else obj.data
+    from_upstream = properties.of(obj).upstream_proxy is not None
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
     weights = mesh_io.read_group_weights(mesh)
     points = mesh_io.read_points(mesh)
-    mesh_points = mesh_io.read_points(obj.data) if from_front else points
-    keys = None if from_front else mesh_io.read_shape_keys(obj, weights)
+    mesh_points = mesh_io.read_points(obj.data) if from_upstream else points
+    keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if len(mesh_points) != len(points):
         sdef_keys = None
@@ -152,18 +155,19 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     shading = mesh_io.read_shading(mesh)
     domain = normals.domain_of(mesh)
     surface = (points, None, topology, mesh_points)
-    source = Source(names, weights, *surface, keys, sdef_keys, shading, from_front, domain)
+    source = Source(names, weights, *surface, keys, sdef_keys, shading, from_upstream, domain)
     return _with_surface(obj, mesh, source) if with_surface else source
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, known: Source) -> Source:
-    """What is known, and what read() leaves out without `with_surface`. Requires is_ready."""
-    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_front else obj.data
+    """Adds to `known` what read() leaves out without `with_surface`. Requires is_ready()."""
+    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_upstream else obj.data
     return _with_surface(obj, mesh, known)
 
 
 def _with_surface(obj: bpy.types.Object, mesh: bpy.types.Mesh, source: Source) -> Source:
-    """mesh  that comes to the Armature modifier: moved, Blender may divide its quads otherwise"""
+    """mesh: the one that the Armature modifier gets; if its points are moved, Blender may split its quads
+    differently."""
     triangles = mesh_io.read_triangles(mesh if source.own_points is None else obj.data)
     return replace(source, triangles=triangles, stored=stored_vertex_data.read(obj.data))
 
@@ -175,15 +179,15 @@ def has_changed(
     changes: Changes,
     touched: bool,
 ) -> bool:
-    """Whether points, weights, groups or shape keys may differ from those read, but for key values and for
-    what moves points in front.
+    """Whether points, weights, groups or shape keys may differ from those read, apart from key values and
+    points moved upstream.
 
     touched  the object itself may have changed
     """
     if touched and [g.name for g in obj.vertex_groups] != source.group_names:
         return True
     helper = properties.of(obj).upstream_proxy
-    if (helper is not None) != source.from_front:
+    if (helper is not None) != source.from_upstream:
         return True
     if helper is not None:
         mesh = upstream_proxy.evaluated_mesh(obj, depsgraph)
@@ -202,10 +206,10 @@ def has_changed(
 def is_slider_moved(
     obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> bool:
-    """Whether the values of shape keys differ from those known: setting one touches the mesh as a change of
-    weights does, and reading them at each step of a slider would cost more than the frame."""
+    """Whether the values of shape keys differ from those known. Setting a value touches the mesh as a change
+    of weights does, and reading weights at each step of a slider would cost more than the frame."""
     keys = obj.data.shape_keys
-    if keys is None or source.from_front or obj.data.session_uid not in changes.meshes:
+    if keys is None or source.from_upstream or obj.data.session_uid not in changes.meshes:
         return False
     values = mesh_io.read_key_values(keys.evaluated_get(depsgraph))
     known = source.known_key_values
@@ -215,7 +219,7 @@ def is_slider_moved(
 def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """float32 [vertices, 3] at this evaluation; the same array as before where nothing changed.
 
-    Requires is_ready.
+    Requires is_ready().
     """
     if properties.of(obj).upstream_proxy is not None:
         return _upstream_points(upstream_proxy.evaluated_mesh(obj, depsgraph), source)
@@ -225,8 +229,8 @@ def rest_points(obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Deps
 def evaluated_points(
     evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, source: Source
 ) -> np.ndarray | None:
-    """The same from evaluated data alone; None where there are others than those read."""
-    if not source.from_front:
+    """The same from evaluated data alone; None where its vertices are not those that were read."""
+    if not source.from_upstream:
         return _keyed_points(evaluated, evaluated_mesh, source)
     upstream = evaluated.sinew.upstream_proxy
     if upstream is None or not upstream.is_evaluated or len(upstream.data.vertices) != len(source.points):
@@ -252,6 +256,6 @@ def _keyed_points(evaluated: bpy.types.Object, evaluated_mesh: bpy.types.Mesh, s
         pinned = mesh_io.read_pinned_points(evaluated_mesh.shape_keys, evaluated.active_shape_key_index)
         if not np.array_equal(pinned, source.mixed_points):
             source.mixed_points = pinned
-            # Whatever the values are, leaving the pin mixes again.
+            # NaN equals nothing: leaving the pin mixes again, whatever the values are.
             source.key_values = np.full_like(values, np.nan)
     return source.mixed_points

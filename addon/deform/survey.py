@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist should know of a mesh that an armature deforms."""
+"""Facts and warnings about a mesh that an armature deforms, for the artist."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def describe(
     points: np.ndarray,
     depsgraph: bpy.types.Depsgraph,
 ) -> RigFacts:
-    """Counts, and warnings of what is missing in the rig or not reproduced.
+    """Returns counts, and warnings about what is missing in the rig or not reproduced.
 
     armature  of its first Armature modifier; None where it was deleted, and others deform the mesh
     points    [vertices, 3], rest points in object space
@@ -37,12 +37,12 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *hooks.misled(obj)]
+    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *hooks.warnings(obj)]
     return facts.with_warnings(found)
 
 
 def _other_sdef(obj: bpy.types.Object) -> list[str]:
-    """A sentence where mmd_tools' own SDEF is at work on the mesh."""
+    """Returns a sentence where mmd_tools' own SDEF deforms the mesh, too."""
     keys = obj.data.shape_keys
     block = None if keys is None else keys.key_blocks.get(sdef.ELSEWHERE)
     if block is None or block.mute:
@@ -57,7 +57,7 @@ def _other_sdef(obj: bpy.types.Object) -> list[str]:
 
 
 def _missing_groups(obj: bpy.types.Object) -> list[str]:
-    """A sentence for each stage that is on without the vertex group that it names."""
+    """Returns a sentence for each active stage whose vertex group does not exist."""
     if not properties.has_sinew(obj):
         return []
     settings = properties.of(obj)
@@ -74,8 +74,9 @@ def _missing_groups(obj: bpy.types.Object) -> list[str]:
     return found
 
 
-def describe_undriven(obj: bpy.types.Object) -> RigFacts:
-    """The same of a mesh object as it lies in the file, and what would keep Sinew from driving it."""
+def describe_in_file(obj: bpy.types.Object) -> RigFacts:
+    """The same for a mesh object as stored in the file, with the reason why Sinew cannot deform it, if there
+    is one."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     armature = attach.armature_of(obj)
     bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
@@ -87,7 +88,7 @@ def describe_undriven(obj: bpy.types.Object) -> RigFacts:
 
 
 def _obstacles(obj: bpy.types.Object) -> list[str]:
-    """What keeps Sinew from driving the mesh: nothing, or one sentence."""
+    """Why Sinew cannot deform the mesh: empty, or one sentence."""
     if properties.has_sinew(obj):
         return []
     try:

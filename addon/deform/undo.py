@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of objects over a step of undo or redo: to read them all anew takes longer than the step.
+"""Keeps what is known of objects over undo and redo: reading them again takes longer than the step.
 
-Blender keeps in memory what is the same in two steps, and lists all else in the next evaluation. So an object
-stays known that Sinew deforms within the evaluation, by its own mesh alone, and that was shown before and is
-after. What the list names of its data is read anew; bones, and what the artist can change of the object
-itself, are compared in any case.
+Blender keeps in memory what is the same in both steps, and lists everything else in the next evaluation. So
+an object stays known if Sinew deforms it within the evaluation, from its own mesh alone, and if it was shown
+before the step and after it. Listed data is read again; bones, and what the artist can change about the
+object itself, are always compared.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from .skinned_object import SkinnedObject
 def known_before(
     pairs: list[tuple[bpy.types.Object, SkinnedObject]], depsgraph_seen: int
 ) -> dict[int, SkinnedObject]:
-    """By session_uid, before the step.
+    """Returns what stays known, by session_uid. Called before the step.
 
-    depsgraph_seen  the address of the one that Sinew saw last
+    depsgraph_seen  the address of the depsgraph that Sinew saw last
     """
     depsgraph = bpy.context.view_layer.depsgraph
     is_seen = depsgraph is not None and depsgraph.as_pointer() == depsgraph_seen
@@ -31,7 +31,7 @@ def known_before(
         return {}
     known = {}
     for obj, state in pairs:
-        # It may have been deleted since they were listed.
+        # The object may have been deleted since the list was made.
         with contextlib.suppress(ReferenceError):
             if _is_known(obj, state, depsgraph):
                 known[obj.session_uid] = state
@@ -42,7 +42,7 @@ def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.
     plan, evaluation = state.plan, state.evaluation
     return (
         plan.state is State.IN_DEPSGRAPH
-        and not (plan.in_buffer or state.bound.source.from_front)
+        and not (plan.in_buffer or state.bound.source.from_upstream)
         and not (state.needs_recheck or state.needs_apply)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
         and obj.mode == state.mode == "OBJECT"
@@ -53,7 +53,8 @@ def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.
 def is_known_after(
     obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> bool:
-    """With the first evaluation after the step: whether it is the object that is known, with its shape."""
+    """Whether this is still the known object with its shape. Called with the first evaluation after the
+    step."""
     has_shape = state.was_deformed(obj, depsgraph) or state.dependencies.isdisjoint(changes.touched)
     return _is_shown(obj, depsgraph) and has_shape and state.is_as_noted(obj)
 

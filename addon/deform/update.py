@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an event means for one skinned object: what is read anew, what changes in the file, who deforms it."""
+"""What an event means for one skinned object: what is read again, what changes in the file, who deforms
+it."""
 
 from __future__ import annotations
 
@@ -11,12 +12,12 @@ from ..core.errors import SinewError
 from ..io import armature_io
 from . import after_update, apply_plan, bound, precomputing, source
 from .changes import Changes
-from .plan import MODES_OF_THE_MODIFIER, Plan, State
+from .plan import ARMATURE_MODIFIER_MODES, Plan, State
 from .skinned_object import SkinnedObject, object_state_of
 
-# As often its node group is made again, which another add-on removes.
+# How often the node group is restored after another add-on removed it.
 MAX_GROUP_LOSSES = 2
-# As often as Sinew in a row could not deform a mesh within Blender's evaluation, it tries again there.
+# How often in a row Sinew may fail to deform a mesh within Blender's evaluation and still try again there.
 MAX_FAILURES_IN_A_ROW = 1
 
 
@@ -25,15 +26,15 @@ def update(
 ) -> SkinnedObject | None:
     """Deforms an object that is on, or has Blender do so with the next evaluation, if anything changed.
 
-    What is known of it from now on; None where it waits for another evaluation, or is in a mode of the
-    modifier. Raises SinewError with a sentence for the user where Sinew can not deform it.
+    Returns what is known of it from now on; None where it waits for another evaluation, or is in a mode of
+    the Armature modifier. Raises SinewError with a sentence for the user where Sinew cannot deform it.
     """
     if obj.library is not None:
-        # Its Armature modifier deforms it: that is how its file is saved.
+        # Its Armature modifier deforms it, as its own file was saved that way.
         return None
-    if skinned is not None and _is_as_it_was(obj, skinned, changes):
+    if skinned is not None and _is_unchanged(obj, skinned, changes):
         return skinned
-    if _is_in_mode_of_modifier(obj):
+    if _is_in_armature_modifier_mode(obj):
         apply_plan.apply(obj, apply_plan.plan_of(obj))
         return None
     inspect = skinned is None or _needs_inspection(obj, skinned, depsgraph, changes)
@@ -41,18 +42,18 @@ def update(
         skinned.dirtied_by_frames = False
         return skinned
     if inspect and is_rendering_in_window():
-        # Seen to when the render has ended.
+        # This is done when the render has ended.
         if skinned is None:
             return None
         skinned.needs_apply, inspect = True, False
     before, known = (None, None) if skinned is None else (skinned.plan, skinned.bound)
     was_on = properties.of(obj).replaces_modifiers
     plan = _apply_plan(obj, skinned, changes) if inspect else before
-    # First of all, as groups are renamed along with bones.
+    # Before anything else, as groups are renamed along with bones.
     bones_changed = skinned is not None and bound.have_bones_changed(
         obj, skinned.bound, depsgraph, None if _may_have_other_bones(skinned, changes) else changes
     )
-    # While Sinew's modifier was off, nothing had Blender evaluate what stands in front.
+    # While Sinew's modifier was off, nothing made Blender evaluate the upstream proxy.
     if not source.is_ready(obj, depsgraph, was_on):
         # What is hidden, or in another scene, stays as it is.
         is_shown = obj.visible_get(view_layer=depsgraph.view_layer)
@@ -62,11 +63,11 @@ def update(
     if inspect or skinned.bound.is_of_another_stack(known):
         if not plan.uses_builtin:
             keep_poses_evaluated(obj, skinned, plan)
-        # With Sinew's driver, which is animation, too.
+        # After Sinew's driver is added, as the driver counts as animation, too.
         skinned.note_object(obj, plan)
     skinned.plan = plan
-    # A render lists all as new with each frame; to tag the object has Blender (4.2 to 5.2) copy it anew,
-    # without what animation had set.
+    # A render lists everything as new with each frame. Tagging the object makes Blender (4.2 to 5.2) copy it
+    # again, without what animation had set.
     is_same = not skinned.bound.is_of_another_stack(known) and skinned.bound.source.equals(known.source)
     is_same &= not skinned.has_new_data
     skinned.data_versions = skinned.bound.data_versions
@@ -83,23 +84,24 @@ def update(
 
 
 def _may_have_other_bones(skinned: SkinnedObject, changes: Changes) -> bool:
-    """Whatever the changes say: they were not seen while it was off."""
+    """Whether bones have to be compared regardless of the changes: these were not recorded while it was
+    off."""
     return skinned.plan.state is State.OFF or changes.after_step
 
 
-def _is_in_mode_of_modifier(obj: bpy.types.Object) -> bool:
-    """Whether the Armature modifier deforms it for the mode that it is in, and nothing is to be known of it:
-    in weight paint, where what stands in front is not evaluated apart then."""
-    if obj.mode in MODES_OF_THE_MODIFIER or obj.data.is_editmode:
+def _is_in_armature_modifier_mode(obj: bpy.types.Object) -> bool:
+    """Whether the Armature modifier deforms it because of its mode, and nothing has to be known of it. In
+    Weight Paint that is so where the upstream proxy is then not evaluated."""
+    if obj.mode in ARMATURE_MODIFIER_MODES or obj.data.is_editmode:
         return True
     is_painted = obj.mode == "WEIGHT_PAINT" and stack.visibility_is_animated(obj)
     return is_painted and upstream_proxy.is_needed(obj)
 
 
 def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
-    """Notes what was done to Sinew's modifier and to the object's name since the last event.
+    """Notes changes of Sinew's modifier and of the object's name since the last event.
 
-    Raises SinewError where the user has to see to something first.
+    Raises SinewError where the user has to fix something first.
     """
     if skinned.evaluation.user_error is not None:
         raise skinned.evaluation.user_error
@@ -116,10 +118,10 @@ def _check_attached(obj: bpy.types.Object, skinned: SkinnedObject) -> None:
         skinned.name, skinned.evaluation.skip_reason = obj.name, "it has another name"
 
 
-def _is_as_it_was(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
+def _is_unchanged(obj: bpy.types.Object, skinned: SkinnedObject, changes: Changes) -> bool:
     """Whether nothing has to be read again. A mesh that needs a recheck counts as changed.
 
-    Raises SinewError where the user has to see to something first.
+    Raises SinewError where the user has to fix something first.
     """
     _check_attached(obj, skinned)
     if skinned.needs_recheck:
@@ -147,7 +149,7 @@ def _needs_inspection(
         return False
     if obj.data.session_uid in changes.touched and normals.domain_of(obj.data) != skinned.normals_domain:
         return True
-    # To request points touches the object by itself.
+    # Requesting points touches the object, too.
     explains_touch = skinned.plan.is_in_depsgraph or skinned.was_deformed(obj, depsgraph)
     return not explains_touch or object_state_of(obj) != skinned.object_state
 
@@ -176,7 +178,7 @@ def _apply_plan(obj: bpy.types.Object, skinned: SkinnedObject | None, changes: C
 
 
 def _failure_of(skinned: SkinnedObject | None) -> str:
-    """What keeps Sinew from deforming it within Blender's evaluation; empty where nothing does."""
+    """Why Sinew cannot deform it within Blender's evaluation; empty where nothing prevents it."""
     if skinned is None or skinned.evaluation.failures_in_a_row <= MAX_FAILURES_IN_A_ROW:
         return ""
     return skinned.evaluation.failure
@@ -185,12 +187,12 @@ def _failure_of(skinned: SkinnedObject | None) -> str:
 def _with_data(
     obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan, depsgraph: bpy.types.Depsgraph
 ) -> Plan:
-    """The plan once what the methods need is asked for. One that waits needs the same of the object as one
-    that does not."""
+    """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
+    same modifiers and storage as one that does not, so it need not be applied again."""
     if plan.uses_builtin:
         return plan
     if plan.normals.domain:
-        # Not within Blender's evaluation: it takes as long as some frames.
+        # Not within Blender's evaluation: it takes as long as several frames.
         skinned.bound.source.make_normals()
     precomputing.request(obj, skinned, depsgraph)
     waits_for = precomputing.waits_for(obj, skinned)
@@ -200,13 +202,13 @@ def _with_data(
 
 
 def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
-    """Brings what Sinew keeps of the modifiers in line with what the artist did to them.
+    """Brings what Sinew stores about the modifiers in line with what the artist did to them.
 
     Raises SinewError where those that Sinew works with are gone.
     """
     if stack.armature_modifier(obj) is None:
         raise SinewError(f"{obj.name}: its Armature modifier was deleted; press Remove")
-    # What decides the plan, such as Preserve Volume, is the artist's own.
+    # The plan depends on settings such as Preserve Volume as the artist set them.
     attach.restore_volume(obj)
     attach.follow_stack(obj)
     attach.adopt_pointers(obj)
@@ -236,14 +238,14 @@ def _bind(
     inspect: bool,
     bones_changed: bool,
 ) -> SkinnedObject:
-    """Bound anew where its mesh, weights, bones or modifiers changed.
+    """Binds the object again where its mesh, weights, bones or modifiers changed.
 
     inspect  the object itself may have changed
     """
     if skinned is None:
         return SkinnedObject(bound.read(obj, depsgraph), obj.name, obj.mode)
     skinned.mode = obj.mode
-    # In a window, while a shape key's slider moves, weights are read with the next event only.
+    # In a window, while a shape key's slider moves, weights are read only at the next event.
     reads_later = not bpy.app.background and source.is_slider_moved(
         obj, skinned.bound.source, depsgraph, changes
     )
@@ -267,21 +269,21 @@ def _request_points(
     is_new_plan: bool,
     is_same: bool,
 ) -> None:
-    """Has Blender evaluate the object once more, and so request its points, where they may differ."""
+    """Has Blender evaluate the object once more, and thereby request its points, where they may differ."""
     skinned.dirtied_by_frames = False
     if skinned.plan.in_buffer:
         rest_points = skinned.bound.source.points
         point_store.set_rest_points(obj, depsgraph, rest_points, skinned.normal_count, anew=is_new_plan)
     if skinned.evaluation.skip_reason or not is_same or is_new_plan:
         skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
-        # The object is copied anew then, and what the change of frame has set is set again: of what is
-        # hidden, originals do not have it.
+        # The object is then copied again, and what the change of frame has set has to be set again: originals
+        # of hidden objects do not have it.
         obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
 
 
 def keep_poses_evaluated(obj: bpy.types.Object, skinned: SkinnedObject, plan: Plan) -> None:
-    """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where it
-    can."""
+    """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where
+    the plan says so."""
     settings, pairs, mesh = properties.of(obj), attach.replaced_modifiers(obj), obj.data
     skinned.attribute, skinned.normals_attribute = settings.attribute, settings.normals_attribute
     skinned.mesh_users, skinned.is_only_user = mesh.users, True

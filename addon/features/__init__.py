@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What riggers do with Sinew besides: each folder has its state, operators and panel."""
+"""Features on top of the deformation: each folder has its state, operators and panel."""

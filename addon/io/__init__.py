@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between Blender's conventions and Sinew's: meshes, armatures, poses, actions, files."""
+"""Converts between Blender's conventions and Sinew's: meshes, armatures, poses, actions, files."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The F-curves of an action that move bones: which they are, their keys, and holding them.
+"""The F-curves of an action that move bones: finding them, reading their keys, and holding them.
 
 A slot of an action is held while Sinew plays its bones: their curves are muted, so that Blender leaves those
-channels alone, and everything else in the action plays on. What the artist had muted is kept in the action
-(properties.SinewActionHold), where undo and copies take it along.
+channels alone, and everything else in the action plays on. What the artist had muted is stored in the action
+(SinewActionHold), so that undo and copies include it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ REPEATING = {"REPEAT", "REPEAT_OFFSET"}
 
 
 class SinewActionHold(bpy.types.PropertyGroup):
-    """A slot of an action whose bones Sinew plays; its name is the slot's handle, 0 where there are none."""
+    """A slot of an action whose bones Sinew plays; its name is the slot's handle, or 0 where there are no
+    slots."""
 
     muted: bpy.props.StringProperty(description="The curves that the artist had muted")
 
@@ -45,7 +46,7 @@ class SinewActionHold(bpy.types.PropertyGroup):
 
 
 class Channel(NamedTuple):
-    """What a curve moves: a property of a bone, and where that stands in its row of channels."""
+    """What a curve moves: a property of a bone, and its column in the bone's row of channels."""
 
     bone: str
     property: str
@@ -53,7 +54,7 @@ class Channel(NamedTuple):
 
 
 def slot_of(player: bpy.types.AnimData | bpy.types.NlaStrip) -> bpy.types.bpy_struct | None:
-    """The slot that `player` plays of its action; None up to Blender 4.3, which has none."""
+    """Returns the slot of its action that `player` plays; None up to Blender 4.3, which has no slots."""
     return getattr(player, "action_slot", None)
 
 
@@ -64,7 +65,7 @@ def handle_of(slot: bpy.types.bpy_struct | None) -> int:
 def curve_lists(
     action: bpy.types.Action, slot: bpy.types.bpy_struct | None
 ) -> list[bpy.types.bpy_prop_collection]:
-    """The F-curves for `slot`: an action's own up to 4.3, those of its slot since 4.4."""
+    """Returns the F-curves for `slot`: the action's own up to 4.3, those of its slot since 4.4."""
     if not hasattr(action, "layers"):
         return [action.fcurves]
     if slot is None:
@@ -74,8 +75,8 @@ def curve_lists(
 
 
 def slot_for(action: bpy.types.Action, obj: bpy.types.Object) -> bpy.types.bpy_struct | None:
-    """The slot by which `obj` plays an action, or would: of those for objects the one of its name, else that
-    which moves most of its bones; None up to Blender 4.3."""
+    """Returns the slot by which `obj` plays an action, or would: of the slots for objects the one with its
+    name, else the one that moves most of its bones; None up to Blender 4.3."""
     if not hasattr(action, "slots"):
         return None
     animation = obj.animation_data
@@ -94,7 +95,8 @@ def slot_for(action: bpy.types.Action, obj: bpy.types.Object) -> bpy.types.bpy_s
 def new_curves(
     action: bpy.types.Action, obj: bpy.types.Object
 ) -> tuple[bpy.types.bpy_prop_collection, bpy.types.bpy_struct | None]:
-    """Where F-curves for `obj` go in a new action, and the slot that plays them; None up to Blender 4.3."""
+    """Returns where F-curves for `obj` go in a new action, and the slot that plays them; None up to Blender
+    4.3."""
     if not hasattr(action, "layers"):
         return action.fcurves, None
     slot = action.slots.new("OBJECT", obj.name)
@@ -103,14 +105,14 @@ def new_curves(
 
 
 def new_curve(curves: bpy.types.bpy_prop_collection, path: str, index: int, group: str) -> bpy.types.FCurve:
-    """An F-curve in a group of the Graph Editor; Blender 4.4 and 4.5 make none in an action's slots."""
+    """Makes an F-curve in a group of the Graph Editor; in slots, Blender 4.4 and 4.5 cannot make groups."""
     known = curves.bl_rna.functions["new"].parameters
     name = next((each for each in ("group_name", "action_group") if each in known), None)
     return curves.new(path, index=index, **({name: group} if name is not None else {}))
 
 
 def play(obj: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.bpy_struct | None) -> None:
-    """Has `obj` play the action; the one before stays in the file."""
+    """Has `obj` play the action; the previous action stays in the file."""
     animation = obj.animation_data or obj.animation_data_create()
     before = animation.action
     if before is not None and before != action and before.is_editable:
@@ -125,7 +127,7 @@ def all_curves(action: bpy.types.Action | None, slot: bpy.types.bpy_struct | Non
 
 
 def channel_of(curve: bpy.types.FCurve) -> Channel | None:
-    """What of a bone's transform the curve moves; None where it moves something else."""
+    """Returns which channel of a bone's transform the curve moves; None where it moves something else."""
     found = _bone_property(curve.data_path)
     return Channel(*found, COLUMNS[found[1]] + curve.array_index) if found else None
 
@@ -139,7 +141,7 @@ def _bone_property(path: str) -> tuple[str, str] | None:
 def bone_curves(
     action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
 ) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """The curves that move bones, by bone."""
+    """Returns the curves that move bones, by bone."""
     bones: dict[str, list[tuple[bpy.types.FCurve, Channel]]] = {}
     for curve in all_curves(action, slot):
         channel = channel_of(curve)
@@ -151,8 +153,8 @@ def bone_curves(
 def unmuted_curves(
     action: bpy.types.Action, slot: bpy.types.bpy_struct | None
 ) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """The curves that move bones, by bone, without those that the artist has muted: what Sinew plays in their
-    place counts."""
+    """Returns the curves that move bones, by bone, without those that the artist has muted; curves that Sinew
+    plays are included."""
     record = action.sinew_holds.get(str(handle_of(slot)))
     muted = record.muted_by_artist() if record is not None else None
     found = {}
@@ -164,9 +166,9 @@ def unmuted_curves(
 
 
 def key_times(curves: Sequence[bpy.types.FCurve]) -> np.ndarray:
-    """The times at which any of the curves has a key, ascending, float32."""
+    """Returns the times at which any of the curves has a key, ascending, float32."""
     times = [_key_points(curve)[:, 0] for curve in curves]
-    # Keyed poses have keys in all channels: seldom is there anything to sort.
+    # Keyed poses have keys in all channels, so there is seldom anything to sort.
     if len({array.tobytes() for array in times}) == 1:
         return times[0]
     return np.unique(np.concatenate(times))
@@ -181,8 +183,9 @@ def _key_points(curve: bpy.types.FCurve) -> np.ndarray:
 def gains_of_a_round(
     curves: Sequence[bpy.types.FCurve], times: np.ndarray, onwards: bool
 ) -> np.ndarray | None:
-    """What each of a bone's curves gains, [curves], from one round of its keys at `times` to the next, where
-    they repeat after the last (`onwards`) or before the first; None where they do not, or not in step."""
+    """Returns how much each of a bone's curves increases, [curves], from one cycle of its keys at `times` to
+    the next, where they repeat after the last key (`onwards`) or before the first; None where they do not
+    repeat, or with different periods."""
     gains = []
     for curve in curves:
         modifiers = [m for m in curve.modifiers if not m.mute]
@@ -203,7 +206,8 @@ def gains_of_a_round(
 
 
 def hold_still(curves: Sequence[bpy.types.FCurve], times: np.ndarray) -> np.ndarray:
-    """At which of `times` the curves all hold the value of a key up to the next (interpolation Constant)."""
+    """Returns at which of `times` all curves hold the value of a key until the next (interpolation
+    Constant)."""
     still = np.ones(len(times), dtype=bool)
     for curve in curves:
         kinds = np.empty(len(curve.keyframe_points), dtype=np.int32)
@@ -217,12 +221,12 @@ def hold_still(curves: Sequence[bpy.types.FCurve], times: np.ndarray) -> np.ndar
 
 @functools.cache
 def key_value(name: str, choice: str) -> int:
-    """The number that stands for a choice of a key's property in arrays of Blender's."""
+    """Returns the number that stands for a choice of a key's property in Blender's arrays."""
     return bpy.types.Keyframe.bl_rna.properties[name].enum_items[choice].value
 
 
 def reason_against(curves: Sequence[bpy.types.FCurve]) -> str | None:
-    """Why a bone's curves can not be keyed poses; None where they can."""
+    """Returns why a bone's curves cannot be keyed poses; None where they can."""
     if not all(len(curve.keyframe_points) for curve in curves):
         return "has a curve without keys"
     for curve in curves:
@@ -235,10 +239,11 @@ def reason_against(curves: Sequence[bpy.types.FCurve]) -> str | None:
 def hold(
     action: bpy.types.Action, slot: bpy.types.bpy_struct | None, rotations: dict[str, str]
 ) -> dict[str, str]:
-    """Mutes the curves of bones that Sinew can play; done again, it takes in what has come since.
+    """Mutes the curves of bones that Sinew can play. Called again, it includes curves added since.
 
-    rotations  the property that turns each bone, by its name
-    Returns the bones that are left to Blender, and why.
+    rotations  each bone's rotation property that is in use, by the bone's name
+
+    Returns the bones that are left to Blender, each with the reason.
     """
     name = str(handle_of(slot))
     record = action.sinew_holds.get(name)
@@ -270,7 +275,7 @@ def hold(
 
 
 def release(action: bpy.types.Action, handle: int) -> None:
-    """Gives the curves of a held slot back as the artist had them."""
+    """Restores the curves of a held slot as the artist had them."""
     index = action.sinew_holds.find(str(handle))
     if index < 0:
         return
@@ -287,7 +292,7 @@ def release(action: bpy.types.Action, handle: int) -> None:
 def held_curves(
     action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
 ) -> dict[str, list[tuple[bpy.types.FCurve, Channel]]]:
-    """The curves that Sinew plays, by bone; empty where the slot is not held."""
+    """Returns the curves that Sinew plays, by bone; empty where the slot is not held."""
     record = action.sinew_holds.get(str(handle_of(slot))) if action is not None else None
     if record is None:
         return {}
@@ -305,8 +310,8 @@ def key_of(curve: bpy.types.FCurve) -> tuple[str, int]:
 
 
 def plays(channel: Channel, rotation: str | None) -> bool:
-    """Whether the channel plays a part where `rotation` turns its bone: not a rotation of another mode, nor
-    anything of a bone that is gone."""
+    """Whether the channel has an effect where `rotation` is its bone's rotation property: not a rotation of
+    another mode, nor a channel of a missing bone."""
     return rotation is not None and channel.property in ("location", "scale", rotation)
 
 

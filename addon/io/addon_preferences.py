@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the extension's page in Blender's preferences says, for all rooms that ask."""
+"""Reads the extension's preferences, for all folders."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ ADDON = __package__.rpartition(".")[0]
 
 
 def value(name: str, default: Any) -> Any:
-    """`default` where there is no such page, as where Sinew is a package of Python's."""
+    """Returns `default` where there are no preferences, as where Sinew is a Python package."""
     preferences = getattr(bpy.context.preferences.addons.get(ADDON), "preferences", None)
     return getattr(preferences, name, default)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which properties of an object its animation sets. Changes nothing."""
+"""Finds which properties of an object its animation sets. Changes nothing."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from . import actions
 
 
 def animated_paths(obj: bpy.types.Object) -> set[str]:
-    """The data paths that the object's actions and drivers set."""
+    """Returns the data paths that the object's actions and drivers set."""
     return {curve.data_path for curve in curves_of(obj)}
 
 
 def curves_of(owner: bpy.types.Object | bpy.types.Mesh | bpy.types.Key) -> list[bpy.types.FCurve]:
-    """Those of its actions, in strips too, and its drivers."""
+    """Returns the curves of its actions, also in strips, and of its drivers."""
     animation = owner.animation_data
     if animation is None:
         return []
@@ -23,7 +23,7 @@ def curves_of(owner: bpy.types.Object | bpy.types.Mesh | bpy.types.Key) -> list[
 
 
 def players(animation: bpy.types.AnimData) -> list[bpy.types.AnimData | bpy.types.NlaStrip]:
-    """What plays an action, or could."""
+    """Returns everything that plays an action, or could."""
     return [animation, *(strip for track in animation.nla_tracks for strip in track.strips)]
 
 
@@ -33,6 +33,6 @@ def is_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier, name: str) 
 
 
 def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
-    """Whether keys or drivers decide when a modifier is on."""
+    """Whether keys or drivers switch a modifier on and off."""
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
     return not animated_paths(obj).isdisjoint((f"{start}viewport", f"{start}render"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones and poses from Blender, in Sinew's conventions: row-major matrices, armature space."""
+"""Reads bones and poses from Blender, in Sinew's conventions: row-major matrices, armature space."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from ..core.spaces import SAME_SPACE
 
 
 def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
-    """The rest bones of an evaluated armature object, in the order of its pose, and bendy ones' joints."""
+    """Returns the rest bones of an evaluated armature object, in the order of its pose, and the joints of
+    bendy bones."""
     bones = evaluated_armature.data.bones
     deform = np.empty(len(bones), dtype=bool)
     lengths = np.empty(len(bones), dtype=np.float32)
@@ -49,21 +50,21 @@ def read_bones(evaluated_armature: bpy.types.Object) -> Bones:
 
 
 def paths_to_wait_for(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
-    """Properties of an armature object that Blender reads, for a driver, no sooner than it has posed all of
-    `names`, with the joints of bendy ones and the bones that shape these."""
+    """Returns properties of an armature object that Blender, for a driver, reads only after it has posed all
+    of `names`, including the joints of bendy bones and the bones that shape these."""
     bones = armature.data.bones
-    # In edit mode bones can be gone that are still in `names`.
+    # In edit mode, bones in `names` may no longer exist.
     names = [name for name in names if name in bones]
     bendy = [name for name in names if bones[name].bbone_segments > 1]
     wanted = dict.fromkeys([*names, *_handles_of(armature, bendy)])
     above = set()
     for name in wanted:
         parent = bones[name].parent
-        # Those above a bone that was met are known.
+        # The parents of a bone that was already reached are known.
         while parent is not None and parent.name not in above:
             above.add(parent.name)
             parent = parent.parent
-    # A bone is posed after those above it; joints come later, and only properties of theirs wait for them.
+    # A bone is posed after its parents, but joints only later, and only bendy-bone properties wait for them.
     return [
         *(f"{_path(name)}.length" for name in wanted if name not in above),
         *(f"{_path(name)}.bbone_curveinx" for name in bendy),
@@ -75,7 +76,7 @@ def _path(name: str) -> str:
 
 
 def _handles_of(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
-    """The bones that shape bendy ones: their handles, neighbours or chosen ones."""
+    """Returns the bones that shape bendy bones: their handles, which are neighbours or chosen bones."""
     handles = []
     for name in names:
         bone = armature.data.bones[name]
@@ -85,7 +86,8 @@ def _handles_of(armature: bpy.types.Object, names: Sequence[str]) -> list[str]:
 
 
 def read_pose(evaluated_armature: bpy.types.Object, bones: Bones) -> np.ndarray:
-    """float32 [bones + joints, 4, 4]: each posed bone in armature space, then the joints of `bones`."""
+    """Returns float32 [bones + joints, 4, 4]: each posed bone in armature space, then the joints of
+    `bones`."""
     pose = _read_matrices(evaluated_armature.pose.bones, "matrix")
     if not bones.bend:
         return pose
@@ -112,7 +114,7 @@ def _read_envelopes(bones: bpy.types.bpy_prop_collection) -> Envelopes:
 def _read_matrices(bones: bpy.types.bpy_prop_collection, name: str) -> np.ndarray:
     flat = np.empty(16 * len(bones), dtype=np.float32)
     bones.foreach_get(name, flat)
-    # Blender hands matrices over by columns.
+    # Blender stores matrices by columns.
     return flat.reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
@@ -122,15 +124,16 @@ def _read_joints(
     bending: Sequence[tuple[int, int]],
     at_rest: bool,
 ) -> np.ndarray:
-    """float32 [joints, 4, 4]: the joints of bendy bones in armature space, from the bones' matrices there.
+    """Returns float32 [joints, 4, 4]: the joints of bendy bones in armature space.
 
-    bending  each bone and how many segments it has
+    matrices  of the bones in armature space
+    bending   the index of each bendy bone and its number of segments
     """
     pose_bones, owners, flat = evaluated_armature.pose.bones, [], []
     for bone, segments in bending:
         joint = pose_bones[bone].bbone_segment_matrix
         for k in range(segments + 1):
-            # A matrix is unpacked faster than numpy reads it.
+            # Unpacking a matrix is faster than having numpy read it.
             for row in joint(k, rest=at_rest):
                 flat.extend(row)
         owners += [bone] * (segments + 1)
@@ -141,7 +144,8 @@ def _read_joints(
 def bones_from_model(
     evaluated_mesh: bpy.types.Object, evaluated_armature: bpy.types.Object
 ) -> np.ndarray | None:
-    """float64 [4, 4]: the mesh object's space to armature space; None where the armature has no size."""
+    """Returns float64 [4, 4], from the mesh object's space to armature space; None where the armature's scale
+    is 0."""
     mesh_world, armature_world = evaluated_mesh.matrix_world, evaluated_armature.matrix_world
     if mesh_world == armature_world:
         return SAME_SPACE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions of an armature as clips, clips as actions, and actions from files of other formats."""
+"""Reads actions of an armature as clips, writes clips as actions, and imports actions from other formats."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ def _import_bvh(path: str) -> None:
 
 Result = TypeVar("Result")
 
-# What Blender opens or imports that can move an armature.
+# Imports that can contain an animated armature.
 IMPORTERS = {**files.IMPORTERS, ".bvh": _import_bvh}
-# How far rests may differ for a clip of another file to be one of this armature: radians, part of the size.
+# How far the rest poses may differ for a clip of another file to fit this armature: radians, share of the
+# size.
 SAME_REST = (0.02, 0.01)
-# Of the three properties that Blender keys, the columns of pose_io.read_channels(), and rest there.
+# The columns of pose_io.read_channels() at rest, for quaternions.
 _REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 
 
 def rig_of(armature: bpy.types.Object) -> Rig:
-    """The bones of an armature object, parents first."""
+    """Returns the bones of an armature object, parents first."""
     waiting = [bone for bone in reversed(armature.data.bones) if bone.parent is None]
     bones = []
     while waiting:
@@ -58,7 +59,7 @@ def rig_of(armature: bpy.types.Object) -> Rig:
 
 
 def up_of(armature: bpy.types.Object) -> np.ndarray:
-    """[3]: the world's Z in armature space, of length 1."""
+    """Returns [3]: the world's Z in armature space, of length 1."""
     up = np.array(armature.matrix_world.to_3x3().normalized().inverted_safe(), dtype=np.float64)[:, 2]
     length = float(np.linalg.norm(up))
     return up / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
@@ -67,11 +68,11 @@ def up_of(armature: bpy.types.Object) -> np.ndarray:
 def read(
     armature: bpy.types.Object, action: bpy.types.Action, rig: Rig | None = None
 ) -> Generator[float, None, Clip]:
-    """An action's bones at every frame, as the armature would play it; yields the share that is done.
+    """Reads an action's bones at every frame, as the armature would play it; yields the progress, 0 to 1.
 
-    From its first key of a bone to its last, or its manual frame range; a cycle where that says so. Curves'
-    modifiers act, constraints and drivers do not. A bone is at rest in what has no keys. Raises SinewError
-    where it moves no bone.
+    From its first key of a bone to its last, or its manual frame range; it is a cycle where that says so.
+    F-curve modifiers apply, constraints and drivers do not. Channels without keys are at rest. Raises
+    SinewError where it moves no bone.
     """
     rig = rig_of(armature) if rig is None else rig
     curves = _playing(armature, action)
@@ -97,16 +98,16 @@ def read(
 
 
 def keyed_properties(armature: bpy.types.Object, action: bpy.types.Action) -> set[tuple[str, str]]:
-    """What an action keys: bones with "location", "rotation" or "scale"."""
+    """Returns what an action keys: bones with "location", "rotation" or "scale"."""
     return {(bone, _property_of(column)) for _curve, bone, column in _playing(armature, action)}
 
 
 def write(
     armature: bpy.types.Object, clip: Clip, name: str, first_frame: float, keyed: set[tuple[str, str]]
 ) -> Generator[float, None, bpy.types.Action]:
-    """A new action of plain keys at every frame, straight lines between them; nothing plays it yet.
+    """Makes a new action with keys at every frame and linear interpolation; nothing plays it yet.
 
-    keyed  as of keyed_properties(); what is not at rest is keyed as well
+    keyed  as from keyed_properties(); whatever is not at rest is keyed as well
     """
     rig, count = clip.rig, len(clip.poses.rigid)
     modes = _modes(armature, rig)
@@ -139,10 +140,10 @@ def write(
 
 
 def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Action]:
-    """The animations in a .bvh, .glb, .gltf or .fbx file as new actions of `armature`; Blender's importers
-    read it into a scene of its own, which is removed again.
+    """Imports the animations of a .bvh, .glb, .gltf or .fbx file as new actions of `armature`. Blender's
+    importers read it into a separate scene, which is then removed.
 
-    Raises SinewError where the file has none, or its bones rest otherwise.
+    Raises SinewError where the file has no animation, or its bones have another rest pose.
     """
     importer = IMPORTERS.get(path.suffix.lower())
     if importer is None:
@@ -156,7 +157,7 @@ def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Act
             raise SinewError(f"{path}: has no animation of an armature")
         for source, action in sources:
             clip = _on_rig(finished(read(source, action)), rig, path)
-            # Without what Blender added where an action of this name was there.
+            # Without the number that Blender adds where an action of this name exists.
             own = re.sub(r"\.\d{3}$", "", action.name)
             name = path.stem if len(sources) == 1 else f"{path.stem} {own}"
             keyed = {each for each in keyed_properties(source, action) if each[0] in rig.names}
@@ -168,7 +169,7 @@ def import_actions(armature: bpy.types.Object, path: Path) -> list[bpy.types.Act
 
 
 def _playing(armature: bpy.types.Object, action: bpy.types.Action) -> list[tuple[bpy.types.FCurve, str, int]]:
-    """The curves that move the armature's bones, with the bone and the column of its channels."""
+    """Returns the curves that move the armature's bones, each with the bone and the column of its channel."""
     rotations = pose_io.rotation_properties(armature.pose.bones)
     found = actions.unmuted_curves(action, actions.slot_for(action, armature))
     return [
@@ -180,7 +181,8 @@ def _playing(armature: bpy.types.Object, action: bpy.types.Action) -> list[tuple
 
 
 def _times(action: bpy.types.Action, curves: list[bpy.types.FCurve]) -> np.ndarray:
-    """Even times from first to last, a frame apart; less where that is no whole number of frames."""
+    """Returns even times from first to last, a frame apart; less where that is not a whole number of
+    frames."""
     if action.use_frame_range:
         first, last = action.frame_start, action.frame_end
     else:
@@ -194,7 +196,7 @@ def _modes(armature: bpy.types.Object, rig: Rig) -> np.ndarray:
 
 
 def _rest_channels(modes: np.ndarray) -> np.ndarray:
-    """[bones, 10] of bones at rest in their rotation modes."""
+    """Returns [bones, 10]: channels of bones at rest in their rotation modes."""
     channels = np.tile(_REST, (len(modes), 1))
     channels[modes == "AXIS_ANGLE", 3:7] = (0.0, 0.0, 1.0, 0.0)
     channels[~np.isin(modes, list(pose_io.ROTATION_PROPERTIES)), 3:7] = 0.0
@@ -206,7 +208,7 @@ def _property_of(column: int) -> str:
 
 
 def _kinds(mode: str) -> list[tuple[str, slice, np.ndarray]]:
-    """Each property with its columns, and its values at rest."""
+    """Returns each property with its columns, and its values at rest."""
     width = 4 if mode in pose_io.ROTATION_PROPERTIES else 3
     columns = {"location": slice(0, 3), "rotation": slice(3, 3 + width), "scale": slice(7, 10)}
     rest = _rest_channels(np.array([mode]))[0]
@@ -223,7 +225,7 @@ def _fill(curve: bpy.types.FCurve, times: np.ndarray, values: np.ndarray) -> Non
 
 
 def _on_rig(clip: Clip, rig: Rig, path: Path) -> Clip:
-    """The clip of a like armature on another's bones; those that it lacks are at rest."""
+    """Returns the clip of a similar armature for the bones of `rig`; bones that it lacks are at rest."""
     rows = [(row, clip.rig.names.index(name)) for row, name in enumerate(rig.names) if name in clip.rig.names]
     if not rows:
         raise SinewError(f"{path}: has no bone of this armature's names: rename bones in one of them")
@@ -242,7 +244,8 @@ def _on_rig(clip: Clip, rig: Rig, path: Path) -> Clip:
 
 
 def _actions_of(obj: bpy.types.Object) -> list[bpy.types.Action]:
-    """The actions that an importer made for an armature object: what it plays and what its tracks hold."""
+    """Returns the actions that an importer made for an armature object: the one that it plays and those in
+    its tracks."""
     animation = obj.animation_data
     if animation is None:
         return []
@@ -252,7 +255,7 @@ def _actions_of(obj: bpy.types.Object) -> list[bpy.types.Action]:
 
 
 def finished(steps: Generator[float, None, Result]) -> Result:
-    """What a generator of this file returns."""
+    """Runs a generator of this file to its end, and returns its result."""
     while True:
         try:
             next(steps)
@@ -262,8 +265,8 @@ def finished(steps: Generator[float, None, Result]) -> Result:
 
 @contextmanager
 def _imported(path: Path, importer: Callable[[str], object]) -> Iterator[list[bpy.types.Object]]:
-    """The objects of a file in a scene of their own, at the open scene's frame rate; afterwards all that the
-    importer made is gone."""
+    """Context with the objects of a file, imported into a separate scene at the open scene's frame rate;
+    afterwards everything that the importer made is removed."""
     before = bpy.context.scene
     known = {block.session_uid for block in _blocks()}
     scene = bpy.data.scenes.new(path.stem)
@@ -281,7 +284,7 @@ def _imported(path: Path, importer: Callable[[str], object]) -> Iterator[list[bp
 
 @contextmanager
 def _shown(scene: bpy.types.Scene) -> Iterator[None]:
-    """Importers add to the scene of the context."""
+    """Makes the scene the one of the context, to which importers add."""
     window = bpy.context.window
     if window is None:
         with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):

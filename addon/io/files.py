@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens what people have, and saves without ever writing over it."""
+"""Opens files, and saves copies so that an existing file is never left half-written."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ BLEND_MAGIC = b"BLENDER"
 ZSTANDARD_MAGIC = b"\x28\xb5\x2f\xfd"
 COMPRESSED_MAGIC = (ZSTANDARD_MAGIC, b"\x1f\x8b")  # the other is gzip, up to Blender 2.93
 
-# Zstandard's seekable format, as Blender writes it: a skippable frame at the end, with two numbers a frame.
+# Zstandard's seekable format, as Blender writes it: a skippable frame at the end, with two numbers for each
+# frame.
 SEEK_TABLE_MAGIC = 0x8F92EAB1
 SKIPPABLE_HEADER = 8
-# Bytes of the last block of a file that is not compressed: up to Blender 4.5, and since.
+# Size in bytes of the last block of an uncompressed file: up to Blender 4.5, and since.
 LAST_BLOCK = (24, 32)
 
 
-# What Blender and Python put before the sentence.
+# What Blender and Python put before the actual message.
 _ABOUT_ERROR = re.compile(r"^((Error|OSError): |\[Errno \d+\] )+")
 
 
@@ -42,13 +43,13 @@ def open_file(
     scripts: bool = False,
     importers: Mapping[str, Callable[[str], object]] = IMPORTERS,
 ) -> None:
-    """Makes `path` the open file: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
+    """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene.
 
-    load_ui    with the file's own windows and workspaces, which a copy of it is to keep
-    scripts    whether those in the file run
-    importers  by their endings, of what else than a .blend is read
+    load_ui    also loads the file's windows and workspaces, for a copy that keeps them
+    scripts    whether scripts in the file run
+    importers  for files other than .blend, by their extensions
 
-    Raises SinewError where it can not be read.
+    Raises SinewError where it cannot be read.
     """
     check_readable(path, (".blend", *importers))
     try:
@@ -59,18 +60,19 @@ def open_file(
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             importer(str(path))
     except RuntimeError as error:
-        # Blender names the file again, up to twice.
+        # Blender repeats the file name, up to twice.
         reason = telling_line(error).rpartition(str(path))[2].lstrip("'\": ,")
         if reason == "not a blend file":
-            # It begins as one does, and older Blenders say no more of what newer ones write.
+            # It begins like a .blend, and older Blenders report nothing else for files of newer ones.
             reason += f", or of a Blender newer than {bpy.app.version_string}"
         raise SinewError(f"{path}: Blender can not read it: {reason}") from None
 
 
 def save_copy(source: Path, target: Path, name_others: Callable[[], None] = lambda: None) -> None:
-    """Saves the open file as `target`, compressed if `source` was; beside it first, then renamed.
+    """Saves the open file as `target`, compressed if `source` was; first under another name beside it, then
+    renamed.
 
-    name_others  gives the files that it refers to their names, once the copy is whole: where it is, all is
+    name_others  renames the files that it refers to, once the copy is complete
     """
     unfinished = target.with_name(f".{target.stem}.unfinished.blend")
     save_beside(source, target, unfinished)
@@ -98,13 +100,13 @@ def save_beside(source: Path | None, target: Path, unfinished: Path) -> None:
 
 
 def check_free(path: Path, overwrite: bool) -> None:
-    """Raises SinewError where a file is at `path` that may not be replaced."""
+    """Raises SinewError where a file at `path` exists that may not be replaced."""
     if path.exists() and not overwrite:
         raise SinewError(f"{path}: is there already; choose to overwrite it, or another folder")
 
 
 def check_readable(path: Path, readable: Sequence[str]) -> None:
-    """Raises SinewError where `path` is no file with one of these endings, or no .blend named so."""
+    """Raises SinewError where `path` is not a file with one of these extensions, or not really a .blend."""
     if not path.exists():
         raise SinewError(f"{path}: no such file")
     if path.is_dir():
@@ -125,8 +127,8 @@ def check_readable(path: Path, readable: Sequence[str]) -> None:
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether all that Blender wrote is in a file: of a compressed one it does not notice that a disk is full
-    (seen on 4.2 and 5.2; it drops the error of its Zstandard writer)."""
+    """Whether a file contains everything that Blender wrote: for compressed files Blender does not notice a
+    full disk (seen on 4.2 and 5.2; it drops the error of its Zstandard writer)."""
     with path.open("rb") as file:
         is_compressed = file.read(4) == ZSTANDARD_MAGIC
         size = file.seek(0, os.SEEK_END)
@@ -134,7 +136,7 @@ def _is_whole(path: Path) -> bool:
             file.seek(-min(size, max(LAST_BLOCK)), os.SEEK_END)
             end = file.read()
             return any(end[-length:].startswith(b"ENDB") for length in LAST_BLOCK)
-        # At its end the sizes of all frames are listed, as they were meant to be written.
+        # A table at the end lists the sizes of all frames, as they were meant to be written.
         footer = struct.Struct("<IBI")
         if size < footer.size:
             return False
@@ -156,12 +158,12 @@ def _is_compressed(path: Path) -> bool:
 
 
 def telling_line(error: Exception) -> str:
-    """What was wrong, of all that Blender wrote."""
+    """Returns the line that says what was wrong, from everything that Blender printed."""
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     lines = [_ABOUT_ERROR.sub("", line.strip()) for line in text.splitlines()]
-    # Where in its own code Blender was is of no use to whoever reads this.
+    # The position in Blender's own code is of no use to readers.
     lines = [line for line in lines if line and not line.startswith("Location: ")]
     if not lines:
         return type(error).__name__
-    # An importer written in Python hands over its whole traceback: the last line says what was wrong.
+    # Importers written in Python pass on their whole traceback: its last line says what was wrong.
     return lines[-1] if "Traceback" in lines[0] else lines[0]

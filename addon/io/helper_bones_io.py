@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helper bones in an armature of their own copy, their keys, and the weights of a mesh that has them."""
+"""Adds helper bones to an armature, and writes their keys and the weights of a mesh that has them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from . import actions, mesh_io
 
 COLLECTION = "Sinew helpers"
 ERRORS = "Sinew bake error"
-# What Blender takes for a bone's name, in bytes.
+# Blender's limit for a bone's name, in bytes.
 _LONGEST_NAME = 63
-# Of the length of the bone that it hangs under.
+# Share of the length of the parent bone.
 _LENGTH = 0.25
 
 
 def read_joints(rig: bpy.types.Object, bones: Bones) -> Joints:
-    """How far its bones may rotate: the limits of inverse kinematics, where they are set."""
+    """Returns how far its bones may rotate: the limits of inverse kinematics, where they are set."""
     number = {name: bone for bone, name in enumerate(bones.names)}
     parents = np.full(len(bones.names), -1)
     limits = np.full((len(bones.names), 3, 2), np.nan)
@@ -47,12 +47,11 @@ def add_bones(
     hanging: bool = True,
     kind: str = "Helper",
 ) -> list[str]:
-    """Gives an armature object a helper bone for each of the `parents`.
+    """Gives an armature object a helper bone for each of the `parents`. Returns their names.
 
     heads    float [helpers, 3], armature space
-    hanging  under these; else without a parent
+    hanging  they become children of these; otherwise they have no parent
     kind     how their names begin: a Helper moves vertices, others move helpers
-    Returns their names.
     """
     names = []
     with _editing(rig) as armature:
@@ -66,7 +65,7 @@ def add_bones(
             bone.matrix = placed
             bone.parent, bone.use_connect = parent if hanging else None, False
             bone.use_deform = kind == "Helper"
-            # A motion that is rigid but for the parent's size.
+            # The motion is rigid except for the parent's size.
             bone.inherit_scale = "AVERAGE"
             collection.assign(bone)
             names.append(bone.name)
@@ -76,7 +75,7 @@ def add_bones(
 
 
 def use_copy_of_armature(rig: bpy.types.Object) -> None:
-    """The one without helper bones stays in the file."""
+    """Gives the object its own copy of the armature; the one without helper bones stays in the file."""
     if rig.data.library is None:
         rig.data.use_fake_user = True
     rig.data = rig.data.copy()
@@ -95,10 +94,10 @@ def _free_name(armature: bpy.types.Armature, kind: str, parent: str) -> str:
 def add_constraints(
     rig: bpy.types.Object, names: Sequence[str], blends: Sequence[Blend], bones: Sequence[str]
 ) -> None:
-    """Has each helper bone follow the pose of the rig's own. Where its head is a centre, another bone there
-    blends linearly, which moves nothing else.
+    """Has each helper bone follow the pose of the armature's own bones. Where a helper's head is a centre, a
+    second bone there blends linearly; it moves no vertices.
 
-    bones  names of those that blends mean
+    bones  names of the bones that the blends refer to
     """
     for name, blend in zip(names, blends, strict=True):
         _blend(rig, name, blend, bones, preserve_volume=True)
@@ -130,11 +129,11 @@ def write_keys(
     parent_poses: np.ndarray,
     times: Sequence[float],
 ) -> None:
-    """Keys of the helper bones, with straight lines between them, in a copy of the armature's action or in a
+    """Writes keys of the helper bones, with linear interpolation, in a copy of the armature's action or in a
     new one; the action without them stays in the file.
 
     motions       float64 [times, helpers, 4, 4], armature space: from rest to posed
-    parent_poses  float64 [times, helpers, 4, 4], armature space: of the bone above each
+    parent_poses  float64 [times, helpers, 4, 4], armature space: of each helper's parent bone
     """
     _use_copy_of_action(rig)
     for number, name in enumerate(names):
@@ -159,7 +158,7 @@ def _use_copy_of_action(rig: bpy.types.Object) -> None:
 
 
 def _channels(bone: bpy.types.Bone, motions: np.ndarray, parent_poses: np.ndarray) -> np.ndarray:
-    """float64 [times, 10]: location, quaternion and scale, as in pose_io.read_channels()."""
+    """Returns float64 [times, 10]: location, quaternion and scale, as in pose_io.read_channels()."""
     rest = np.array(bone.matrix_local, dtype=np.float64)
     channels = np.empty((len(motions), 10))
     for number, (motion, parent) in enumerate(zip(motions, parent_poses, strict=True)):
@@ -172,7 +171,7 @@ def _channels(bone: bpy.types.Bone, motions: np.ndarray, parent_poses: np.ndarra
         )
         location, rotation, scale = basis.decompose()
         channels[number] = (*location, *rotation, *scale)
-        # The shorter way from key to key.
+        # Takes the shorter way from key to key.
         if number and channels[number, 3:7] @ channels[number - 1, 3:7] < 0.0:
             channels[number, 3:7] *= -1.0
     return channels
@@ -182,7 +181,7 @@ def _write_curves(rig: bpy.types.Object, name: str, channels: np.ndarray, times:
     bone = rig.pose.bones[name]
     has_scale = np.abs(channels[:, 7:] - 1.0).max() > 1e-5
     for path in ("location", "rotation_quaternion", *(("scale",) if has_scale else ())):
-        # Makes the action, its slot and the curves, as each version has them.
+        # Makes the action, its slot and the curves in each version's way.
         bone.keyframe_insert(path, frame=times[0], group=name)
     animation = rig.animation_data
     for curve, channel in actions.bone_curves(animation.action, actions.slot_of(animation))[name]:
@@ -199,12 +198,12 @@ def _write_curves(rig: bpy.types.Object, name: str, channels: np.ndarray, times:
 def write_weights(
     obj: bpy.types.Object, bones: Bones, names: Sequence[str], slots: np.ndarray, weights: np.ndarray
 ) -> None:
-    """Gives a mesh object these weights of bones in the place of those that it has; groups of no bone stay.
+    """Replaces a mesh object's weights of bones by these; groups without a bone are unchanged.
 
-    bones           whose groups' weights go, also where a vertex gets none: an option or a mask of the
-                    modifier was against them
+    bones           their groups lose their weights also where a vertex gets none: an option or a mask of the
+                    modifier left these out
     names           of all bones
-    slots, weights  [vertices, n]: numbers of `names`, -1 for none, and their weights
+    slots, weights  [vertices, n]: indices into `names`, -1 for none, and their weights
     """
     new = [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in _used(names, slots)]
     index = {group.name: group.index for group in new}
@@ -238,7 +237,8 @@ def _used(names: Sequence[str], slots: np.ndarray) -> list[str]:
 
 @contextmanager
 def _editing(rig: bpy.types.Object) -> Iterator[bpy.types.Armature]:
-    """Inside, an armature object alone is in edit mode; modes and selection are as they were afterwards."""
+    """Context in which only this armature object is in edit mode; afterwards modes and selection are as
+    before."""
     layer = bpy.context.view_layer
     active, mode = layer.objects.active, bpy.context.mode
     of_active = active.mode if active is not None else "OBJECT"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's inverse kinematics constraints: what they ask of which bones, and at a frame."""
+"""Reads Blender's inverse kinematics constraints: their settings and bones, and their targets at a frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sinew.ik import Effector
 from ..core.errors import SinewError
 from ..core.ik import Posed, Tree
 
-# The constraints by which bones have the pose that Sinew solved live.
+# The name of the constraints that give bones the pose that Sinew solves live.
 FOLLOWS = "Sinew IK"
 
 
@@ -26,13 +26,13 @@ def read_trees(
     only: Collection[str] | None = None,
     live: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Tree]:
-    """The trees of bones that the IK constraints of an armature object pull, those nearest to the root first.
+    """Returns the trees of bones that the IK constraints of an armature object pull, those nearest to the
+    root first. Constraints whose chains begin at the same bone pull one tree, as in Blender.
 
-    Constraints whose chains begin at one bone pull one tree, as in Blender.
-
-    only  trees that have one of these bones; None: all
+    only  trees that contain one of these bones; None: all
     live  by bone, the constraint that counts although it is muted
-    Raises SinewError where a constraint asks for what Sinew does not do, and where there is no tree.
+
+    Raises SinewError where a constraint needs what Sinew does not support, and where there is no tree.
     """
     chains: dict[str, list[tuple[bpy.types.PoseBone, bpy.types.Constraint]]] = {}
     for bone in armature.pose.bones:
@@ -56,13 +56,13 @@ def read_trees(
 
 
 def follows(constraint: bpy.types.Constraint) -> bool:
-    """Whether it is one by which a bone has the pose that Sinew solved live."""
+    """Whether the constraint gives a bone the pose that Sinew solves live."""
     return constraint.type == "COPY_TRANSFORMS" and constraint.name == FOLLOWS
 
 
 def settings_of(armature: bpy.types.Object, tree: Tree) -> tuple:
-    """All that is read once of a tree's bones and constraints, to be compared; empty where something of it is
-    gone."""
+    """Returns everything that is read once of a tree's bones and constraints, to be compared; empty where any
+    of it is gone."""
     found: list[object] = []
     bones = armature.pose.bones
     for name in tree.bones:
@@ -102,7 +102,7 @@ def constraints_of(armature: bpy.types.Object, tree: Tree) -> list[bpy.types.Con
 
 @contextmanager
 def muted(armature: bpy.types.Object, tree: Tree) -> Iterator[None]:
-    """Inside, a tree's constraints are off."""
+    """Context in which a tree's constraints are muted."""
     names = list(tree.constraints)
     set_muted(armature, names, True)
     try:
@@ -112,7 +112,7 @@ def muted(armature: bpy.types.Object, tree: Tree) -> Iterator[None]:
 
 
 def set_muted(armature: bpy.types.Object, names: Collection[tuple[str, str]], mute: bool) -> None:
-    """What is gone by now is left out."""
+    """Mutes or unmutes constraints. Missing ones are skipped."""
     for bone, name in names:
         owner = armature.pose.bones.get(bone)
         constraint = owner.constraints.get(name) if owner is not None else None
@@ -121,8 +121,8 @@ def set_muted(armature: bpy.types.Object, names: Collection[tuple[str, str]], mu
 
 
 def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
-    """What the evaluated scene has of a tree, whose constraints are off. Raises SinewError where a target can
-    not be read."""
+    """Reads a tree, whose constraints are muted, from the evaluated scene. Raises SinewError where a target
+    cannot be read."""
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = armature.evaluated_get(graph)
     matrices = [evaluated.pose.bones[name].matrix for name in tree.bones]
@@ -131,8 +131,8 @@ def read_posed(armature: bpy.types.Object, tree: Tree) -> Posed:
 
 
 def read_unsolved(evaluated: bpy.types.Object, tree: Tree) -> Posed:
-    """The same of an evaluated armature within Blender's evaluation, before the tree's bones are posed: from
-    their channels, as they are without constraints. What is above the tree, and targets, are evaluated."""
+    """Reads the same from an evaluated armature within Blender's evaluation, before the tree's bones are
+    posed: from their channels, without constraints. The tree's parent and the targets are evaluated."""
     matrices: list[Matrix] = []
     for name, parent in zip(tree.bones, tree.parents.tolist(), strict=True):
         bone = evaluated.pose.bones[name]
@@ -147,7 +147,7 @@ def read_unsolved(evaluated: bpy.types.Object, tree: Tree) -> Posed:
 
 
 def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """float64 [frames, 4]: the quaternion that each armature-space matrix asks for, whatever the bone
+    """Returns float64 [frames, 4]: the local quaternion for each armature-space matrix, whatever the bone
     inherits."""
     rest = bone.bone
     result = np.empty((len(matrices), 4))
@@ -161,7 +161,7 @@ def local_rotations(bone: bpy.types.PoseBone, matrices: np.ndarray, parents: np.
 
 
 class Wanted(NamedTuple):
-    """What a tree's constraints ask for, armature space: matrices, points, and how much each counts."""
+    """The targets of a tree's constraints, in armature space: matrices, points, and influences."""
 
     goals: list[Matrix]
     poles: list[Vector]
@@ -173,9 +173,10 @@ def read_wanted(
     tree: Tree,
     evaluated_of: Callable[[bpy.types.Object], bpy.types.Object] = lambda target: target,
 ) -> Wanted:
-    """Raises SinewError where a target can not be read.
+    """Raises SinewError where a target cannot be read.
 
-    evaluated_of  of what the constraints have as targets; within Blender's evaluation these are evaluated
+    evaluated_of  finds the evaluated target of a constraint; within Blender's evaluation targets are
+                  evaluated
     """
     from_world = evaluated.matrix_world.inverted_safe()
     wanted = Wanted([], [], [])
@@ -205,7 +206,7 @@ def _posed(evaluated: bpy.types.Object, tree: Tree, matrices: list[Matrix], want
 
 
 def _active(bone: bpy.types.PoseBone) -> bpy.types.Constraint | None:
-    """The one of a bone's IK constraints that Blender heeds: the first with an influence."""
+    """Returns the one of a bone's IK constraints that Blender uses: the first with an influence."""
     found = [
         each
         for each in bone.constraints
@@ -219,7 +220,7 @@ def _active(bone: bpy.types.PoseBone) -> bpy.types.Constraint | None:
 
 
 def _chain(bone: bpy.types.PoseBone, constraint: bpy.types.Constraint) -> list[bpy.types.PoseBone]:
-    """From the root to the tip."""
+    """Returns the chain from the root to the tip."""
     at = bone if constraint.use_tail or bone.parent is None else bone.parent
     chain = [at, *at.parent_recursive]
     count = constraint.chain_count
@@ -238,7 +239,7 @@ def _tree(armature: bpy.types.Object, pairs: list[tuple[bpy.types.PoseBone, bpy.
                 index[chain[-1].name],
                 constraint.weight if constraint.use_location else 0.0,
                 constraint.orient_weight if constraint.use_rotation else 0.0,
-                # Blender looks for a pole where a position is wanted, and of one constraint alone.
+                # As in Blender, a pole counts only where a position is wanted, and for a single constraint.
                 len(pairs) == 1 and constraint.pole_target is not None and constraint.use_location,
                 constraint.pole_angle,
             )
@@ -266,7 +267,7 @@ def _tree(armature: bpy.types.Object, pairs: list[tuple[bpy.types.PoseBone, bpy.
 
 
 def _check(armature: bpy.types.Object, tree: Tree) -> None:
-    """Raises SinewError for what would be lost or wrong without a word."""
+    """Raises SinewError for anything that would silently be lost or wrong."""
     for constraint, (bone, _name) in zip(constraints_of(armature, tree), tree.constraints, strict=True):
         stretched = [name for name in tree.bones if armature.pose.bones[name].ik_stretch > 0.0]
         if constraint.use_stretch and stretched:
@@ -295,7 +296,7 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
 
 
 def _target(armature: bpy.types.Object, from_world: Matrix, target: bpy.types.Object, part: str) -> Matrix:
-    """In armature space; all evaluated."""
+    """Returns the target in armature space; all arguments are evaluated."""
     if target.type != "ARMATURE" or not part:
         return from_world @ target.matrix_world
     bone = target.pose.bones.get(part)

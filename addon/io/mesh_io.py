@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rest points, surface, shape keys and weights from a mesh; deformed points into an attribute of it."""
+"""Reads rest points, surface, shape keys and weights from a mesh; writes deformed points into an
+attribute."""
 
 from __future__ import annotations
 
@@ -21,34 +22,33 @@ from ..core.shape_keys import ShapeKeys
 from ..core.stage_mesh import Topology
 from ..core.surface import Surface, coincident_vertices
 
-# The attribute that holds a mesh's vertices: read and written as a whole, where "co" of the vertices takes a
-# hundred times as long.
+# The attribute with a mesh's vertices: as a whole it is read and written a hundred times as fast as the
+# vertices' "co".
 POSITION = "position"
 SHARP_EDGES, SHARP_FACES, CUSTOM_NORMALS = "sharp_edge", "sharp_face", "custom_normal"
 _VECTOR_BYTES = 3 * np.dtype(np.float32).itemsize
 
 
 def find_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """The attribute to read; None where the mesh has none of that name. What is written is looked up by
+    """Returns the attribute to read; None where the mesh has none of that name. To write, use
     attribute_to_write()."""
     index = mesh.attributes.find(name)
     return None if index < 0 else mesh.attributes[index]
 
 
 def attribute_to_write(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """The attribute, with an array that is the mesh's own; None where it has none of that name.
+    """Returns the attribute, with an array that only this mesh has; None where it has none of that name.
 
-    Where one is looked up by its name, in whatever way, Blender expects it to be written, and gives the mesh
-    a copy of an array that it shares with the evaluated mesh and with steps of undo. Each undo then lists the
-    mesh as changed.
+    Blender expects any attribute that is looked up by name to be written, and copies an array that the mesh
+    shares with the evaluated mesh or with undo steps. Each undo then lists the mesh as changed.
     """
     return mesh.attributes.get(name)
 
 
 def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Vertex positions in object space, float32 [vertices, 3]; a copy."""
+    """Returns vertex positions in object space, float32 [vertices, 3]; a copy."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    # In edit mode a mesh has no attributes, and without vertices it need not.
+    # In edit mode a mesh has no attributes, and without vertices it may have none.
     attribute = None if mesh.is_editmode else find_attribute(mesh, POSITION)
     if attribute is not None and len(attribute.data) == len(points):
         attribute.data.foreach_get("vector", points.ravel())
@@ -58,14 +58,15 @@ def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _read_key_points(block: bpy.types.ShapeKey) -> np.ndarray:
-    """float32 [vertices, 3], as stored."""
+    """Returns float32 [vertices, 3], as stored."""
     points = np.empty((len(block.points), 3), dtype=np.float32)
     block.points.foreach_get("co", points.ravel())
     return points
 
 
 def read_sdef_keys(mesh: bpy.types.Mesh) -> np.ndarray | None:
-    """float32 [4, vertices, 3]: the basis, then C, R0 and R1 of the method sdef; None without these keys."""
+    """Returns float32 [4, vertices, 3]: the basis, then C, R0 and R1 of the method sdef; None without these
+    keys."""
     keys = mesh.shape_keys
     blocks = [] if keys is None else [keys.key_blocks.get(name) for name in sdef.KEYS]
     if not blocks or None in blocks:
@@ -76,7 +77,7 @@ def read_sdef_keys(mesh: bpy.types.Mesh) -> np.ndarray | None:
 
 
 def read_triangles(mesh: bpy.types.Mesh) -> np.ndarray:
-    """int32 [triangles, 3]: their vertices."""
+    """Returns int32 [triangles, 3]: the vertices of each."""
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
@@ -97,7 +98,7 @@ def read_topology(mesh: bpy.types.Mesh) -> Topology:
     offsets = np.empty(len(mesh.polygons) + 1, dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", offsets[:-1])
     offsets[-1] = len(corners)
-    # As whole attributes a hundredth of the time.
+    # Reading whole attributes takes a hundredth of the time.
     of_corners, of_edges = (
         None if mesh.is_editmode else find_attribute(mesh, name) for name in (".corner_vert", ".edge_verts")
     )
@@ -111,7 +112,7 @@ def read_topology(mesh: bpy.types.Mesh) -> Topology:
 
 
 def read_shading(mesh: bpy.types.Mesh) -> Shading:
-    """What decides the mesh's normals beside its points."""
+    """Returns what the mesh's normals depend on, apart from its points."""
     return Shading(
         _read_flags(mesh, SHARP_EDGES, mesh.edges, "use_edge_sharp", shown_as=True),
         _read_flags(mesh, SHARP_FACES, mesh.polygons, "use_smooth", shown_as=False),
@@ -126,9 +127,9 @@ def _read_flags(
     property_name: str,
     shown_as: bool,
 ) -> np.ndarray | None:
-    """bool [elements]; None where none is set.
+    """Returns bool [elements]; None where no flag is set.
 
-    shown_as  what the elements' property says where the flag is set, read where the mesh has no attributes
+    shown_as  the value of the elements' property that means a set flag; read where the mesh has no attributes
     """
     if mesh.is_editmode:
         flags = np.empty(len(elements), dtype=bool)
@@ -144,8 +145,8 @@ def _read_flags(
 
 
 def _read_custom_normals(mesh: bpy.types.Mesh) -> np.ndarray | None:
-    """int16 [corners, 2], as Blender stores them in relation to the computed ones; None where there are none.
-    Blender 4.5 and later."""
+    """Returns int16 [corners, 2], as Blender stores them relative to the computed normals; None where there
+    are none. Blender 4.5 and later."""
     attribute = None if mesh.is_editmode else find_attribute(mesh, CUSTOM_NORMALS)
     if attribute is None or attribute.data_type != "INT16_2D" or attribute.domain != "CORNER":
         return None
@@ -155,8 +156,8 @@ def _read_custom_normals(mesh: bpy.types.Mesh) -> np.ndarray | None:
 
 
 def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> None:
-    """Takes normals that Sinew gave off a mesh that was made of an evaluated one; it has again what the mesh
-    had that this was evaluated from.
+    """Removes Sinew's normals from a mesh that was made from an evaluated one, and restores those of the
+    original mesh.
 
     custom  int16 [corners, 2], as Shading.custom
     """
@@ -171,14 +172,14 @@ def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> N
 
 
 def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
-    """All entries of all vertices, in stored order; 0.2 to 0.5 microseconds an entry, four times that for an
-    evaluated mesh whose vertices are others than its shape keys'."""
+    """Returns all entries of all vertices, in stored order. Takes 0.2 to 0.5 microseconds for each entry,
+    four times that for an evaluated mesh whose vertices are not those of its shape keys."""
     keys = mesh.shape_keys
     if keys is not None and len(keys.reference_key.data) != len(mesh.vertices):
-        # A BMesh would be made of as many points of each key as the mesh has vertices, beyond their end.
+        # BMesh would read as many points of each key as the mesh has vertices: beyond the end of the array.
         return _read_groups_of(mesh.vertices)
-    # A BMesh gives a vertex's entries at once; vertex.groups makes a Python object of each, which takes two
-    # to four times as long, the making of the BMesh counted.
+    # BMesh gives a vertex's entries at once; vertex.groups makes a Python object of each, which takes two to
+    # four times as long even with the time to make the BMesh.
     edited = bmesh.new()
     try:
         edited.from_mesh(mesh, face_normals=False, vertex_normals=False)
@@ -205,9 +206,10 @@ def _read_groups_of(vertices: bpy.types.bpy_prop_collection) -> GroupWeights:
 
 
 def write_group_weights(obj: bpy.types.Object, rows: Mapping[int, Mapping[int, float]]) -> None:
-    """Gives vertices other weights, also in edit mode: those that stay keep their place in the stored order.
+    """Gives vertices other weights, also in edit mode. Entries that stay keep their position in the stored
+    order.
 
-    rows  the weight in each group, by its index, of each vertex that changes, by its own
+    rows  for each vertex that changes, by its index: its weight in each group, by the group's index
     """
     if obj.mode == "EDIT":
         edited = bmesh.from_edit_mesh(obj.data)
@@ -232,7 +234,7 @@ def write_group_weights(obj: bpy.types.Object, rows: Mapping[int, Mapping[int, f
 
 
 def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys | None:
-    """The relative shape keys of a mesh object, None where it has none.
+    """Returns the relative shape keys of a mesh object, None where it has none.
 
     Raises SinewError for absolute keys.
     """
@@ -260,7 +262,7 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
 
 
 def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
-    """float32 [keys]: the value of each shape key at this evaluation; 0 where it is muted."""
+    """Returns float32 [keys]: the value of each shape key at this evaluation; 0 where it is muted."""
     blocks = evaluated_keys.key_blocks
     values = np.empty(len(blocks), dtype=np.float32)
     muted = np.empty(len(blocks), dtype=bool)
@@ -271,9 +273,9 @@ def read_key_values(evaluated_keys: bpy.types.Key) -> np.ndarray:
 
 
 def read_pinned_points(keys: bpy.types.Key, active: int) -> np.ndarray:
-    """float32 [vertices, 3]: the shape key shown alone, as it is stored; the basis where it is muted.
+    """Returns float32 [vertices, 3]: the pinned shape key as stored; the basis where it is muted.
 
-    active  its index
+    active  the index of the shape key
     """
     block = keys.key_blocks[active] if 0 <= active < len(keys.key_blocks) else keys.reference_key
     return _read_key_points(keys.reference_key if block.mute else block)
@@ -296,7 +298,7 @@ def write_values(mesh: bpy.types.Mesh, name: str, values: np.ndarray) -> None:
 
 
 def _add_attribute(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str) -> bpy.types.Attribute:
-    """A new attribute becomes the active one, which is the artist's choice: here it stays what it was."""
+    """Adds an attribute. Blender would make it active; here the artist's choice stays."""
     active = mesh.attributes.active_index
     attribute = mesh.attributes.new(name, data_type, domain)
     mesh.attributes.active_index = active
@@ -312,16 +314,17 @@ def _is_of_vectors(attribute: bpy.types.Attribute | None, domain: str) -> bool:
 
 
 def domain_size(mesh: bpy.types.Mesh, domain: str) -> int:
-    """Vertices or corners."""
+    """The number of vertices or corners."""
     return len(mesh.vertices if domain == "POINT" else mesh.loops)
 
 
 def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT") -> np.ndarray | None:
-    """The memory of the evaluated mesh's attribute `name` of the domain, float32 [vertices or corners, 3],
-    which Blender then does not share with another mesh. Valid until the mesh is evaluated again or changed.
+    """Returns the memory of the evaluated mesh's attribute `name` in the domain, float32 [vertices or
+    corners, 3], which Blender then does not share with another mesh. Valid until the mesh is evaluated again
+    or changed.
 
-    None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not in
-    one piece.
+    None for a mesh without vertices, or without such an attribute of vectors, and where the memory is not
+    contiguous.
     """
     attribute = attribute_to_write(evaluated_mesh, name)
     if not _is_of_vectors(attribute, domain):
@@ -338,8 +341,8 @@ def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT")
 
 @functools.lru_cache(maxsize=256)
 def _vectors_at(address: int, count: int) -> np.ndarray:
-    """float32 [count, 3]: that memory, of which it owns nothing. Blender gives one mesh after the other the
-    same memory, and to look the array up takes a tenth of making it."""
+    """Returns float32 [count, 3], an array on that memory, without ownership. Cached, as Blender reuses the
+    same memory for mesh after mesh, and the cache takes a tenth of the time of making the array."""
     return np.ndarray((count, 3), np.float32, (ctypes.c_float * (3 * count)).from_address(address))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pose bones' location, rotation and scale from and to Blender, in any rotation mode."""
+"""Reads and writes pose bones' location, rotation and scale, in any rotation mode."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ ROTATION_PROPERTIES = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotat
 
 
 def rotation_properties(bones: bpy.types.bpy_prop_collection) -> dict[str, str]:
-    """By name, the one of each pose bone's three rotations that turns it."""
+    """Returns, by name, each pose bone's rotation property that is in use."""
     return {bone.name: ROTATION_PROPERTIES.get(bone.rotation_mode, "rotation_euler") for bone in bones}
 
 
 def read_channels(bones: bpy.types.bpy_prop_collection) -> np.ndarray:
-    """float32 [bones, 10]: location 3, rotation 4 (Euler angles: 3 and a 0), scale 3 of pose bones as set."""
+    """Returns float32 [bones, 10] as set on the pose bones: location 3, rotation 4 (Euler angles: 3 and a 0),
+    scale 3."""
     channels = np.zeros((len(bones), CHANNELS), dtype=np.float32)
     for name, columns, rows in _channel_blocks(bones):
         width = columns.stop - columns.start
@@ -30,7 +31,7 @@ def read_channels(bones: bpy.types.bpy_prop_collection) -> np.ndarray:
 
 
 def write_channels(bones: bpy.types.bpy_prop_collection, channels: np.ndarray) -> bool:
-    """Sets what differs from `channels`, as read_channels() has them; whether anything did."""
+    """Sets what differs from `channels`, as from read_channels(). Returns whether anything did."""
     changed = False
     for name, columns, rows in _channel_blocks(bones):
         values = _read_channel(bones, name, columns.stop - columns.start)
@@ -44,7 +45,7 @@ def write_channels(bones: bpy.types.bpy_prop_collection, channels: np.ndarray) -
 def _channel_blocks(
     bones: bpy.types.bpy_prop_collection,
 ) -> list[tuple[str, slice, np.ndarray]]:
-    """Each property of the channels, its columns and the bones (rows) that are moved by it."""
+    """Returns each property of the channels, its columns and the bones (rows) that use it."""
     rotations = np.array(list(rotation_properties(bones).values()))
     everything = np.ones(len(bones), dtype=bool)
     blocks = [("location", slice(0, 3), everything), ("scale", slice(7, 10), everything)]
@@ -61,8 +62,8 @@ def _read_channel(bones: bpy.types.bpy_prop_collection, name: str, width: int) -
 
 
 def poses_of(channels: np.ndarray, modes: np.ndarray) -> Poses:
-    """Bones' transforms relative to their rest, from channels [bones, 10] in rotation `modes` [bones]. A
-    quaternion or an axis of length 0 is no rotation."""
+    """Returns bones' transforms relative to rest, from channels [bones, 10] in rotation `modes` [bones]. A
+    quaternion or an axis of length 0 means no rotation."""
     rigid = np.empty((len(channels), 7))
     for mode in np.unique(modes):
         rows = modes == mode
@@ -72,7 +73,8 @@ def poses_of(channels: np.ndarray, modes: np.ndarray) -> Poses:
 
 
 def channels_of(poses: Poses, modes: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """What poses_of() undoes, float64 [bones, 10]; of the ways to write a rotation that close to `near`."""
+    """The inverse of poses_of(), float64 [bones, 10]; of equivalent rotation values it takes those closest to
+    `near`."""
     channels = np.zeros((len(modes), CHANNELS))
     channels[:, :3], channels[:, 7:] = poses.rigid[:, 4:], poses.scale
     for mode in np.unique(modes):
@@ -83,8 +85,8 @@ def channels_of(poses: Poses, modes: np.ndarray, near: np.ndarray) -> np.ndarray
 
 
 def closer(channels: np.ndarray, modes: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """`channels` with rotations that are written far from `near` written anew: the other quaternion, angles
-    without the full turns between them."""
+    """Returns `channels`, where rotation values far from `near` are replaced by equivalent ones: the
+    antipodal quaternion, or angles without the full turns between them."""
     quaternions = modes == "QUATERNION"
     against = (channels[:, 3:7] * near[:, 3:7]).sum(axis=1) < 0.0
     turned = np.abs(channels[:, 3:7] - near[:, 3:7]).max(axis=1) > np.pi
@@ -114,22 +116,22 @@ def _rotations(quaternions: np.ndarray, mode: str, near: np.ndarray) -> np.ndarr
     if mode == "QUATERNION":
         return np.where((quaternions * near).sum(axis=1, keepdims=True) < 0.0, -quaternions, quaternions)
     screw = sinew.quat_vec.to_screw(_pairs(quaternions))
-    # Both directions of an axis are written as well: the one near the axis that is set.
+    # A rotation has two equivalent axes: take the one closer to the axis that is set.
     signs = np.where((screw.axis * near[:, 1:]).sum(axis=1) < 0.0, -1.0, 1.0)
     angles = signs * screw.angle
     rounds = np.round((near[:, 0] - angles) / (2.0 * np.pi))
-    # The identity has any axis: it keeps the one that is set.
+    # The identity can have any axis: keep the one that is set.
     axes = np.where(screw.angle[:, None] > 0.0, signs[:, None] * screw.axis, near[:, 1:])
     return np.column_stack([angles + 2.0 * np.pi * rounds, _unit(axes, otherwise=(0.0, 1.0, 0.0))])
 
 
 def _pairs(quaternions: np.ndarray) -> np.ndarray:
-    """As sinew.quat_vec has them, [n, 7], without translation."""
+    """Returns [n, 7], as sinew.quat_vec takes them, without translation."""
     return np.pad(quaternions, ((0, 0), (0, 3)))
 
 
 def _unit(vectors: np.ndarray, otherwise: tuple[float, ...]) -> np.ndarray:
-    """Each row at length 1; `otherwise` in the place of one of length 0."""
+    """Returns each row normalised; `otherwise` in place of a row of length 0."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(
         vectors, lengths, out=np.broadcast_to(otherwise, vectors.shape).copy(), where=lengths > 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured values as people read them, in the units that the preferences choose."""
+"""Formats measured values for display, in the units that the preferences choose."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import bpy
 
 from . import addon_preferences
 
-# Of lengths.
+# Choices for lengths.
 OF_SCENE, MILLIMETRES, NONE = "SCENE", "MILLIMETRES", "NONE"
-# Below this part of a unit a length is none.
+# Shorter lengths, as a share of a unit, are shown as 0.
 LEAST_LENGTH = 1e-6
 
 
 def text(scene: bpy.types.Scene, unit: str, value: float, signed: bool = False, short: bool = False) -> str:
-    """A value whose unit is "length", "ratio" or "share", as in Metric, or "area" or "volume"; "not defined"
-    for NaN.
+    """Formats a value whose unit is "length", "ratio" or "share", as in Metric, or "area" or "volume"; "not
+    defined" for NaN.
 
-    signed  with a plus above zero, as for a change
+    signed  with a plus for positive values, as for a change
     short   for a narrow column
     """
     if value != value:
@@ -41,7 +41,7 @@ def _power_of_length(settings: bpy.types.UnitSettings, unit: str, value: float, 
         return f"{value:.{digits}g}"
     value *= settings.scale_length**power
     if settings.system == "METRIC":
-        # Blender would have thousands of cubic centimetres.
+        # Blender would print thousands of cubic centimetres.
         return f"{value:.{digits}g} m{'²³'[power - 2]}"
     return bpy.utils.units.to_string(settings.system, unit.upper(), value, precision=digits)
 

@@ -28,14 +28,14 @@ class Job:
 
 
 def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> list[Job]:
-    """A job for each file of `inputs`: files, folders (all .blend files below them), patterns such as
-    "characters/**/*.blend", and STANDARD_INPUT, which stands for the paths `listed`, one a line.
+    """Returns a job for each file of `inputs`: files, folders (all .blend files below them), patterns such as
+    "characters/**/*.blend", and STANDARD_INPUT, which stands for the paths `listed`, one per line.
 
-    A single file's copy is written right into `out`. The tree below a folder, below the fixed part of a
-    pattern, or below what all listed files have in common is kept there.
+    A single file's copy is written directly to `out`. For a folder, a pattern or listed files, the tree is
+    kept: below the folder, below the pattern's fixed part, or below the listed files' common folder.
 
-    Raises WrongUse, before anything is done, where an input means no file, a copy would be written over an
-    input, or two would have one name. A file that can not be read is reported by its own job.
+    Raises WrongUse, before any work starts, where an input matches no file, a copy would overwrite an input,
+    or two copies would have the same name. A file that cannot be read is reported by its own job.
     """
     out = Path(os.path.abspath(out))
     jobs: dict[Path, Job] = {}
@@ -49,8 +49,8 @@ def plan_jobs(inputs: Iterable[str], out: Path, listed: Iterable[str] = ()) -> l
 
 
 def _files_of(given: str, out: Path, listed: Iterable[str]) -> tuple[Path, list[Path]]:
-    """The absolute paths of one input, and the folder below which the tree is kept."""
-    # Absolute without following links: a linked folder keeps its name.
+    """Returns the absolute paths of one input, and the folder below which the tree is kept."""
+    # Made absolute without following links, so that a linked folder keeps its name.
     path = Path(os.path.abspath(given))
     if given == STANDARD_INPUT:
         lines = [line for line in (line.strip("\r\n") for line in listed) if line]
@@ -88,7 +88,8 @@ def blend_files_below(folder: Path) -> Iterator[Path]:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """All files below, also in linked folders, but not in links to a folder above, which have no end."""
+    """Yields all files below, also in linked folders, but not in links to a parent folder, which would never
+    end."""
     for path, folders, names in os.walk(folder, followlinks=True):
         above = {os.path.realpath(part) for part in (Path(path), *Path(path).parents)}
         folders[:] = [name for name in folders if os.path.realpath(os.path.join(path, name)) not in above]
@@ -96,8 +97,8 @@ def _files_below(folder: Path) -> Iterator[Path]:
 
 
 def _matching(root: Path, pattern: Path) -> Iterator[Path]:
-    """The files below `root` that match a pattern of glob: ** stands for any folders, and * for nothing
-    hidden. glob itself does not end where links lead to a folder above."""
+    """Returns the files below `root` that match a glob pattern: ** stands for any folders, and * does not
+    match hidden names. glob itself does not end if links lead to a parent folder."""
     parts = pattern.parts
     if "**" not in parts:
         found = glob.iglob(os.path.join(glob.escape(str(root)), pattern))
@@ -106,7 +107,7 @@ def _matching(root: Path, pattern: Path) -> Iterator[Path]:
 
 
 def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
-    # The positions in the pattern that the names so far can match up to.
+    # The positions in the pattern up to which the names so far can match.
     positions = {0}
     for name in names:
         shown = not name.startswith(".")
@@ -124,7 +125,7 @@ def _fits(names: tuple[str, ...], parts: tuple[str, ...]) -> bool:
 
 
 def _past_folders(positions: set[int], parts: tuple[str, ...]) -> set[int]:
-    """The positions, with those behind each **, which can also stand for no folder."""
+    """Returns the positions, with those behind each **, which can also stand for no folder."""
     found = set(positions)
     for position in sorted(positions):
         while position < len(parts) and parts[position] == "**":
@@ -134,7 +135,8 @@ def _past_folders(positions: set[int], parts: tuple[str, ...]) -> set[int]:
 
 
 def _fixed_part(pattern: Path) -> Path:
-    """The folder above all files of a pattern. A part that exists under that exact name is no pattern."""
+    """Returns the folder above all files of a pattern. A part that exists with exactly that name is not a
+    pattern."""
     fixed = Path(pattern.anchor)
     for part in pattern.parts[1:-1]:
         if glob.has_magic(part) and not (fixed / part).exists():
@@ -144,7 +146,7 @@ def _fixed_part(pattern: Path) -> Path:
 
 
 def _is_bake(path: Path) -> bool:
-    """Whether the file is a batch's bake beside a copy; the batch's journal is in a folder above."""
+    """Whether the file is a batch's bake beside a copy; the batch's journal is then in a parent folder."""
     start = path.name.removesuffix(BAKED)
     beside_copy = start != path.name and path.with_name(f"{start}.blend").exists()
     return beside_copy and any((folder / JOURNAL).exists() for folder in path.parents)
@@ -164,6 +166,6 @@ def _check(jobs: list[Job]) -> None:
 
 
 def _resolver() -> Callable[[Path], Path]:
-    """Path.resolve() for many files in few folders: each folder is resolved once."""
+    """Returns Path.resolve() for many files in few folders: each folder is resolved once."""
     folder = cache(Path.resolve)
     return lambda path: path.resolve() if path.is_symlink() else folder(path.parent) / path.name

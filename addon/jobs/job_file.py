@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The job file: a batch's settings in TOML, for all files, for some, for single objects (docs/batch.md)."""
+"""The job file: a batch's settings in TOML, for all files, for some files, for single objects
+(docs/batch.md)."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from .schema import Position, SchemaError, read
 
 @dataclass(frozen=True)
 class ObjectRule:
-    """Settings of the objects whose name matches; None where the file has none."""
+    """Settings of the objects whose name matches; None for what the file does not set."""
 
     match: str
     method: str | None = None
@@ -37,10 +38,10 @@ class Settings:
 
     include, exclude  patterns of names of objects and of collections
     scale             name of a scale rule
-    set               parameters as NAME=VALUE; later ones win
+    set               parameters as NAME=VALUE; later ones override earlier ones
     bake              kinds of bakes, written beside the copy
     bake_frames       as typed; None: those of the file's scene
-    objects           later ones win
+    objects           later rules override earlier ones
     """
 
     method: str | None = None
@@ -66,16 +67,16 @@ class Settings:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """All kinds of bakes that any object of the file has, each once."""
+        """All kinds of bakes of the file's objects, each once."""
         every = [*(self.bake or ()), *(kind for rule in self.objects for kind in rule.bake or ())]
         return tuple(dict.fromkeys(every))
 
     def check_bakes(self) -> None:
-        """Raises WrongUse where a bake can not have the frames."""
+        """Raises WrongUse where a bake is not possible for the frames."""
         check_bakes(self.kinds, self.bake_frames)
 
     def as_task(self) -> dict:
-        """As JSON, for tasks and for the journal."""
+        """Returns the settings as JSON, for tasks and for the journal."""
         return {
             "method": self.method,
             "include": list(self.include or ()),
@@ -90,14 +91,15 @@ class Settings:
 
 @dataclass(frozen=True)
 class FileRule:
-    """Settings of the files whose path matches, as "hero*.blend" or "characters/*.blend", from the right."""
+    """Settings of the files whose path matches, as "hero*.blend" or "characters/*.blend", compared from the
+    right."""
 
     match: tuple[str, ...]
     settings: Settings
     line: int
 
     def matches(self, path: PurePath) -> bool:
-        """Whether a pattern matches, or equals the end of the path: a path can have brackets."""
+        """Whether a pattern matches, or equals the end of the path, as a path can contain brackets."""
         return any(path.match(pattern) or _ends_with(path, PurePath(pattern)) for pattern in self.match)
 
 
@@ -107,7 +109,7 @@ def _ends_with(path: PurePath, end: PurePath) -> bool:
 
 @dataclass(frozen=True)
 class JobFile:
-    """A whole job file; `inputs` and `out` are relative to its folder, as read."""
+    """A whole job file; `inputs` and `out` are relative to its folder."""
 
     inputs: tuple[str, ...] = ()
     out: str | None = None
@@ -115,8 +117,8 @@ class JobFile:
     files: tuple[FileRule, ...] = ()
 
     def settings_of(self, source: PurePath, given: Settings) -> Settings:
-        """A file's settings: the job file's own, those `given` on the command line, those of each rule that
-        matches; later ones win."""
+        """Returns a file's settings: the job file's own, those `given` on the command line, those of each
+        rule that matches; later ones override earlier ones."""
         settings = self.settings.overridden_by(given)
         for rule in self.files:
             if rule.matches(source):
@@ -125,9 +127,9 @@ class JobFile:
 
 
 def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
-    """Raises WrongUse, with file and line, for anything that the schema does not allow."""
+    """Reads a job file. Raises WrongUse, with file and line, for anything that the schema does not allow."""
     try:
-        # Some editors begin a file with a byte order mark.
+        # Some editors start a file with a byte order mark.
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
@@ -155,20 +157,22 @@ def read_job_file(path: Path, methods: Collection[str]) -> JobFile:
 
 
 def _settings(values: Mapping[str, Any]) -> Settings:
-    """The settings in a table, which can have other keys as well. Keys and fields have the same names."""
+    """Returns the settings in a table, which can have other keys as well. Keys and fields have the same
+    names."""
     own = {field.name: values[field.name] for field in fields(Settings) if field.name in values}
     own["objects"] = tuple(ObjectRule(**entry.values) for entry in values.get("objects", ()))
     return Settings(**own)
 
 
 def _line_of(text: str, position: Position) -> int:
-    """The line, from 1, on which the value at `position` begins."""
+    """Returns the line, from 1, where the value at `position` begins."""
     return _line_where(text, lambda table: _has(table, position))
 
 
 def _line_where(text: str, is_true: Callable[[dict], bool]) -> int:
-    """The line of the first statement that makes `is_true` hold. tomllib reports no positions: ever longer
-    beginnings of the file are parsed, and the first one for which it holds ends with that statement."""
+    """Returns the line of the first statement that makes `is_true` hold. tomllib reports no positions, so
+    longer and longer beginnings of the file are parsed; the first one for which it holds ends with that
+    statement."""
     lines = text.splitlines()
     begin = 0
     for end in range(1, len(lines) + 1):

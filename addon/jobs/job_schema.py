@@ -16,7 +16,7 @@ from .schema import TEXT, TEXTS, Key, SchemaError, Table, checked, one_of, rows,
 
 
 def job_schema(methods: Collection[str]) -> Table:
-    """The top table of a job file. `methods` are the names that `method` can have."""
+    """Returns the top table of a job file. `methods` are the allowed values of `method`."""
     method = Key("method", one_of(methods, "a method of `sinew methods`"), "how the meshes are deformed")
     scale = Key(
         "scale",
@@ -81,7 +81,7 @@ def job_schema(methods: Collection[str]) -> Table:
 
 
 def markdown() -> str:
-    """The keys as a table of docs/batch.md."""
+    """Returns the keys as a table for docs/batch.md."""
     lines = ["| key | where | value | meaning |", "|---|---|---|---|"]
     for name, headers, wanted, meaning in rows(job_schema(())):
         lines.append(f"| `{name}` | {headers} | {wanted} | {meaning} |")
@@ -89,14 +89,14 @@ def markdown() -> str:
 
 
 def bakes(values: Mapping[str, Any]) -> tuple[str, ...]:
-    """All kinds of bakes that a table's settings name, each once."""
+    """Returns all kinds of bakes in a table's settings, each once."""
     every = [*values.get("bake", ())]
     every += [kind for entry in values.get("objects", ()) for kind in entry.values.get("bake", ())]
     return tuple(dict.fromkeys(every))
 
 
 def check_bakes(kinds: Sequence[str], frames: str | None) -> None:
-    """Raises WrongUse where a bake can not have the frames."""
+    """Raises WrongUse where a bake is not possible for the frames."""
     if frames is not None:
         for kind in kinds:
             check_frames(kind, sorted(set(parse_frames(frames))))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record of a batch in its output folder, valid also after a run that is killed at any moment.
+"""The record of a batch in its output folder, which is valid even if a run is killed at any moment.
 
-One JSON object a line. A line is on disk before the copy that it describes gets its name: if the run is
-killed in between, the next run only has to rename the copy. A half-written last line is ignored.
+One JSON object per line. A line is on disk before the copy that it describes gets its final name: if the run
+is killed in between, the next run only has to rename the copy. A half-written last line is ignored.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Journal:
         self.out = out
         self.path = out / NAME
         self._start = len(os.path.join(out, ""))
-        # _read() truncates a half-written last line: it must not do so through a link that somebody else
+        # _read() truncates a half-written last line, which it must not do through a link that somebody else
         # made.
         if self.path.is_symlink() or (self.path.exists() and not self.path.is_file()):
             raise SinewError(f"{self.path}: is no journal but a link or a folder; remove it")
@@ -56,7 +56,7 @@ class Journal:
         self._file.close()
 
     def name_of(self, target: Path) -> str:
-        """The path of a copy below `out`."""
+        """Returns the path of a copy below `out`."""
         return str(target)[self._start :].replace(os.sep, "/")
 
     def record(self, target: Path, record: dict) -> None:
@@ -69,7 +69,8 @@ class Journal:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(self._file.fileno())
         except OSError as error:
-            # Removes the part of the line that fitted on a full disk: only a last line may be half-written.
+            # Removes the part of the line that was written before the disk was full: only a last line may be
+            # half-written.
             self._file.truncate(end)
             raise SinewError(
                 f"{self.path}: can not be written: {error.strerror}; what was done is in it, --resume goes on"
@@ -77,8 +78,8 @@ class Journal:
         self.latest[record["file"]] = record
 
     def finish(self, target: Path, record: dict) -> None:
-        """Renames a copy and its bakes after their record was written. The copy is renamed last: where it
-        exists, its bakes do, too. Files that have their names already are not touched."""
+        """Renames a copy and its bakes after their record was written. The copy is renamed last, so if it
+        exists, its bakes do, too. Files that have their final names already are not touched."""
         for unfinished, path, written in self._files(target, record):
             if _stamp(unfinished) == written:
                 os.replace(unfinished, path)
@@ -88,17 +89,17 @@ class Journal:
         return record is not None and record.get("written") == _stamp(target)
 
     def matches_with_bakes(self, target: Path, record: dict) -> bool:
-        """Whether its bakes are, too."""
+        """Whether the target and its bakes are still the files that the record describes."""
         files = self._files(target, record)
         return all(_stamp(path) == written for _unfinished, path, written in files)
 
     def baked(self, target: Path, record: dict | None) -> list[Path]:
-        """The bakes of a record that are still the files that it describes."""
+        """Returns the bakes of a record that are still the files that it describes."""
         files = self._files(target, record)[:-1] if record is not None else []
         return [path for _unfinished, path, written in files if _stamp(path) == written]
 
     def recover(self) -> None:
-        """Renames the files that a killed run had recorded and not yet renamed."""
+        """Renames the files that a killed run had recorded and not renamed yet."""
         for name, record in self.latest.items():
             if "unfinished" in record:
                 files = self._files(self.out / name, record)
@@ -106,7 +107,8 @@ class Journal:
                     self.finish(self.out / name, record)
 
     def _files(self, target: Path, record: dict) -> list[tuple[Path, Path, list[int] | None]]:
-        """For each file of a record: its temporary path, its final path, its stamp. The copy is the last."""
+        """Returns, for each file of a record, its temporary path, its final path and its stamp. The copy is
+        the last."""
         beside = [
             (self.out / unfinished, self.out / path, written)
             for unfinished, path, written in record.get("beside", ())
@@ -117,7 +119,7 @@ class Journal:
     def remove_unfinished(self, targets: Iterable[Path]) -> None:
         """Removes unfinished copies of killed runs that no record describes."""
         for folder in {target.parent for target in targets}:
-            # Blender's own temporary files end with @; bakes have other suffixes, and caches a folder.
+            # Blender's own temporary files end with @; bakes have other extensions, and caches a folder.
             for pattern in (f".*{MARK}*", f"*{CACHES}/.*{MARK}"):
                 for leftover in folder.glob(pattern):
                     leftover.unlink(missing_ok=True)
@@ -131,7 +133,7 @@ class Journal:
         latest = {}
         for line in content[:whole].splitlines():
             # After a loss of power, or in a folder made by somebody else, a line can be anything: it is
-            # ignored, and its file is done again.
+            # ignored, and its file is processed again.
             with suppress(ValueError):
                 record = json.loads(line)
                 if _is_sound(record):
@@ -154,7 +156,7 @@ def _is_sound(record: object) -> bool:
 
 
 def is_complete(record: dict) -> bool:
-    """Whether a record of a finished file has all that the report shows."""
+    """Whether a record of a finished file has everything that the report shows."""
     kinds = {"hash": str, "versions": dict, "meshes": list, "left_out": list, "notes": list, "seconds": dict}
     if not all(isinstance(record.get(key), kind) for key, kind in kinds.items()):
         return False
@@ -169,12 +171,13 @@ def _is_inside(path: object) -> bool:
     if not isinstance(path, str) or not path or "\0" in path:
         return False
     pure = PurePath(path)
-    # On Windows a path without a drive leads away, too, and is none that is absolute.
+    # On Windows a path without a drive, but with a root, leads outside, too, and does not count as absolute.
     return not pure.anchor and ".." not in pure.parts
 
 
 def content_hash(path: Path) -> str | None:
-    """The hash of a file's content; None where it can not be read, which opening the file will report."""
+    """Returns the hash of a file's content; None where it cannot be read, which opening the file will
+    report."""
     try:
         if not path.is_file():
             return None
@@ -185,7 +188,7 @@ def content_hash(path: Path) -> str | None:
 
 
 def stamp(path: Path) -> list[int]:
-    """The size of a file and the time of its last change, which renaming keeps."""
+    """Returns the size of a file and the time of its last change, which renaming keeps."""
     status = path.stat()
     return [status.st_size, status.st_mtime_ns]
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""report.json and report.html: the result of each file of a batch, with pictures of its worst frame."""
+"""Writes report.json and report.html: the result of each file of a batch, with pictures of its worst
+frame."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ img { max-width: 360px; max-height: 360px; background: #2a2c30; border-radius: 4
 
 
 def write_report(out: Path, summary: dict, rows: list[dict]) -> Path:
-    """Writes both into the folder `out`; returns the path of report.html."""
+    """Writes both to the folder `out`; returns the path of report.html."""
     write_text(
         out / "report.json",
         json.dumps({"summary": summary, "files": rows}, indent=1, ensure_ascii=False),

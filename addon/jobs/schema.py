@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A schema for the tables of a TOML file, from which reading, error messages and documents are made."""
+"""A schema for the tables of a TOML file, used for reading, error messages and documents."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Position = tuple[str | int, ...]
 class SchemaError(Exception):
     """A value that the schema does not allow.
 
-    position  of the value; from the top of the file once read() raises it
+    position  of the value; from the top of the file when read() raises it
     sentence  what was expected and what was found
     """
 
@@ -29,7 +29,7 @@ class SchemaError(Exception):
 class Kind:
     """The type of a value.
 
-    wanted  in a few words, for documents
+    wanted  a short description for documents
     read    converts and checks a value; raises WrongUse with a sentence that follows the name of the key
     """
 
@@ -74,7 +74,8 @@ class Entry:
 
 
 def read(table: Mapping[str, Any], schema: Table, position: Position = ()) -> Entry:
-    """Raises SchemaError for the first key, in the order of the file, that the schema does not allow."""
+    """Reads a table. Raises SchemaError for the first key, in the order of the file, that the schema does not
+    allow."""
     known = {key.name: key for key in schema.keys}
     for name in table:
         if name not in known:
@@ -123,7 +124,7 @@ TEXTS = Kind("text or a list", _read_texts)
 
 
 def one_of(names: Collection[str], wanted: str = "") -> Kind:
-    """Text that is one of `names`."""
+    """Returns a kind of text that is one of `names`."""
 
     def read_name(value: object) -> str:
         name = _read_text(value)
@@ -135,7 +136,7 @@ def one_of(names: Collection[str], wanted: str = "") -> Kind:
 
 
 def some_of(names: Collection[str]) -> Kind:
-    """One text or a list, each one of `names`."""
+    """Returns a kind of one text or a list, each one of `names`."""
 
     def read_names(value: object) -> tuple[str, ...]:
         found = _read_texts(value)
@@ -148,7 +149,7 @@ def some_of(names: Collection[str]) -> Kind:
 
 
 def checked(kind: Kind, check: Callable[[Any], None], wanted: str = "") -> Kind:
-    """The same as `kind`, for values for which `check` does not raise WrongUse."""
+    """Returns `kind`, restricted to values for which `check` does not raise WrongUse."""
 
     def read_checked(value: object) -> object:
         kept = kind.read(value)
@@ -162,7 +163,7 @@ def checked(kind: Kind, check: Callable[[Any], None], wanted: str = "") -> Kind:
 
 
 def rows(schema: Table) -> list[tuple[str, str, str, str]]:
-    """Each key once: its name, the tables that can have it, the values that it takes, its help."""
+    """Returns each key once: its name, the tables that can have it, the values that it takes, its help."""
     headers: dict[Key, list[str]] = {}
     for key, header in _keys_below(schema, ""):
         headers.setdefault(key, []).append(header)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The workers of a batch: Blenders on this machine, or those of a dask cluster.
 
-On this machine threads of this process distribute the tasks: the Blenders are processes already, and dask
-would take as much time for a small file as Blender takes to save it (bench/README.md).
+On this machine, threads of this process distribute the tasks: the Blenders are separate processes already,
+and dask would take as much time for a small file as Blender takes to save it (bench/README.md).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CONNECT_LIMIT = 30.0
 
 @cache
 def versions() -> dict[str, str]:
-    """The releases of Sinew and of Blender in this Python, on which results depend."""
+    """Returns the releases of Sinew and of Blender in this Python, on which results depend."""
     try:
         return {"sinew": sinew.__version__, "blender": importlib.metadata.version("bpy")}
     except importlib.metadata.PackageNotFoundError:
@@ -94,7 +94,7 @@ class _Blenders:
         raise Stopped
 
     def end(self) -> None:
-        """Ends those that are idle."""
+        """Ends the idle ones."""
         with self._lock:
             idle, self._idle = self._idle, []
         for blender in idle:
@@ -124,14 +124,15 @@ def do_task(
     run: Callable[[dict, Limits], dict] = _blenders.run,
     versions: Callable[[], dict[str, str]] = versions,
 ) -> dict:
-    """The outcome of a task, tried once more in a new process where Blender crashed or was ended.
+    """Returns the outcome of a task, which is tried once more in a new process where Blender crashed or was
+    ended.
 
     task  "command", "source", "target", what the command needs, and "known": hash and versions of a source
-          that need not be done again, or None
-    run   does the task, in another process or in this one
+          that need not be processed again, or None
+    run   performs the task, in another process or in this one
 
-    The copy is written in the folder of its target under the name "unfinished"; who writes the journal
-    renames it.
+    The copy is written in the folder of its target under the name "unfinished"; the journal's writer renames
+    it.
     """
     source, target = Path(task["source"]), Path(task["target"])
     facts: dict[str, object] = {"versions": versions()}
@@ -139,7 +140,7 @@ def do_task(
         return {"unchanged": True}
     for attempt in range(1, ATTEMPTS + 1):
         facts["attempts"] = attempt
-        # Short: the target's name may have the system's maximal length.
+        # Short, as the target's name may have the system's maximal length.
         unfinished = target.with_name(f".{uuid.uuid4().hex[:12]}{UNFINISHED}")
         try:
             outcome = run({**task, "unfinished": str(unfinished)}, limits)
@@ -169,7 +170,7 @@ def run_here(
     run: Callable[[dict, Limits], dict],
     versions: Callable[[], dict[str, str]],
 ) -> Generator[tuple[dict, dict], None, None]:
-    """Each task and its outcome, one after the other in this process."""
+    """Yields each task and its outcome, one after the other in this process."""
     for task in tasks:
         yield task, do_task(task, Limits(), run, versions)
 
@@ -177,7 +178,7 @@ def run_here(
 def run_on_this_machine(
     tasks: Sequence[dict], limits: Limits, jobs: int
 ) -> Generator[tuple[dict, dict], None, None]:
-    """Each task and its outcome, in the order in which `jobs` Blenders finish them.
+    """Yields each task and its outcome, in the order in which `jobs` Blenders finish them.
 
     Raises SinewError where no Blender can be started. Tasks that are not done when the generator is closed or
     interrupted are dropped.
@@ -187,13 +188,13 @@ def run_on_this_machine(
     done: SimpleQueue[tuple[dict, dict]] = SimpleQueue()
 
     def work() -> None:
-        # Outcomes are handled in the main thread: here a Blender would wait for it.
+        # Outcomes are handled in the main thread: here a Blender would wait for that.
         with contextlib.suppress(IndexError):
             while True:
                 task = waiting.popleft()
                 done.put((task, _outcome(task, partial(do_task, task, limits))))
 
-    # The threads must run until all is done: a Blender ends with the thread that started it.
+    # The threads have to run until everything is done: a Blender ends with the thread that started it.
     pool = ThreadPoolExecutor(jobs)
     for _ in range(jobs):
         pool.submit(work)
@@ -211,15 +212,15 @@ def run_on_this_machine(
 def run_in_dask(
     tasks: Sequence[dict], limits: Limits, scheduler: str, warn: Callable[[str], None]
 ) -> Generator[tuple[dict, dict], None, None]:
-    """The same on the dask cluster at `scheduler`: as many Blenders on each worker as it has threads.
+    """The same on the dask cluster at `scheduler`: with as many Blenders on each worker as it has threads.
 
     warn  called with one sentence where others can reach the cluster
 
-    Raises SinewError where the cluster can not be used.
+    Raises SinewError where the cluster cannot be used.
     """
     import distributed
 
-    # dask warns of load and lost connections; what matters is also an error of a task.
+    # dask warns of load and lost connections; what matters is an error of a task, too.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(scheduler, timeout=CONNECT_LIMIT)
@@ -253,7 +254,7 @@ def _outcome(task: dict, result: Callable[[], dict]) -> dict:
 
 
 def _warn_where_open(address: str, warn: Callable[[str], None]) -> None:
-    """address  as the scheduler reports it; one of its machine's own where it listens on all"""
+    """address: as the scheduler reports it; one of its machine's addresses if it listens on all."""
     scheme, _separator, host_and_port = address.rpartition("://")
     host = host_and_port.rpartition(":")[0].strip("[]")
     if scheme != "tls" and not _is_this_machine(host):
@@ -271,7 +272,7 @@ def _is_this_machine(host: str) -> bool:
 
 
 def _check_workers(client: Client, scheduler: str) -> None:
-    """Raises SinewError where a worker can not run Blender or has another Sinew than this process."""
+    """Raises SinewError where a worker cannot run Blender or has another Sinew than this process."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_LIMIT)
     except TimeoutError:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of a whole character, as the panel shows them: properties without values of their own.
+"""The settings of a whole character, as the panel shows them: properties without stored values.
 
-Each reads the value of one mesh, the lead, and is written to all meshes that follow the character; so one
-change of a slider or menu is one change of them all, and one step of undo. Keys and drivers belong to a
-mesh's own settings.
+Each property reads the value of one mesh, the lead, and writes to all meshes that follow the character. So
+one change of a slider or menu changes all of them, in one undo step. Keys and drivers belong to a mesh's own
+settings.
 """
 
 from __future__ import annotations
@@ -20,30 +20,32 @@ from ..attach.subscribers import subscribers
 from ..deform import events, session
 from . import operators
 
-# What a property that is computed can not have.
+# Arguments that a computed property cannot have.
 _NOT_COMPUTED = {"update", "override", "default", "options"}
 
 
 def followers(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The meshes of the characters meant that have Sinew, without those that keep settings of their own."""
+    """Returns the meshes of the selected characters that have Sinew, without those with their own
+    settings."""
     return [obj for obj in operators.sinew_targets(context) if not properties.of(obj).is_own]
 
 
 def lead(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The mesh whose values are shown: the active one, else the first that follows; else the first."""
+    """Returns the mesh whose values are shown: the active one, else the first that follows; else the
+    first."""
     return min(known_meshes(context), key=lambda obj: properties.of(obj).is_own, default=None)
 
 
 def set_method(context: bpy.types.Context, method: str) -> None:
-    """All meshes that follow blend by `method`, with all of their Armature modifiers."""
+    """Sets `method` for all meshes that follow, with all of their Armature modifiers."""
     with session.changing(context):
         for obj in followers(context):
             attach.use_one_method(obj, method)
 
 
 class _Known:
-    """The character's meshes as they were found last, by their names, and what was selected then; until
-    Blender evaluates something. To find them goes through the whole scene, and each button reads its value
+    """The character's meshes as last found, by their names, and the selection at that time; valid until
+    Blender evaluates something. Finding them goes through the whole scene, and each button reads its value
     several times."""
 
     selection: tuple[object, ...] = ()
@@ -51,15 +53,15 @@ class _Known:
 
 
 def find_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """Those of the characters meant that have Sinew; known_meshes() has them from now on."""
+    """Returns the meshes of the selected characters that have Sinew, and stores them for known_meshes()."""
     found = operators.sinew_targets(context)
     _Known.selection, _Known.names = _selection(context), tuple(obj.name for obj in found)
     return found
 
 
 def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The same as they were found last, as long as nothing has changed, the same objects are selected and all
-    still have Sinew."""
+    """Returns the same from memory, as long as nothing has changed, the selection is the same and all still
+    have Sinew."""
     if _Known.names and _Known.selection == _selection(context):
         found = [context.scene.objects.get(name) for name in _Known.names]
         if all(obj is not None and properties.has_sinew(obj) for obj in found):
@@ -69,7 +71,7 @@ def known_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 @persistent
 def _forget(*_args: object) -> None:
-    """Others may belong to the character now."""
+    """Forgets the meshes, as others may belong to the character now."""
     _Known.names = ()
 
 
@@ -83,7 +85,7 @@ def _selection(context: bpy.types.Context) -> tuple[object, ...]:
 
 
 def _computed(deferred: Any, group: str, name: str) -> object:
-    """The property of a character for one of a mesh.
+    """Returns the character's property for a mesh's property.
 
     deferred  what bpy.props made for the mesh's
     group     its group within the settings; empty for the settings themselves
@@ -102,7 +104,7 @@ def _computed(deferred: Any, group: str, name: str) -> object:
     def set_all(_own: bpy.types.PropertyGroup, value: object) -> None:
         prop = CLASSES_OF[group].bl_rna.properties[name]
         if prop.type == "ENUM":
-            # One without identifier is a heading.
+            # An item without identifier is a heading.
             value = next(i.identifier for i in prop.enum_items if i.identifier and i.value == value)
         each = [of_mesh(properties.of(obj)) for obj in followers(bpy.context)]
         if any(getattr(settings, name) != value for settings in each):
@@ -151,7 +153,8 @@ def _choose_row(own: bpy.types.PropertyGroup, row: int) -> None:
 
 
 def chosen(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The mesh of the list whose details are shown; the active one where another character's was chosen."""
+    """Returns the mesh of the list whose details are shown; the active one where another character's was
+    chosen."""
     meshes = operators.targets(bpy.context)
     return next((obj for obj in meshes if obj.name == of(scene).chosen), meshes[0] if meshes else None)
 
@@ -190,7 +193,7 @@ def of(scene: bpy.types.Scene) -> SinewCharacter:
 
 
 def _clear() -> None:
-    """Takes the group out of the file where nothing needs it any more."""
+    """Removes the group from the file where nothing needs it any more."""
     if not any(properties.has_sinew(obj) for obj in bpy.data.objects):
         for scene in bpy.data.scenes:
             if scene.library is None and scene.is_property_set("sinew_character"):

@@ -108,12 +108,12 @@ class SINEW_OT_open_tab(bpy.types.Operator):
 
 
 def _choose_tab(address: int) -> None:
-    """address  of the area, which may be closed by now"""
+    """address: of the area, which may be closed by now."""
     areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
     for area in areas:
         if area.as_pointer() == address and area.type == "VIEW_3D":
             region = next(region for region in area.regions if region.type == "UI")
-            # It has no such tab where it shows no tabs at all.
+            # Fails if the region shows no tabs.
             with contextlib.suppress(TypeError, AttributeError):
                 region.active_panel_category = Sidebar.bl_category
             region.tag_redraw()

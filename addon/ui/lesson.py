@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lesson: a file with an arm, a hand and a page of text (blend_files/make_lesson.py), for who sees Sinew
-for the first time."""
+"""The lesson: a file with an arm, a hand and a page of text (blend_files/make_lesson.py), for new users."""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ class SINEW_OT_open_lesson(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        # Blender asks whether to save what is open, unless the user has switched that off.
+        # Blender asks whether to save the open file, unless the user has switched that off.
         if not context.preferences.view.use_save_prompt:
             return self.execute(context)
         return _open("INVOKE_DEFAULT")
@@ -33,7 +32,7 @@ class SINEW_OT_open_lesson(bpy.types.Operator):
 
 
 def _open(how: str) -> set[str]:
-    """As a new file, without a name: what is saved from it does not go into the extension's folder."""
+    """Opens it as a new file, without a name, so that it is not saved in the extension's folder."""
     return bpy.ops.wm.read_homefile(how, filepath=str(FILE), load_ui=True)
 
 

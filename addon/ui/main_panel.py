@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar tab "Sinew" of the 3D view: one control for a character, however many meshes it has."""
+"""The sidebar tab "Sinew" of the 3D view: one set of controls for a character, however many meshes it has."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SINEW_PT_main(Sidebar, bpy.types.Panel):
 def _draw_title(
     layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]
 ) -> None:
-    """Whose settings these are."""
+    """Shows whose settings these are."""
     names = [armature.name for armature in operators.armatures(context)] or [meshes[0].name]
     text = names_text(names, most=2)
     if len(meshes) > 1:
@@ -77,7 +77,7 @@ def _draw_character(
     lead: bpy.types.Object,
 ) -> None:
     shared = character.of(context.scene)
-    # Of one mesh, its own settings: those can have keys.
+    # For a single mesh its own settings, which can have keys.
     settings = properties.of(lead) if len(meshes) == 1 else shared
     row = layout.row(align=True)
     row.prop(shared, "enabled", text="On" if shared.enabled else "Off", toggle=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's "Online Manual", at Sinew's buttons and properties, opens the page within the extension."""
+"""Makes Blender's "Online Manual", on Sinew's buttons and properties, open the page in the extension."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 PAGE = Path(__file__).resolve().parent.parent / "manual.html"
-# By the start of the name, in lower case as Blender looks it up; the first that fits.
+# By the start of the name, in lower case as Blender looks it up; the first match counts.
 _SECTIONS = {
     "bpy.ops.sinew.method_preset*": "presets",
     "bpy.ops.sinew.use_method*": "method",

@@ -29,13 +29,13 @@ class Entry:
 
 
 def _over(operator: str, text: str) -> tuple[Entry, ...]:
-    """One for each range of frames."""
+    """Returns an entry for each range of frames."""
     return tuple(
         Entry(operator, f"{text} over the {label}", values={"over": name}) for name, label, _text in OVER
     )
 
 
-# All operators that act on what is selected, and the lesson, in the menu's order; None is a line.
+# All operators that act on the selection, and the lesson, in the menu's order; None is a separator.
 ENTRIES: tuple[Entry | None, ...] = (
     Entry("sinew.add", icon="MOD_ARMATURE"),
     Entry("sinew.switch"),
@@ -96,7 +96,7 @@ class SINEW_MT_menu(bpy.types.Menu):
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
-        # Elsewhere than in a sidebar a menu executes without the dialog.
+        # Outside of a sidebar, a menu would execute without the dialog.
         layout.operator_context = "INVOKE_DEFAULT"
         for entry in ENTRIES:
             if entry is None:
@@ -150,14 +150,15 @@ MENUS = {
     "VIEW3D_MT_paint_weight": _draw_in_menu,
     "OBJECT_MT_modifier_add_deform": _draw_in_modifiers,
 }
-# The operator, what it opens, and its key, with Alt and Shift: Blender has none of these in a 3D view.
+# The operator, what it opens, and its key, with Alt and Shift: Blender does not use these in a 3D view.
 SHORTCUTS = (("wm.call_menu_pie", SINEW_MT_pie.__name__, "Y"), ("sinew.flip_comparison", "", "F"))
 # What was added to the add-ons' key configuration.
 _shortcuts: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 def draw_shortcuts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """In the preferences, to be changed there; the user's own key configuration has them."""
+    """Draws the shortcuts in the preferences, where they can be changed; they are in the user's key
+    configuration."""
     user = context.window_manager.keyconfigs.user
     if user is None or not _shortcuts:
         return
@@ -175,7 +176,7 @@ def register() -> None:
         getattr(bpy.types, name).append(draw)
     addons = bpy.context.window_manager.keyconfigs.addon
     if addons is None:
-        # Without a window.
+        # In background mode.
         return
     keymap = addons.keymaps.new(name="3D View Generic", space_type="VIEW_3D")
     for operator, menu, key in SHORTCUTS:

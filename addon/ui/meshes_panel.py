@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a character's meshes, in which one can have settings of its own."""
+"""The list of a character's meshes, where each can have its own settings."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _draw_details(
 
 
 def _draw_further_modifiers(layout: bpy.types.UILayout, settings: properties.SinewSettings) -> None:
-    """The methods of several Armature modifiers in a row."""
+    """Draws the methods of several consecutive Armature modifiers."""
     if len(settings.armatures) > 1 or any(
         s.method != properties.SAME_METHOD for s in settings.replaced_modifiers
     ):

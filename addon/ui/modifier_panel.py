@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is at work on a mesh, above its stack of modifiers. Blender draws the panel of a modifier itself, and
-the node group within is shared by all meshes: neither can say it."""
+"""Shows who deforms a mesh, above its stack of modifiers. Blender itself draws the panel of a modifier, and
+all meshes share the node group, so these cannot show it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..attach import properties
 from . import state_text
 from .sidebar import draw_text
 
-# Of the Properties editor, with the stack.
+# In the Properties editor, with the stack.
 PANEL = "DATA_PT_modifiers"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel's buttons: poll, gather, one call, report."""
+"""The panel's operators: poll, gather, one call, report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .translations import counted, tr
 
 
 def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The objects selected or active."""
+    """Returns the selected objects and the active one."""
     chosen = list(context.selected_objects)
     active = context.active_object
     if active is not None and active not in chosen:
@@ -26,7 +26,7 @@ def _chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def _armature_meant(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """The armature that an object is, that deforms it, or that it hangs on."""
+    """Returns the armature that an object is, that deforms it, or that it is parented to."""
     if obj.type == "ARMATURE":
         return obj
     found, parent = attach.armature_of(obj), obj.parent
@@ -36,13 +36,13 @@ def _armature_meant(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The armatures meant: those selected or active, and those of such meshes; the active one first."""
+    """Returns the selected or active armatures, and those of selected meshes; the active one first."""
     found = {_armature_meant(obj) for obj in _chosen(context)} - {None}
     return sorted(found, key=lambda o: (o != context.active_object, o.name))
 
 
 def _each_target(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
-    """The meshes of targets(), those that are selected first: most who ask need only one."""
+    """Yields the meshes of targets(), selected ones first, as most callers need only one."""
     chosen, meant = _chosen(context), set(armatures(context))
     yield from attach.deformed_meshes([obj for obj in chosen if obj.name in context.scene.objects])
     if not meant:
@@ -53,7 +53,7 @@ def _each_target(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
 
 
 def _is_of(obj: bpy.types.Object, meant: Collection[bpy.types.Object]) -> bool:
-    """Whether one of the armatures deforms a mesh; of most meshes of a scene that is seen at once."""
+    """Whether one of the armatures deforms a mesh; for most meshes of a scene this is decided at once."""
     has_modifier = any(modifier.type == "ARMATURE" for modifier in obj.modifiers)
     if not (has_modifier or stack.parent_deforms(obj) or properties.has_sinew(obj)):
         return False
@@ -61,8 +61,8 @@ def _is_of(obj: bpy.types.Object, meant: Collection[bpy.types.Object]) -> bool:
 
 
 def targets(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The meshes meant: all that the armatures meant deform, as clothes, hair and eyes belong to the body
-    that is selected; the active one first."""
+    """Returns the meshes to act on: all that the armatures() deform, as clothes, hair and eyes belong to the
+    selected body; the active one first."""
     active, found = context.active_object, list(_each_target(context))
     order = {name: place for place, name in enumerate(context.scene.objects.keys())} if found else {}
     return sorted(found, key=lambda obj: (obj != active, order[obj.name]))
@@ -81,7 +81,7 @@ def has_sinew_targets(context: bpy.types.Context) -> bool:
 
 
 class OfSkinned:
-    """A panel that is there where Sinew deforms something that is meant."""
+    """A panel that is shown where Sinew deforms a target."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -89,12 +89,13 @@ class OfSkinned:
 
 
 def are_any_on(context: bpy.types.Context) -> bool:
-    """Whether Sinew is on for any mesh: else panels are grey whose numbers are its own."""
+    """Whether Sinew is on for any target: otherwise panels with its numbers are grey."""
     return any(properties.of(obj).enabled for obj in _each_target(context) if properties.has_sinew(obj))
 
 
 def waits_for_render() -> str:
-    """What a button has to wait for, as its thread reads what the button would change; else empty."""
+    """Returns what a button has to wait for, as the render's thread reads what it would change; otherwise
+    ""."""
     return "Wait for the end of the render" if is_rendering_in_window() else ""
 
 
@@ -107,7 +108,7 @@ def can_change(operator: type[bpy.types.Operator]) -> bool:
 
 
 def can_take_over(obj: bpy.types.Object) -> bool:
-    """Whether the mesh has a Corrective Smooth in whose place Delta Mush could smooth."""
+    """Whether the mesh has a Corrective Smooth that Delta Mush could replace."""
     modifier = corrective_smooth.candidate(obj)
     return (
         modifier is not None and properties.of(obj).enabled and not corrective_smooth.why_not(obj, modifier)
@@ -137,7 +138,7 @@ def _for_each(
 
 
 class _OfOneMesh:
-    """Acts on all meshes of a character, or on the one that is named."""
+    """An operator on all meshes of a character, or on one by name."""
 
     name: bpy.props.StringProperty(
         name="Mesh",
@@ -150,7 +151,7 @@ class _OfOneMesh:
 
 
 AS_BEFORE = "AS_BEFORE"
-# What Add Sinew starts with.
+# The choices of Add Sinew's first method.
 FIRST_METHODS = [
     (
         AS_BEFORE,
@@ -193,7 +194,7 @@ class SINEW_OT_add(_OfOneMesh, bpy.types.Operator):
         return False
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        # Of a click; what a script leaves out does not depend on somebody's preferences.
+        # Only for a click: a script's default must not depend on the user's preferences.
         if not self.properties.is_property_set("method"):
             self.method = addon_preferences.value("first_method", default=AS_BEFORE)
         return self.execute(context)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far precomputations are, in the panel and the status bar; Esc and buttons that stop them and go on."""
+"""The progress of precomputations, in the panel and the status bar; Esc and buttons that stop and continue
+them."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from ..deform import precompute_watch, precomputing
 from ..deform.skinned_object import SkinnedObject
 from .translations import tr
 
-# Seconds between looks at whether there is still something to stop.
+# Seconds between checks whether there is still something to stop.
 INTERVAL = 0.2
 
 
@@ -40,7 +41,7 @@ class SINEW_OT_watch_precomputation(bpy.types.Operator):
         return {"PASS_THROUGH"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """The window closes, or another file is loaded."""
+        """Called when the window closes, or another file is loaded."""
         self._end(context)
 
     def _end(self, context: bpy.types.Context) -> None:
@@ -66,12 +67,13 @@ class SINEW_OT_precompute(bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        precompute_watch.go_on()
+        precompute_watch.resume()
         return {"FINISHED"}
 
 
 def draw(layout: bpy.types.UILayout, pairs: Sequence[tuple[bpy.types.Object, SkinnedObject | None]]) -> None:
-    """Of a character's meshes together: progress and a button that stops it, or one that starts it again."""
+    """Draws, for all meshes of a character together, the progress with a button that stops it, or a button
+    that starts it again."""
     known = [(obj, skinned) for obj, skinned in pairs if skinned is not None]
     runs: dict[str, list[float]] = {}
     for obj, skinned in known:
@@ -92,7 +94,7 @@ def draw(layout: bpy.types.UILayout, pairs: Sequence[tuple[bpy.types.Object, Ski
 
 
 def _show() -> None:
-    """Redraws the panels, and has an operator in the window that hears Esc."""
+    """Redraws the panels, and starts an operator in the window that reacts to Esc."""
     runs = precomputations.running
     if runs:
         _watch()

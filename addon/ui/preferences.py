@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's page in Blender's preferences."""
+"""The extension's preferences."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class SinewPreferences(bpy.types.AddonPreferences):
 
 
 def _draw_variable(layout: bpy.types.UILayout, context: bpy.types.Context, name: str) -> None:
-    """Says so where an environment variable decides instead."""
+    """Draws a note where an environment variable overrides the setting."""
     if os.environ.get(name) is not None:
         text = tr(
             "The environment variable {name} decides: it is {value}", name=name, value=repr(os.environ[name])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of a method with its parameters and stages, by Blender's own mechanism: each is a file of Python in
+"""Presets of a method with its parameters and stages, by Blender's own mechanism: each is a Python file in
 the user's folder of presets."""
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .operators import OnSinewObjects
 
 FOLDER = "sinew/methods"
 DEFINES = ("character = bpy.context.scene.sinew_character",)
-# Names of vertex groups belong to a mesh, not to a method.
+# Without vertex groups, as their names belong to a mesh, not to a method.
 PATHS = (
     *(f"character.{name}" for name in SHARED),
     *(
@@ -55,7 +55,7 @@ class SINEW_OT_method_preset(OnSinewObjects, bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        # All at once: one evaluation, and one step of undo.
+        # All at once: one evaluation, and one undo step.
         with session.changing(context):
             return bpy.ops.script.execute_preset(filepath=self.filepath, menu_idname=self.menu_idname)
 

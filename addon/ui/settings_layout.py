@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How settings are drawn: a character's (character.py) or those of one mesh, which have the same names."""
+"""Draws settings: a character's (character.py) or those of one mesh, which have the same names."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .translations import tr
 
 
 def draw_method(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
-    """The method, and the parameters of all methods at work.
+    """Draws the method, and the parameters of all methods in use.
 
-    obj  whose settings these are; of a character, its lead
+    obj  whose settings these are; for a character, its lead
     """
     layout.prop(settings, "method", text="")
     for name in method_needs.methods_of(obj):
@@ -31,7 +31,7 @@ def draw_stages(
     obj: bpy.types.Object,
     only: str = "",
 ) -> None:
-    """What follows the method, what bones' scale does, and who computes normals.
+    """Draws the stages, the scale rule, and who computes normals.
 
     only  the name of the mesh that buttons act on; empty for the character
     """
@@ -71,7 +71,7 @@ def _draw_make_group(
     stage: str,
     only: str,
 ) -> None:
-    """A button where the stage lacks the vertex group that it names, or the mix any."""
+    """Draws a button where the stage lacks the vertex group that it names, or the mix has none."""
     name = getattr(settings, stage).group
     if name in obj.vertex_groups or not (name or stage == "mix"):
         return
@@ -87,7 +87,7 @@ def _draw_stage(
     stage: sinew.Stage,
     only: str,
 ) -> None:
-    """Its switch, and while it is on its parameters."""
+    """Draws its switch, and its parameters while it is on."""
     group = getattr(settings, stage.name)
     switch, *others = stage.parameters
     layout.prop(group, switch.id, text=stage.label)
@@ -105,7 +105,7 @@ def _draw_stage(
 def _draw_take_over(
     layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object, only: str
 ) -> None:
-    """Of the mesh, or of any of the character's."""
+    """For the mesh, or for any of the character's."""
     meshes = [obj] if only else operators.sinew_targets(context)
     if any(operators.can_take_over(mesh) for mesh in meshes):
         layout.operator("sinew.take_over_smooth", icon="MOD_SMOOTH").name = only

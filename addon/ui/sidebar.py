@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar tab, and what is in it where the native library does not load."""
+"""The sidebar tab, and its content where the native library does not load."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import bpy
 from .. import native
 from .translations import tr
 
-# Characters of the interface font that fit a pixel of sidebar at scale 1; a label is not wrapped by Blender.
+# Characters of the interface font per pixel of sidebar at scale 1; Blender does not wrap labels.
 CHARACTERS_PER_PIXEL = 0.14
-# Of a name among others.
+# For a name among others.
 NAME_LENGTH = 24
 
 
@@ -31,12 +31,12 @@ class SINEW_PT_unavailable(Sidebar, bpy.types.Panel):
 
 
 def characters(context: bpy.types.Context) -> int:
-    """How many fit the region's width."""
+    """The number of characters that fit the region's width."""
     return int(context.region.width / context.preferences.system.ui_scale * CHARACTERS_PER_PIXEL)
 
 
 def shortened(name: str, most: int = NAME_LENGTH) -> str:
-    """A long name without its middle, as both ends tell names apart: "Character_…_low.003"."""
+    """Returns a long name without its middle, as both ends distinguish names: "Character_…_low.003"."""
     if len(name) <= most:
         return name
     ahead = most // 2
@@ -44,13 +44,13 @@ def shortened(name: str, most: int = NAME_LENGTH) -> str:
 
 
 def draw_armature(layout: bpy.types.UILayout, context: bpy.types.Context, armature: bpy.types.Object) -> None:
-    """The name of an armature object, as long as fits."""
+    """Draws the name of an armature object, shortened to fit."""
     name = shortened(armature.name, characters(context) - 4)
     layout.label(text=name, icon="OUTLINER_OB_ARMATURE", translate=False)
 
 
 def names_text(names: Sequence[str], most: int = 3) -> str:
-    """Some names as one text, the others by their number."""
+    """Returns the first names as one text, with the number of the others."""
     text = ", ".join(shortened(name) for name in names[:most])
     more = len(names) - most
     return tr("{names} and {count} more", names=text, count=more) if more > 0 else text
@@ -63,12 +63,12 @@ def draw_text(
     icon: str = "NONE",
     alert: bool = False,
 ) -> None:
-    """Text in the user's language, broken into as many labels as the sidebar's width needs."""
+    """Draws text in the user's language, wrapped into as many labels as the sidebar's width needs."""
     width = max(20, characters(context) - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
-    # A name may be longer than a line; broken, it would be two.
+    # A name may be longer than a line; wrapped, it would look like two.
     text = " ".join(shortened(word, width) for word in tr(text).split())
     for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False)):
         shown = icon if number == 0 or icon == "NONE" else "BLANK1"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who deforms a mesh, and why, in the panel's words."""
+"""Sentences for the panel about who deforms a mesh, and why."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import bpy
 
 from ..attach import attach, hooks, properties
 from ..deform import session, small_meshes
-from ..deform.plan import MODES_OF_THE_MODIFIER, ObjectFacts, State, plan
+from ..deform.plan import ARMATURE_MODIFIER_MODES, ObjectFacts, State, plan
 from .sidebar import draw_text, names_text
 from .translations import tr
 
@@ -21,7 +21,7 @@ ICONS = {
 
 
 def reason_of(obj: bpy.types.Object) -> str:
-    """Why it is not deformed as usual; empty where it is, or is off."""
+    """Returns why it is not deformed as usual; empty where it is, or is off."""
     settings, state = properties.of(obj), session.state_of(obj)
     if not settings.enabled:
         return ""
@@ -30,7 +30,7 @@ def reason_of(obj: bpy.types.Object) -> str:
 
 
 def sentence_of(obj: bpy.types.Object) -> str:
-    """What is at work: who deforms the mesh, by which method, and why if not as usual."""
+    """Returns who deforms the mesh, by which method, and why if not as usual."""
     settings, state = properties.of(obj), session.state_of(obj)
     replaced = names_text([each.name for each in settings.replaced_modifiers])
     if settings.error:
@@ -55,7 +55,7 @@ def icon_of(obj: bpy.types.Object) -> str:
 
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
-    """What the artist should see to, apart from an error that switched it off."""
+    """Returns what the artist should fix, apart from an error that switched it off."""
     settings, state = properties.of(obj), session.state_of(obj)
     if state is None:
         return []
@@ -69,14 +69,14 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
             )
         )
     found += state.bound.facts.warnings
-    # A Hook may have come since.
-    return [*found, *(sentence for sentence in hooks.misled(obj) if sentence not in found)]
+    # A Hook may have been added since.
+    return [*found, *(sentence for sentence in hooks.warnings(obj) if sentence not in found)]
 
 
 def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    """In modes whose tools work through the Armature modifier: whether its shape is Sinew's, and the switch
-    that makes it so where the artist has switched it."""
-    if obj.mode not in MODES_OF_THE_MODIFIER or not properties.of(obj).enabled or obj.library is not None:
+    """For modes whose tools work through the Armature modifier: draws whether its shape is Sinew's, and the
+    switch that makes it so if the artist has changed it."""
+    if obj.mode not in ARMATURE_MODIFIER_MODES or not properties.of(obj).enabled or obj.library is not None:
         return
     sentence, modifiers = shape_in_mode(obj)
     draw_text(layout, context, sentence, icon="INFO")
@@ -88,8 +88,8 @@ def draw_in_mode(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bp
 
 
 def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureModifier]]:
-    """What the Armature modifiers show in such a mode, and those whose Preserve Volume has to be switched for
-    Sinew's shape."""
+    """Returns what the Armature modifiers show in such a mode, and those whose Preserve Volume has to be
+    switched for Sinew's shape."""
     method = tr(properties.method_label(properties.of(obj).method))
     if not small_meshes.has_builtin_shape(obj):
         return tr(
@@ -106,7 +106,7 @@ def shape_in_mode(obj: bpy.types.Object) -> tuple[str, list[bpy.types.ArmatureMo
 
 
 def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object) -> None:
-    """All of it, of one mesh."""
+    """Draws everything about one mesh."""
     if properties.of(obj).error:
         draw_text(layout, context, properties.of(obj).error, icon="ERROR", alert=True)
     elif reason_of(obj):
@@ -123,7 +123,8 @@ def draw_mesh(layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.t
 def draw_character(
     layout: bpy.types.UILayout, context: bpy.types.Context, meshes: list[bpy.types.Object]
 ) -> None:
-    """Of one mesh all; of several their errors, and what else there is to read in their list."""
+    """Draws everything for one mesh; for several their errors, and which of them have more to read in the
+    list."""
     if len(meshes) == 1:
         draw_mesh(layout, context, meshes[0])
         return
@@ -152,4 +153,4 @@ def uses_builtin(obj: bpy.types.Object) -> bool:
     settings, state = properties.of(obj), session.state_of(obj)
     if not settings.enabled or state is None:
         return False
-    return obj.mode in MODES_OF_THE_MODIFIER or state.plan.state is State.BUILT_IN
+    return obj.mode in ARMATURE_MODIFIER_MODES or state.plan.state is State.BUILT_IN

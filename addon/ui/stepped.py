@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that go through frames: in steps in a window, with progress and Esc; at once elsewhere."""
+"""Operators that go through frames: in a window in steps, with progress and Esc; otherwise at once."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ..deform import evaluate, precompute_watch, session
 from ..io import pose_io
 from .translations import tr
 
-# The window draws in between: rarely enough to cost little, often enough for Esc.
+# The window redraws in between: rarely enough to cost little, often enough for Esc.
 SECONDS_BETWEEN_REDRAWS = 0.1
 OVER = [
     ("SCENE", "Scene's Frames", "The scene's frame range, or its preview range where that is on"),
     ("ACTION", "Action's Frames", "From the first to the last key of the armature's action"),
 ]
-# Of the property that chooses one of them.
+# For the property that chooses one of them.
 OVER_WHICH = {"name": "Over", "description": "The frames to go through", "items": OVER}
 
 
 class Stepped:
-    """Has steps(context), which yields the share that is done, and finish(context), which takes what it
-    found. Both may raise SinewError, which is reported.
+    """A base class: subclasses have steps(context), which yields the progress, and finish(context), which
+    uses the result. Both may raise SinewError, which is reported.
 
     saying   what it does, in the status bar
-    stopped  what Esc reports; closing steps() has to leave all as it was
+    stopped  what Esc reports; closing steps() has to restore everything
     """
 
     saying = "Sinew goes through frames"
@@ -66,12 +66,12 @@ class Stepped:
             self.cancel(context)
             self.report({"WARNING"}, self.stopped)
             return {"CANCELLED"}
-        # Whatever else is done meanwhile would end up in what is found.
+        # Other events are blocked, as changes made meanwhile would affect the result.
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         share = None
         try:
-            share = self._go_on()
+            share = self._advance()
         except SinewError as error:
             return self._failed(error)
         finally:
@@ -85,12 +85,12 @@ class Stepped:
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Also when the window closes."""
+        """Called also when the window closes."""
         self._left.close()
         self._end(context)
 
-    def _go_on(self) -> float | None:
-        """The share that is done after some steps; None at the end."""
+    def _advance(self) -> float | None:
+        """Returns the progress after some steps; None at the end."""
         until, share = time.perf_counter() + SECONDS_BETWEEN_REDRAWS, 0.0
         while share is not None and time.perf_counter() < until:
             share = next(self._left, None)
@@ -116,7 +116,7 @@ class Stepped:
 
 
 def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], over: str) -> list[int]:
-    """The frames of one of OVER. Raises SinewError where there is no action."""
+    """Returns the frames of one of OVER. Raises SinewError where there is no action."""
     if over == "SCENE":
         if scene.use_preview_range:
             return list(range(scene.frame_preview_start, scene.frame_preview_end + 1))
@@ -132,8 +132,8 @@ def frames_over(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object], o
 
 @contextmanager
 def kept_frame(scene: bpy.types.Scene, armatures: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Inside, go to any frame; afterwards the scene is at its own, and armatures are posed as they were,
-    keyed or not."""
+    """Context in which any frame can be set; afterwards the scene is at its own frame, and armatures are
+    posed as before, keyed or not."""
     frame = scene.frame_float
     poses = [(armature, pose_io.read_channels(armature.pose.bones)) for armature in armatures]
     try:

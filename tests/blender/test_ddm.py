@@ -118,7 +118,7 @@ def test_in_a_window_the_shape_of_the_old_radius_stays_until_the_new_is_made(in_
 
 def look_until_done() -> None:
     for _ in range(300):
-        if precompute_watch.look() is None:
+        if precompute_watch.check() is None:
             return
         time.sleep(0.02)
     raise AssertionError("it goes on and on")

@@ -106,7 +106,7 @@ USES = [
 
 def reported(obj) -> dict[str, list[str]]:
     """By each that says something of groups: the panel's facts, Diagnostics, and pages."""
-    facts = survey.describe_undriven(obj).warnings
+    facts = survey.describe_in_file(obj).warnings
     diagnose.check(bpy.context.scene, [obj], 4)
     found = {finding.name: finding for finding in diagnose.of(obj).findings}
     (part,) = measure.gather(bpy.context.scene, [obj]).parts

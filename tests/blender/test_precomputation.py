@@ -83,7 +83,7 @@ def forget_made() -> None:
 
 def look_until_done() -> None:
     for _ in range(200):
-        if precompute_watch.look() is None:
+        if precompute_watch.check() is None:
             return
         time.sleep(0.01)
     raise AssertionError("it goes on and on")
@@ -134,7 +134,7 @@ def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
     assert "centres of rotation" in plan_of(obj).reason
     assert precomputing.running(obj, session.state_of(obj)).keys() == {"centres of rotation"}
     assert scenes.worst(scenes.final_points(obj), by_modifier) <= tolerance
-    assert precompute_watch.look() is not None
+    assert precompute_watch.check() is not None
     gate.open()
     look_until_done()
     assert plan_of(obj).state is not State.WAITING
@@ -207,7 +207,7 @@ def test_while_weights_are_painted_the_old_centres_serve(gate, route):
     for _ in range(3):
         move_weights(obj)
         # Another stroke comes before the artist has paused.
-        assert precompute_watch.look() is not None
+        assert precompute_watch.check() is not None
         assert gate.count == 1
         assert plan_of(obj).state is not State.WAITING
     by_old = scenes.final_points(obj)
@@ -265,7 +265,7 @@ def test_what_happens_meanwhile_does_no_harm(gate, in_window, event):
         bpy.ops.mesh.subdivide()
         bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
-    precompute_watch.look()
+    precompute_watch.check()
     gate.open()
     look_until_done()
     if event == "edit":

@@ -772,7 +772,7 @@ class SinewSide:
         from sinew_addon.deform import handlers, precompute_watch
 
         until = time.monotonic() + 30.0
-        while precompute_watch.look() is not None:
+        while precompute_watch.check() is not None:
             if time.monotonic() > until:
                 raise RuntimeError("what methods need is still computed after half a minute")
             time.sleep(0.002)

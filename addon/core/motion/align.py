@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which times of two clips are the same moment of a motion: dynamic time warping of their poses.
+"""Finds which times of two clips are the same moment of a motion, by dynamic time warping of their poses.
 
 The path through the matrix of pose distances has slopes from 1/2 to 2 (Sakoe and Chiba 1978, P = 1), so that
-each time of one clip has one of the other, and no clip stands still. Of cycles every offset is tried, and the
-ends of the path are the same moment. Clips warped so, with a timing blended of theirs, are the registration
+each time of one clip has one of the other, and no clip stands still. For cycles every offset is tried, and
+the ends of the path are the same moment. With a blended timing, clips warped in this way are the registration
 curves of Kovar and Gleicher 2003.
 """
 
@@ -15,23 +15,27 @@ import numpy as np
 
 from .clip import Clip
 
-# Of a clip: steps in which it is compared.
+# The number of steps of a clip that are compared.
 PHASES = 64
-# Steps over which a path is made smooth: it goes from one step to another.
+# The number of steps over which a path is smoothed, as it is made of whole steps.
 SMOOTH = 9
 
 
 @dataclass(frozen=True)
 class Warp:
-    """own [PHASES + 1]: the phase of a clip, 0 to 1, at even phases of the reference; increasing. Of a cycle
-    it begins anywhere, and ends 1 later."""
+    """The phase of a clip relative to a reference.
+
+    own  [PHASES + 1]: the clip's phase, 0 to 1, at even phases of the reference; increasing. For a cycle it
+         begins
+         anywhere, and ends 1 later.
+    """
 
     own: np.ndarray
 
     def at(self, phases: np.ndarray) -> np.ndarray:
         """[phases]: the clip's phase; whole cycles are added."""
         whole = np.floor(phases)
-        # The end of the last cycle is no beginning of another: a clip that is none has no more.
+        # The end of the last cycle is not the beginning of another: a clip that is no cycle has only one.
         whole = np.where((phases == whole) & (phases > 0.0), whole - 1.0, whole)
         even = np.linspace(0.0, 1.0, len(self.own))
         return whole + np.interp(phases - whole, even, self.own)
@@ -42,9 +46,9 @@ def same_pace() -> Warp:
 
 
 def features(clip: Clip, bones: np.ndarray) -> np.ndarray:
-    """[PHASES (of a cycle) or PHASES + 1, numbers]: where the ends of `bones` (bool) are, and how fast they
-    move, of the clip in place; each part with mean 0 and mean square 1, so that a long stride compares with
-    a short one."""
+    """[PHASES (of a cycle) or PHASES + 1, numbers]: positions and velocities of the ends of `bones` (bool) in
+    the in-place clip; each part with mean 0 and mean square 1, so that a long stride is comparable with a
+    short one."""
     phases = np.arange(PHASES + (not clip.is_cyclic)) / PHASES
     posed = clip.rig.to_armature(clip.at(phases * clip.length).rigid)
     places = clip.rig.points(posed)[:, bones].reshape(len(phases), -1)
@@ -60,11 +64,12 @@ def features(clip: Clip, bones: np.ndarray) -> np.ndarray:
 
 
 def align(reference: Clip, clip: Clip, bones: np.ndarray) -> Warp:
-    """The warp of `clip`, both in place and both cycles or neither; by `bones` (bool) alone."""
+    """Returns the warp of `clip`, compared by `bones` (bool) alone. Both clips are in place, and both or
+    neither are cycles."""
     if reference.length == 0.0 or clip.length == 0.0:
         return same_pace()
     a, b = features(reference, bones), features(clip, bones)
-    # What stands still is at the same moment everywhere.
+    # All times are alike in a clip that stands still.
     if not a.any() or not b.any():
         return same_pace()
     cost = ((a[:, None] - b[None]) ** 2).sum(axis=2)
@@ -77,11 +82,11 @@ def _path(cost: np.ndarray, is_cyclic: bool) -> tuple[np.ndarray, np.ndarray]:
     starts = np.arange(n) if is_cyclic else np.zeros(1, dtype=int)
     steps = np.arange(n + 1)
     if is_cyclic:
-        # [starts, n + 1, n + 1]: of a clip that begins at each of its steps.
+        # [starts, n + 1, n + 1]: for a clip that begins at each of its steps.
         cost = cost[steps[None, :, None] % n, (starts[:, None, None] + steps[None, None]) % n]
     else:
         cost = cost[None]
-    # Where others are as cheap, the diagonal from the first step.
+    # If other paths cost the same, the diagonal from the first step is preferred.
     slack = 1e-9 * (1.0 + cost.mean())
     total = np.full(cost.shape, np.inf)
     came = np.zeros(cost.shape, dtype=np.int8)
@@ -102,7 +107,7 @@ def _path(cost: np.ndarray, is_cyclic: bool) -> tuple[np.ndarray, np.ndarray]:
         di, dj = ((1, 1), (1, 2), (2, 1))[came[start, i, j]]
         nodes.append((i - di, j - dj))
     of_reference, of_clip = np.array(nodes[::-1]).T
-    # The nearer way: to begin a little before the clip's first pose is not to begin at its end.
+    # The nearer way: just before the clip's first pose, instead of nearly at its end.
     begin = int(starts[start])
     return of_reference, of_clip + (begin - n if begin > n // 2 else begin)
 

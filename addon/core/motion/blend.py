@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips of one armature blended: `sinew.interpolate.blend` over all frames and bones at once.
+"""Blends clips of one armature: `sinew.interpolate.blend` over all frames and bones at once.
 
-Smith 2013, section 4.1, asks for it. Rigid parts are blended by the method; the scale is the mean of the
-clips' scales, by the same weights, as Blender keeps a bone's scale apart from its rotation.
+Smith 2013, section 4.1, describes it. Rigid parts are blended by the method; the scale is the mean of the
+clips' scales, with the same weights, as Blender stores a bone's scale separately from its rotation.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ..inbetween import Method, Poses, axes_of, in_layout_of, rigid_of
 from . import timing
 from .align import Warp, align, same_pace
 from .clip import Clip, Rig, common_rig
-from .root import Grounded, accumulated, carried, grounded, main_root, stay
+from .root import Grounded, accumulated, as_keyed, carried, grounded, main_root
 
 RELATIVE, ARMATURE = "relative", "armature"
 TRAVEL, IN_PLACE, KEYED = "travel", "in_place", "keyed"
 
 
-# The one to recommend first, as menus have them; numbers are those of the in-betweens. "sclerp" and "dib" are
-# one under two names, that of two and that of many.
+# In the order of menus, the recommended method first; numbers are those of the in-betweens. "sclerp" and
+# "dib" are one method, for two and for many transforms.
 METHODS = {
     method.name: method
     for method in (
@@ -44,13 +44,15 @@ METHODS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """method       of METHODS
-    space        RELATIVE, each bone relative to its parent; or ARMATURE, where bones leave their parents
-    align        whether clips are brought to the same moment; else each plays from its first frame
-    align_bones  those that say which moment it is; none: all below the root
+    """How clips are blended.
+
+    method       of METHODS
+    space        RELATIVE, each bone relative to its parent; or ARMATURE, where bones can leave their parents
+    align        whether clips are brought to the same moment; otherwise each plays from its first frame
+    align_bones  the bones by which moments are compared; none: all below the root
     root         the bone that carries the others; None: found by main_root()
-    root_motion  TRAVEL: blended and added up; IN_PLACE: taken out; KEYED: blended as any bone's pose
-    cycles       how often the blend goes round; of clips that do not repeat once
+    root_motion  TRAVEL: blended and accumulated; IN_PLACE: removed; KEYED: blended like any bone's pose
+    cycles       how often the blend repeats; clips that are no cycles repeat once
     """
 
     method: interpolate.Method = "dlb"
@@ -64,14 +66,16 @@ class Settings:
 
 @dataclass(frozen=True)
 class Blend:
-    """poses      [frames, bones, ..], each bone relative to its parent and rest
-    volume     [frames, bones]: determinant of what the method gives; below 1 a bone shrinks
-    apart      [frames, bones]: how far heads would be from where their parents hold them
+    """The result of a blend.
+
+    poses      [frames, bones, ..], each bone relative to its parent and rest
+    volume     [frames, bones]: determinant of the method's result; below 1 a bone shrinks
+    apart      [frames, bones]: how far heads would be from where their parents keep them
     undefined  bool [frames, bones]: where sinew.interpolate.blend says that its result is not defined
     timing     of each clip in each frame
     warps      of the clips
     root       the bone that carried the others, None where root motion is as keyed
-    is_cyclic  the last pose is the first again, but for its travel
+    is_cyclic  the last pose equals the first, except for its travel
     """
 
     rig: Rig
@@ -94,14 +98,15 @@ def blend(
     settings: Settings | None = None,
     up: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Blend:
-    """The clips blended by weights, brought to sum 1, or by such that change.
+    """Blends clips by weights, scaled to sum 1, or by weights that change.
 
-    Whether a clip is a cycle is found from its poses, or as `Clip.is_cyclic` says. Where not all are, all are
-    aligned from their first pose to their last. The heaviest clip at the beginning is the reference: the
-    blend begins where it does.
+    Whether a clip is a cycle is found from its poses, or given by `Clip.is_cyclic`. Where some are none, all
+    are aligned from their first pose to their last. The clip with the largest weight at the beginning is the
+    reference: the blend begins where it does.
 
     up  [3], the vertical in armature space, of length 1
-    Raises SinewError for other settings, weights or bones than can be.
+
+    Raises SinewError for impossible settings, weights or bones.
     """
     settings = Settings() if settings is None else settings
     rig = common_rig(clips)
@@ -151,8 +156,8 @@ def _check(settings: Settings) -> None:
 
 
 def _in_place(clips: Sequence[Clip], root: int, up: np.ndarray, settings: Settings) -> list[Grounded]:
-    """The clips without their travel, which all are cycles or, to be aligned, none."""
-    take_out = stay if settings.root_motion == KEYED else grounded
+    """Returns the clips without their travel: all as cycles, or, if that is needed to align them, none."""
+    take_out = as_keyed if settings.root_motion == KEYED else grounded
     found = [take_out(clip, root, up, clip.is_cyclic or None) for clip in clips]
     if settings.align and not all(each.clip.is_cyclic for each in found):
         found = [take_out(clip, root, up, False) for clip in clips]
@@ -174,14 +179,14 @@ def _warps(clips: Sequence[Clip], reference: int, rig: Rig, root: int, settings:
 def _ground(
     travels: Sequence[Grounded], schedule: timing.Timing, reference: int, settings: Settings
 ) -> np.ndarray:
-    """[frames, 7]: the ground frame of the blend, from where the reference begins."""
+    """[frames, 7]: the ground frames of the blend, starting where the reference starts."""
     frames = [travel.at(times) for travel, times in zip(travels, schedule.times.T, strict=True)]
     start = frames[reference][0]
     count = len(schedule.times)
     if settings.root_motion == IN_PLACE:
         return np.repeat(start[None], count, axis=0)
     steps = [quat_vec.compose(quat_vec.inverse(each[:-1]), each[1:]) for each in frames]
-    # A step is blended by the weights of its middle.
+    # A step is blended by the weights at its middle.
     weights = 0.5 * (schedule.weights[1:] + schedule.weights[:-1])
     blended = _of_all(steps, weights, settings.method)
     return accumulated(start, rigid_of(settings.method, blended.transforms))
@@ -190,8 +195,8 @@ def _ground(
 def _of_all(
     rigid: Sequence[np.ndarray], weights: np.ndarray, method: interpolate.Method
 ) -> interpolate.Blended:
-    """Rigid transforms [.., 7] of each clip, blended by weights [.., clips] of sum 1. Of two the methods
-    have a shorter way than that of many, to the same result."""
+    """Blends rigid transforms [.., 7] of each clip by weights [.., clips] of sum 1. For two clips the methods
+    have a faster way, with the same result."""
     inside = [in_layout_of(method, each) for each in rigid]
     if len(inside) == 2:
         return interpolate.between(inside[0], inside[1], weights[..., 1], method)
@@ -207,7 +212,7 @@ class _Result(NamedTuple):
 
 
 def _blended(rig: Rig, sampled: Sequence[Poses], weights: np.ndarray, settings: Settings) -> _Result:
-    """Poses [frames, bones, ..] of clips blended by weights [frames, clips]."""
+    """Blends poses [frames, bones, ..] of clips by weights [frames, clips]."""
     rigid = [poses.rigid for poses in sampled]
     scale = np.einsum("fc,fcbk->fbk", weights, np.stack([poses.scale for poses in sampled], axis=1))
     if settings.space == ARMATURE:
@@ -230,8 +235,8 @@ def _blended(rig: Rig, sampled: Sequence[Poses], weights: np.ndarray, settings: 
 
 
 def _stretch(rig: Rig, matrices: np.ndarray, volume: np.ndarray, space: str) -> np.ndarray:
-    """[frames, bones, 3]: what a bone's scale can have of matrices that are not rigid: the lengths of their
-    axes. Of matrices in armature space, where bones have their parents' scale already, the size alone."""
+    """[frames, bones, 3]: the scale that a bone can take from matrices that are not rigid: the lengths of
+    their axes. In armature space, where bones already have their parents' scale, only the overall size."""
     if space == RELATIVE:
         return axes_of(matrices)
     size = np.cbrt(np.maximum(volume, 0.0))

@@ -12,7 +12,7 @@ from sinew import interpolate, quat_vec
 from ..errors import SinewError
 from ..inbetween import Poses
 
-# How far the last pose may be from the first for a clip to be a cycle: radians, and a part of the rig's size.
+# How far the last pose of a cycle may be from the first: radians, and a share of the rig's size.
 SAME_ANGLE, SAME_PLACE = 0.06, 0.02
 
 
@@ -35,7 +35,8 @@ class Rig:
     connected: np.ndarray
 
     def to_armature(self, relative: np.ndarray) -> np.ndarray:
-        """[.., bones, 7] armature_from_bone, of bones relative to their parents and rests; rigid alone."""
+        """[.., bones, 7] armature_from_bone, from bones relative to their parents and rests; rigid parts
+        only."""
         posed = quat_vec.compose(self.rest, relative)
         for bone, parent in enumerate(self.parents):
             if parent >= 0:
@@ -43,20 +44,20 @@ class Rig:
         return posed
 
     def to_relative(self, armature: np.ndarray) -> np.ndarray:
-        """What to_armature() undoes."""
+        """The inverse of to_armature()."""
         above = armature[..., np.maximum(self.parents, 0), :]
         above = np.where((self.parents >= 0)[:, None], above, quat_vec.identity())
         return quat_vec.compose(quat_vec.inverse(quat_vec.compose(above, self.rest)), armature)
 
     def points(self, armature: np.ndarray) -> np.ndarray:
-        """[.., bones, 2, 3]: heads and tails of bones as to_armature() gives them, unscaled."""
+        """[.., bones, 2, 3]: heads and tails of bones as to_armature() returns them, unscaled."""
         ends = np.zeros((len(self.names), 2, 3))
         ends[:, 1, 1] = self.lengths
         return quat_vec.transform_point(armature[..., None, :], ends)
 
     @property
     def size(self) -> float:
-        """The diagonal of the box around the bones at rest; of a rig without extent 1."""
+        """The diagonal of the bounding box of the bones at rest; 1 for a rig without extent."""
         rest = self.points(self.to_armature(np.broadcast_to(quat_vec.identity(), self.rest.shape)))
         return float(np.linalg.norm(np.ptp(rest.reshape(-1, 3), axis=0))) or 1.0
 
@@ -66,7 +67,7 @@ class Rig:
         return self.names.index(name)
 
     def below(self, bone: int) -> np.ndarray:
-        """bool [bones]: `bone` and all under it."""
+        """bool [bones]: `bone` and all its descendants."""
         found = np.zeros(len(self.names), dtype=bool)
         found[bone] = True
         for each, parent in enumerate(self.parents):
@@ -80,7 +81,7 @@ class Clip:
 
     poses      [samples, bones, ..], each bone relative to its parent and rest, at even times
     length     frames from the first sample to the last; 0 for a single pose
-    is_cyclic  the last pose is the first again: after it comes the second
+    is_cyclic  the last pose equals the first, and is followed by the second
     """
 
     name: str
@@ -90,19 +91,20 @@ class Clip:
     is_cyclic: bool = False
 
     def at(self, times: np.ndarray) -> Poses:
-        """The poses [times, bones, ..] so many frames after the first: between samples the shortest rotation
-        at an even pace; outside of the clip its repetition, or its first or last pose."""
+        """Returns the poses [times, bones, ..] at times in frames after the first: between samples by the
+        shortest rotation at constant speed; outside of the clip its repetition, or its first or last pose."""
         last = len(self.poses.rigid) - 1
         if last == 0 or self.length == 0.0:
             nothing = np.zeros(len(times), dtype=int)
             return Poses(self.poses.rigid[nothing], self.poses.scale[nothing])
         times = np.asarray(times, dtype=np.float64)
-        # A time that a sum of fractions missed by its rounding is that of the sample.
+        # Times that miss a sample only by rounding are that sample.
         places = times * (last / self.length)
         whole = np.round(places)
         places = np.where(np.abs(places - whole) < 1e-9 * last, whole, places)
         if self.is_cyclic:
-            # Of the two poses that are one the last ends a round: what is blended of one clip is that clip.
+            # The first and the last pose are equal; here the last one ends a cycle, so that a blend of one
+            # clip is that clip.
             places = np.where(places == 0.0, 0.0, places - last * (np.ceil(places / last) - 1.0))
         else:
             places = np.clip(places, 0.0, last)
@@ -126,7 +128,8 @@ class Clip:
 
 
 def closes(rig: Rig, first: np.ndarray, last: np.ndarray) -> bool:
-    """Whether two poses [bones, 7] are one, as the ends of a cycle are; root motion is taken out before."""
+    """Whether two poses [bones, 7] are equal, as the ends of a cycle are; root motion has to be removed
+    before."""
     apart = quat_vec.rigid_distance(first, last)
     return bool(apart.angle.max(initial=0.0) < SAME_ANGLE) and bool(
         apart.translation.max(initial=0.0) < SAME_PLACE * rig.size
@@ -134,7 +137,7 @@ def closes(rig: Rig, first: np.ndarray, last: np.ndarray) -> bool:
 
 
 def common_rig(clips: Sequence[Clip]) -> Rig:
-    """The rig of all clips. Raises SinewError where there is none, or where they differ."""
+    """Returns the rig of all clips. Raises SinewError where there is no clip, or where rigs differ."""
     if not clips:
         raise SinewError("Nothing to blend: choose two actions or more")
     for clip in clips[1:]:

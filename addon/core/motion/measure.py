@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers of a motion: what an eye sees as wrong."""
+"""Measures of a motion, for faults that are visible."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from ..errors import SinewError
 from .blend import Blend
 from .clip import Clip
 
-# Below this part of a clip's height a foot counts as on the ground: 2.5 cm of 1.7 m (Zhang et al. 2018).
+# Below this share of a clip's height a foot counts as on the ground: 2.5 cm of 1.7 m (Zhang et al. 2018).
 NEAR_GROUND = 0.015
 
 
 @dataclass(frozen=True)
 class Measures:
-    """sliding              how far feet slide in a frame while they are on the ground, mean; 0 without feet
-    travel               how far the root goes over the ground in a frame, mean
-    angular_acceleration root of the mean square over bones and frames, degrees a second squared
-    worst_acceleration   its largest value
+    """Measures of a clip.
+
+    sliding               how far feet on the ground slide in a frame, mean; 0 without feet
+    travel                how far the root moves over the ground in a frame, mean
+    angular_acceleration  root of the mean square over bones and frames, degrees per second squared
+    worst_acceleration    its largest value
     """
 
     sliding: float
@@ -33,8 +35,8 @@ class Measures:
 
 @dataclass(frozen=True)
 class Shrinking:
-    """The least determinant that a blend has, in which bone and in which of its frames; and how far a head is
-    from its parent at most."""
+    """The smallest determinant of a blend, with its bone and frame; and the largest distance of a head from
+    its parent."""
 
     volume: float
     bone: str
@@ -43,16 +45,16 @@ class Shrinking:
 
 
 def measure(clip: Clip, feet: Sequence[int], root: int, up: np.ndarray, frames_a_second: float) -> Measures:
-    """The numbers of a clip that goes as it is keyed: with its travel.
+    """Measures a clip as it is keyed, with its travel.
 
-    feet  bones, of which the lower end counts at each frame; of feet_of(), say
+    feet  bones; at each frame their lower end counts. For example from feet_of()
     """
     rig, rigid = clip.rig, clip.poses.rigid
     posed = rig.to_armature(rigid)
     places = posed[:, root, 4:]
     flat = places - (places @ up)[:, None] * up
     travel = np.linalg.norm(np.diff(flat, axis=0), axis=1)
-    # In frames, which samples need not be.
+    # Per frame, as samples need not be whole frames.
     pace = (len(rigid) - 1) / clip.length if clip.length else 1.0
     spin = _angular_velocity(rigid) * pace * frames_a_second
     change = np.linalg.norm(np.diff(spin, axis=0), axis=-1) * pace * frames_a_second
@@ -76,11 +78,12 @@ def shrinking(blend: Blend) -> Shrinking:
 
 
 def sliding(clip: Clip, feet: Sequence[int], up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """[samples - 1, feet]: how far each foot goes along the ground to the next sample, and how much it is on
+    """[samples - 1, feet]: how far each foot moves along the ground to the next sample, and how much it is on
     the ground then.
 
-    On the ground is 2 - 2^(h / H), h its height above its lowest: 1 at 0, and 0 from the height H on (Zhang,
-    Starke, Komura, Saito 2018, section 8): no threshold at which a foot begins to count.
+    On the ground is 2 - 2^(h / H), where h is its height above its lowest position: 1 at 0, and 0 from the
+    height H on (Zhang, Starke, Komura, Saito 2018, section 8), so there is no threshold at which a foot
+    begins to count.
     """
     rig = clip.rig
     ends = rig.points(rig.to_armature(clip.poses.rigid))[:, list(feet)]
@@ -102,8 +105,8 @@ def _mean_sliding(clip: Clip, feet: Sequence[int], up: np.ndarray) -> float:
 
 
 def feet_of(clip: Clip, up: np.ndarray) -> list[int]:
-    """The bones that come closest to the ground: of those without others below them, whose lower end is
-    somewhere within NEAR_GROUND of the lowest that any has."""
+    """Returns the bones that come closest to the ground: of the bones without children, those whose lower end
+    is at some time within NEAR_GROUND of the lowest of all."""
     rig = clip.rig
     heights = (rig.points(rig.to_armature(clip.poses.rigid)) @ up).min(axis=(0, 2))
     ends = ~np.isin(np.arange(len(rig.names)), rig.parents)
@@ -112,7 +115,7 @@ def feet_of(clip: Clip, up: np.ndarray) -> list[int]:
 
 
 def bones_named(clip: Clip, names: Sequence[str]) -> list[int]:
-    """Raises SinewError for one that the rig does not have."""
+    """Raises SinewError for a bone that the rig does not have."""
     missing = [name for name in names if name not in clip.rig.names]
     if missing:
         raise SinewError(f"There is no bone {missing[0]!r}; choose feet of this armature")

@@ -12,15 +12,19 @@ from ..errors import SinewError, WrongUse
 from .align import Warp
 from .clip import Clip
 
-# Steps of a cycle in which its timing is added up.
+# The number of steps in which a cycle's timing is summed.
 STEPS = 512
-# Of a blend: frames beyond which something was mistyped.
+# Longer blends are taken for typing errors.
 MOST_FRAMES = 100_000
 
 
 @dataclass(frozen=True)
 class Timing:
-    """times [frames, clips], in frames after each clip's first; weights [frames, clips] of sum 1."""
+    """Times and weights of a blend's clips.
+
+    times    [frames, clips], in frames after each clip's first
+    weights  [frames, clips], of sum 1
+    """
 
     times: np.ndarray
     weights: np.ndarray
@@ -28,10 +32,10 @@ class Timing:
 
 @dataclass(frozen=True)
 class Weights:
-    """Those of a blend's clips over its motion: between two keys in a straight line, or smoothly.
+    """Weights of a blend's clips over its motion, interpolated linearly between keys, or smoothly.
 
-    at      [keys], rising: shares of the motion, from 0 to 1; before the first and behind the last key
-            nothing changes
+    at      [keys], ascending: shares of the motion, from 0 to 1; constant before the first key and after the
+            last
     values  [keys, clips], of sum 1
     """
 
@@ -43,9 +47,9 @@ class Weights:
     def of(
         cls, given: Sequence, count: int, at: Sequence[float] | None = None, smooth: bool = False
     ) -> Weights:
-        """given: the weights of `count` clips, or such at each key; without `at`, keys are even.
+        """given: the weights of `count` clips, or these at each key; without `at`, keys are even.
 
-        Raises SinewError where they are not such.
+        Raises SinewError where they are invalid.
         """
         are_keys = len(given) > 0 and np.ndim(given[0]) > 0
         values = [np.array(each, dtype=np.float64) for each in (given if are_keys else [given])]
@@ -76,14 +80,15 @@ class Weights:
 
 
 def lengths_of(clips: Sequence[Clip]) -> np.ndarray:
-    """[clips]: frames; a single pose is as long as the others are on average."""
+    """[clips]: lengths in frames; a single pose gets the mean of the others."""
     lengths = np.array([clip.length for clip in clips])
     others = lengths[lengths > 0.0]
     return np.where(lengths > 0.0, lengths, others.mean() if len(others) else 0.0)
 
 
 def own_pace(clips: Sequence[Clip], weights: Weights, cycles: int) -> Timing:
-    """Every clip from its first frame at its own pace, for the longest that has a weight."""
+    """Returns the timing where every clip plays from its first frame at its own speed, for the longest that
+    has a weight."""
     used = (weights.values > 0.0).any(axis=0)
     lengths = lengths_of(clips)
     frames = _whole(cycles * lengths[used].max())
@@ -92,9 +97,9 @@ def own_pace(clips: Sequence[Clip], weights: Weights, cycles: int) -> Timing:
 
 
 def aligned(clips: Sequence[Clip], warps: Sequence[Warp], weights: Weights, cycles: int) -> Timing:
-    """Clips at the same moment of their motion. A moment takes the weighted mean of the times that it takes
-    in each: so a blend is as long as the weighted mean of its clips, to whole frames, and one of a single
-    clip plays that as it is. Weights change in step with the motion."""
+    """Returns the timing where clips are at the same moment of their motion. A moment takes the weighted mean
+    of its times in each clip: so a blend is as long as the weighted mean of its clips, in whole frames, and a
+    blend of one clip plays it unchanged. Weights change in step with the motion."""
     lengths = lengths_of(clips)
     _whole(cycles * float((weights.values @ lengths).min()))
     phases = np.linspace(0.0, cycles, STEPS * cycles + 1)

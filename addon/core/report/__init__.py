@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The experiments of Smith 2013, chapter 3, done again: what is printed there beside what Sinew gives."""
+"""Repeats the experiments of Smith 2013, chapter 3: the printed numbers beside Sinew's."""

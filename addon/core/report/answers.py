@@ -10,14 +10,14 @@ from . import orders, paths, printed, studies, tables
 from .measure import Measurements
 from .model import Answer, Fact, Figure
 
-# What counts as no dearer: within what one machine's neighbours change in a measurement.
+# Times count as equal within this factor, which other load on a machine can cause.
 CLOSE = 1.25
-# Times as dear that a method of skinning may be for its shape to be worth it.
+# A method of skinning is worth its better shape up to this factor in time.
 WORTH = 3.0
 
 
 def answers(measurements: Measurements | None, figures: tuple[Figure, ...]) -> tuple[Answer, ...]:
-    """One for each question. What is not measured in this installation is said to be so."""
+    """Returns an answer to each question. Answers say what is not measured in this installation."""
     return (
         _matrices(measurements),
         _worth(measurements, figures),
@@ -211,7 +211,8 @@ def _slower_methods(measurements: Measurements | None, figures: tuple[Figure, ..
 
 
 def dlb_bound() -> Fact:
-    """The largest differences of DLB and ScLERP between the identity and a screw of up to 180 degrees."""
+    """Returns the largest differences of DLB and ScLERP between the identity and a screw of up to 180
+    degrees."""
     t = np.linspace(0.0, 1.0, 201)
     axis, point = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     degrees, share = 0.0, 0.0

@@ -11,9 +11,9 @@ from ..plots import new_figure, to_svg
 from .model import Fact, Figure, Picture
 from .paths import in_layout, layout
 
-# Two bones of length 1, each rotated by this about its head between the keys.
+# Two bones of length 1, each rotated by this angle about its head between the keys.
 DEGREES = 75.0
-# The report's linear methods: of Algorithm 2.
+# The report's linear methods, of Algorithm 2.
 METHODS: tuple[sinew.interpolate.Method, ...] = ("matrix_linear", "qv_nlerp", "dlb")
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
 TITLE = "An arm of two bones between two keys, interpolated relative to its parents and relative to the root"
@@ -31,7 +31,7 @@ def arms(method: sinew.interpolate.Method, t: np.ndarray, from_root: bool) -> np
     skeleton = sinew.Skeleton([-1, 0])
     ends = [in_layout(module, keys(degrees)) for degrees in (0.0, DEGREES)]
     if from_root:
-        # What algorithm 1 gives, interpolated by algorithm 2: the wrong order.
+        # The result of algorithm 1, interpolated by algorithm 2: the wrong order.
         ends = [skeleton.root_relative(end) for end in ends]
     bones, _defined = skeleton.interpolate(ends[0], ends[1], t, method)
     if not from_root:
@@ -74,7 +74,7 @@ def figure_3_3() -> Figure:
     return Figure("3.3", TITLE, pictures, (fact,))
 
 
-# Wide below and narrow above, so that arms that fall together are all seen.
+# Lower lines are wider, so that coinciding arms are all visible.
 _STYLES = (("#d8b365", 5.0), ("#01665e", 3.2), ("#c51b7d", 1.4))
 
 

@@ -18,19 +18,19 @@ import numpy as np
 from ..errors import SinewError
 
 PROGRAMS = ("operation_counts", "timings_optimised", "timings_unoptimised")
-# Of a program's name.
+# The extension of programs.
 SUFFIX = ".exe" if sys.platform == "win32" else ""
-# Without optimisation Eigen takes minutes, and says nothing of the report, which used GLM.
+# Without optimisation Eigen takes minutes, and is irrelevant to the report, which used GLM.
 UNOPTIMISED = r"^3\.(4|5|10)/(plain|glm|sinew)|^3\.9/(plain|glm|sinew_(matrix_linear|qv|dlb|sclerp))"
-# What one loop of each table does so many times.
+# The number of operations in one loop of each table.
 OPERATIONS = {"3.4": 5 * 100_000, "3.5": 1_000_000, "3.9": 1_000_000, "3.10": 1_000_000}
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Processor seconds for a whole loop: the median of all runs, the fastest, the range of the middle half.
+    """Processor seconds for a whole loop: the median of all runs, the fastest run, the interquartile range.
 
-    A shortened loop's, as many times as it was shortened.
+    Times of a shortened loop are multiplied by the factor by which it was shortened.
     """
 
     median: float
@@ -45,11 +45,11 @@ class Timing:
 
 @dataclass(frozen=True)
 class Measurements:
-    """What the programs gave.
+    """The results of the programs.
 
     counts       operations, by table, name and kind
-    optimised    by "table/name", as built to be fast
-    unoptimised  the same without optimisation, of fewer candidates
+    optimised    by "table/name", from the optimised build
+    unoptimised  the same without optimisation, for fewer candidates
     """
 
     counts: dict[str, dict[str, dict[str, int]]]
@@ -59,7 +59,7 @@ class Measurements:
 
 
 def machine() -> dict[str, str]:
-    """Processor, system and Python."""
+    """Returns processor, system and Python."""
     try:
         found = re.search(r"^model name\s*:\s*(.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     except OSError:
@@ -72,13 +72,13 @@ def machine() -> dict[str, str]:
 
 
 def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measurements:
-    """Runs the programs in the folder `programs`; some 90 seconds, `quick` less than one.
+    """Runs the programs in the folder `programs`; takes some 90 seconds, `quick` less than one.
 
-    step  called with what is about to be done
+    step  called with a description before each step
 
-    Raises SinewError where a program is not there or fails.
+    Raises SinewError where a program does not exist or fails.
     """
-    # A program called by its bare name would be looked for elsewhere.
+    # The system would search elsewhere for a program without a path.
     found = {name: programs.resolve() / f"{name}{SUFFIX}" for name in PROGRAMS}
     for name, program in found.items():
         if not program.is_file():
@@ -101,7 +101,7 @@ def measure(programs: Path, quick: bool, step: Callable[[str], None]) -> Measure
 
 def _timings(program: Path, repetitions: int, quick: bool, *options: str) -> tuple[dict[str, Timing], dict]:
     shorten = 1000 if quick else 1
-    # Interleaved, so that a neighbour's load falls on all candidates alike.
+    # Interleaved, so that other load on the machine affects all candidates alike.
     result = json.loads(
         _output(
             [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 3.6 to 3.11: deformed chains of links, what is measured of them and what the report says."""
+"""Figures 3.6 to 3.11: deformed chains of links, what is measured of them, and what the report says."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ HIERARCHIES = {
     "qv_nlerp": ("3.7", "Quaternion-vector hierarchical interpolation"),
     "dlb": ("3.8", "Dual quaternion hierarchical interpolation"),
 }
-# Those of the report's pictures (a) to (c), then those of its future work.
+# The methods of the report's pictures (a) to (c), then those of its future work.
 SKINS = ("lbs", "qv", "dq", "log", "sbs")
-# Metres of a link of the tube.
+# The length of a link of the tube, in metres.
 LINK = 0.25
 TITLES = {
     "3.9": "Mesh used for skinning, with linear weighting",
@@ -32,10 +32,11 @@ _POSES = "The report does not print its poses; these are those of Sinew's own fi
 
 
 def joint_degrees(parents: np.ndarray, rest: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """[bones]: how far each joint rotates between two poses; one without parent by its whole motion.
+    """[bones]: how far each joint rotates between two poses; for a bone without parent, the rotation of its
+    whole motion.
 
-    parents               int32 [bones], parents before children
-    rest, first, second   [bones, 4, 4] of the bones in one space
+    parents              int32 [bones], parents before children
+    rest, first, second  [bones, 4, 4] of the bones in one space
     """
     motions = []
     for pose in (first, second):
@@ -48,7 +49,8 @@ def joint_degrees(parents: np.ndarray, rest: np.ndarray, first: np.ndarray, seco
 
 
 def said_of_joints(degrees: np.ndarray, between: str) -> str:
-    """Such as: 5 joints rotate by 90 degrees between the keys. degrees: of joint_degrees()."""
+    """Returns a sentence such as: 5 joints rotate by 90 degrees between the keys. degrees: from
+    joint_degrees()."""
     moving = degrees[degrees > 0.5]
     count = {1: "One joint rotates"}.get(len(moving), f"{len(moving)} joints rotate")
     low, high = (f"{angle:.0f}" for angle in (moving.min(), moving.max()))
@@ -59,10 +61,10 @@ def said_of_joints(degrees: np.ndarray, between: str) -> str:
 class Chain:
     """Links that do not blend, between two keyframes.
 
-    points       [vertices, 3] at rest
-    triangles    [triangles, 3]
-    bones        int [vertices], the one that moves each
-    parents      int32 [bones], parents before children
+    points               [vertices, 3] at rest
+    triangles            [triangles, 3]
+    bones                int [vertices], the bone that moves each
+    parents              int32 [bones], parents before children
     rest, first, second  [bones, 4, 4] of the bones, in the space of the points
     """
 
@@ -113,7 +115,7 @@ class Chain:
 def hierarchy_figures(
     chain: Chain, shapes: dict[str, list[np.ndarray]], pictures: dict[str, list[Picture]]
 ) -> tuple[Figure, ...]:
-    """shapes  [vertices, 3] by method and time of TIMES, pictures likewise"""
+    """shapes: [vertices, 3] by method and time of TIMES, pictures likewise."""
     rest = chain.link_volumes(chain.points)
     length = float(np.ptp(chain.points, axis=0).max())
     kept = {
@@ -159,7 +161,7 @@ class Skin:
 
     rest                     [vertices, 3], of volume rest_volume
     triangles                [triangles, 3]
-    counts, groups, weights  int [vertices], and of all their entries the link's number and its weight
+    counts, groups, weights  int [vertices]; then the link's number and its weight, for all entries
     """
 
     rest: np.ndarray
@@ -175,7 +177,7 @@ class Skin:
 
 def figure_3_9(skin: Skin, picture: Picture) -> Figure:
     links = int(skin.groups.max()) + 1
-    # The domes at both ends reach beyond the links, by as much at either end.
+    # The domes at both ends extend beyond the links, by the same length.
     middle = (skin.rest[:, 0].min() + skin.rest[:, 0].max()) / 2
     middles = middle + (np.arange(links) + 0.5 - links / 2) * LINK
     vertex = np.repeat(np.arange(len(skin.counts)), skin.counts)
@@ -195,7 +197,7 @@ def figure_3_9(skin: Skin, picture: Picture) -> Figure:
 def figure_3_10(
     skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture], degrees: np.ndarray
 ) -> Figure:
-    """degrees  of joint_degrees(), from rest"""
+    """degrees: from joint_degrees(), relative to rest."""
     kept = {method: skin.volume_kept(points) for method, points in shapes.items()}
     drift = float(np.linalg.norm(shapes["qv"] - shapes["dq"], axis=1).max())
     width = float(np.ptp(skin.rest[:, 1]))
@@ -221,8 +223,8 @@ def figure_3_10(
 def figure_3_11(
     skin: Skin, shapes: dict[str, np.ndarray], pictures: list[Picture], degrees: np.ndarray
 ) -> Figure:
-    """degrees  of joint_degrees(), from rest"""
-    # The tube's own surface, off the domes, whose middle lies on the axis at rest.
+    """degrees: from joint_degrees(), relative to rest."""
+    # The tube's own surface, without the domes; its middle is on the axis at rest.
     radius = np.hypot(skin.rest[:, 1], skin.rest[:, 2])
     wall = radius > 0.999 * radius.max()
     kept = {
@@ -245,7 +247,7 @@ def figure_3_11(
 
 
 def trimmed(pictures: list[Picture]) -> list[Picture]:
-    """The PNGs without the clear margin that all of them have. Requires Pillow."""
+    """Returns the PNGs without the transparent margin that all of them have. Requires Pillow."""
     from PIL import Image
 
     contents = [picture.content for picture in pictures if isinstance(picture.content, bytes)]
@@ -263,6 +265,6 @@ def trimmed(pictures: list[Picture]) -> list[Picture]:
 
 
 def missing(reason: str) -> tuple[Figure, ...]:
-    """All six figures, with why they are not there."""
+    """Returns all six figures, with the reason why they are missing."""
     titles = {**{number: title for number, title in HIERARCHIES.values()}, **TITLES}
     return tuple(Figure(number, title, missing=reason) for number, title in titles.items())

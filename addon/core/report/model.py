@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the page is made of. report.json holds exactly this."""
+"""The data of the page, which report.json contains exactly."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Numbers = tuple[float, ...]
 class Row:
     """One line of a table.
 
-    printed, ours  the numbers that the table's `columns` name; None where there is none
-    agrees         None where nothing is printed to agree with
-    why            why not, where it does not
-    more           what the table's `more_columns` name
+    printed, ours  the numbers that the table's `columns` name; None where there are none
+    agrees         None where nothing is printed to compare with
+    why            the reason where it does not agree
+    more           the values that the table's `more_columns` name
     """
 
     name: str
@@ -28,7 +28,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Fact:
-    """What the report says that its table or figure shows, and what ours shows, with the numbers behind."""
+    """What the report says about its table or figure, and what ours shows, with the underlying numbers."""
 
     says: str
     ours: str
@@ -40,12 +40,12 @@ class Fact:
 class Table:
     """A table of the report.
 
-    number     as there
-    columns    what each of the numbers is
+    number     as in the report
+    columns    the meaning of each number
     tolerance  a sentence: when printed and ours agree
     decimals   digits shown after the point
-    facts      what the report concludes from it
-    notes      what else there is to say
+    facts      the report's conclusions from it
+    notes      further remarks
     missing    why it could not be measured here and how to, or None
     """
 
@@ -63,7 +63,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """caption, and the picture itself: an SVG as text or a PNG as bytes."""
+    """A caption, and the picture itself: an SVG as text or a PNG as bytes."""
 
     caption: str
     content: str | bytes = field(repr=False)
@@ -81,7 +81,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Answer:
-    """A conclusion or an open question of the report, and what our numbers say to it."""
+    """A conclusion or an open question of the report, and what our numbers say about it."""
 
     question: str
     answer: str
@@ -89,7 +89,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Page:
-    """studies: the numbers of studies.py that the answers speak of."""
+    """studies: the numbers of studies.py that the answers refer to."""
 
     version: str
     machine: dict[str, str]

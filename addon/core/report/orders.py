@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the report concludes from its times, held to ours: by the best implementation of each
+"""Compares the report's conclusions from its times with ours, using the best implementation of each
 representation."""
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from . import printed
 from .measure import OPERATIONS, Measurements, Timing
 from .model import Fact
 
-# By representation, what measures it here. GLM's first, which the report used.
+# The implementations measured here, by representation. GLM's are first, which the report used.
 CANDIDATES = {
     "affine": ("glm_4x4", "plain_4x4", "lanes_4x4", "lanes_3x4", "sinew_affine", "eigen_4x4", "eigen_3x4"),
     "quat_vec": ("glm_quat_vec", "sinew_quat_vec", "eigen_quat_vec"),
     "dual_quat": ("glm_dual_quat", "sinew_dual_quat"),
 }
 _OTHER_MATRICES = ("plain_4x4", "lanes_4x4", "lanes_3x4", "eigen_4x4", "eigen_3x4")
-# By table: the times that the report prints, and the candidates of each row. Of ScLERP Kenwright's on GLM.
+# By table: the times that the report prints, and the candidates of each row. For ScLERP, Kenwright's on GLM.
 TIMED: dict[str, tuple[dict[str, float], dict[str, tuple[str, ...]]]] = {
     "3.4": (printed.CHAIN_SECONDS, CANDIDATES),
     "3.5": (printed.POINT_SECONDS, CANDIDATES),
@@ -60,12 +60,12 @@ _ROWS = {
     "qv": "pair",
     "dq": "dual quaternion",
 }
-# How far a printed ratio may be off ours.
+# How far a printed ratio may differ from ours.
 RATIO_TOLERANCE = 0.25
 
 
 def nanoseconds(measurements: Measurements, table: str, name: str) -> float:
-    """One operation in a table's optimised loop."""
+    """The time of one operation in a table's optimised loop."""
     return measurements.optimised[f"{table}/{name}"].median / OPERATIONS[table] * 1e9
 
 
@@ -75,13 +75,13 @@ def fastest(measurements: Measurements, table: str, row: str) -> str:
 
 
 def best(measurements: Measurements, table: str, row: str) -> str:
-    """The time of the fastest implementation of a table's row, how far the runs spread, and who made it."""
+    """The time of the fastest implementation of a table's row, its spread over the runs, and its name."""
     name = fastest(measurements, table, row)
     return _in_words(measurements.optimised[f"{table}/{name}"], table, name)
 
 
 def ratio_of_best(measurements: Measurements, table: str, row: str, other: str) -> float:
-    """The time of one row to that of another, each by its fastest implementation."""
+    """The time of one row relative to another, each by its fastest implementation."""
     of_row, of_other = (
         nanoseconds(measurements, table, fastest(measurements, table, each)) for each in (row, other)
     )
@@ -96,8 +96,8 @@ def _in_words(timing: Timing, table: str, name: str) -> str:
 
 
 def facts(measurements: Measurements, table: str) -> tuple[Fact, ...]:
-    """The order of a table's rows, unoptimised as the report had them and optimised by the fastest of each;
-    of Table 3.9 also what section 3.5.3 says of ScLERP."""
+    """Returns facts about the order of a table's rows: unoptimised as in the report, and optimised with the
+    fastest of each; for Table 3.9 also about what section 3.5.3 says of ScLERP."""
     rows = TIMED[table][1]
     as_reported = {row: names[0] for row, names in rows.items()}
     fastest_of_each = {row: fastest(measurements, table, row) for row in rows}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One HTML page that needs nothing beside itself, and the same as JSON."""
+"""Writes one HTML page that needs no other file, and the same as JSON."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ dt { font-weight: 600; margin-top: .8em; } dd { margin-left: 0; }
 
 
 def write(page: Page, folder: Path) -> tuple[Path, Path]:
-    """report.html and report.json in `folder`. Raises SinewError where they can not be written."""
+    """Writes report.html and report.json to `folder`. Raises SinewError where they cannot be written."""
     paths = folder / "report.html", folder / "report.json"
     for path, text in zip(paths, (to_html(page), to_json(page)), strict=True):
         write_text(path, text)
@@ -45,7 +45,7 @@ def write(page: Page, folder: Path) -> tuple[Path, Path]:
 
 
 def to_json(page: Page) -> str:
-    """All that the page says; of pictures the captions."""
+    """Returns everything on the page; for pictures only the captions."""
 
     def plain(part: Table | Figure) -> dict[str, object]:
         fields = asdict(part)
@@ -100,7 +100,7 @@ def to_html(page: Page) -> str:
 
 
 def headline(page: Page) -> str:
-    """What agrees, and what is not there to agree."""
+    """Returns a sentence about what agrees, and what is missing."""
     agree, of = agreement(page)
     missing = sum(table.missing is not None for table in page.tables)
     missing += sum(figure.missing is not None for figure in page.figures)
@@ -112,7 +112,7 @@ def headline(page: Page) -> str:
 
 
 def agreement(page: Page) -> tuple[int, int]:
-    """How many rows and statements agree, and of how many that have something to agree with."""
+    """Returns how many rows and statements agree, and how many have something to compare with."""
     verdicts = [row.agrees for table in page.tables for row in table.rows if row.agrees is not None]
     facts = [table.facts for table in page.tables] + [figure.facts for figure in page.figures]
     verdicts += [fact.agrees for of_part in facts for fact in of_part]

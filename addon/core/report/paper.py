@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The best five results as a short page with plots, made of what report.json has: no number is typed here."""
+"""The five best results as a short page with plots, made from report.json: no number is typed here."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ _SHORT = {
     "qv": "pairs",
     "dq": "dual quaternions",
 }
-# What the page is made of, beside `studies`.
+# The parts that the page needs, besides `studies`.
 _TABLES, _FIGURES = (*TIMES, "3.7", "3.9"), ("3.4", "3.10", "3.11")
 
 Content = Mapping[str, Any]
 
 
 def digest(report: Content) -> dict[str, Any]:
-    """What of report.json the page needs: facts, the rows of Table 3.7, studies, and what it was made with.
+    """Returns what the page needs from report.json: facts, the rows of Table 3.7, studies, and how it was
+    made.
 
-    Raises SinewError where something of it was not measured or drawn.
+    Raises SinewError where any of it was not measured or drawn.
     """
     if report.get("quick"):
         raise SinewError("its times are of quick mode and say nothing: make it without --quick")
@@ -53,7 +54,7 @@ def digest(report: Content) -> dict[str, Any]:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """digest() of a report.json. Raises SinewError that names the file."""
+    """Returns digest() of a report.json. Raises SinewError that names the file."""
     try:
         return digest(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError) as error:
@@ -63,7 +64,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def write(content: Content, folder: Path) -> list[Path]:
-    """results.md, its plots and results.json, of which they are made, in `folder`."""
+    """Writes results.md, its plots and results.json, from which they are made, to `folder`."""
     files = {"results.md": page(content), **plots(content)}
     files["results.json"] = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
     for name, text in files.items():
@@ -75,7 +76,7 @@ def write(content: Content, folder: Path) -> list[Path]:
 
 
 def _values(content: Content, part: str, number: str) -> dict[str, float]:
-    """Of all facts of a table or figure."""
+    """Returns the values of all facts of a table or figure."""
     found: dict[str, float] = {}
     for fact in content[part][number]["facts"]:
         found |= fact["values"]
@@ -83,7 +84,7 @@ def _values(content: Content, part: str, number: str) -> dict[str, float]:
 
 
 def _orders(content: Content, number: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The facts of a table's order: unoptimised, and optimised by the fastest of each."""
+    """Returns the facts about a table's order: unoptimised, and optimised with the fastest of each."""
     first, second = content["tables"][number]["facts"][:2]
     return first, second
 
@@ -104,7 +105,7 @@ def _listed(words: list[str]) -> str:
 
 
 def page(content: Content) -> str:
-    """results.md."""
+    """Returns results.md."""
     machine = content["machine"]
     return (
         "\n\n".join(
@@ -299,7 +300,7 @@ def _axes_section(content: Content) -> str:
 
 
 def plots(content: Content) -> dict[str, str]:
-    """SVG text by name of file, on white: a dark page would leave nothing of the text.
+    """Returns SVG text by file name, on white, as the text would be invisible on a dark page.
 
     Raises SinewError without matplotlib.
     """
@@ -328,7 +329,7 @@ def _plot_times(content: Content) -> str:
                 for place, (row, value) in enumerate(fact["values"].items()):
                     axes.bar(group * 4 + place, value, color=_COLOUR[_OF_SKINNING.get(row, row)], width=0.9)
             axes.set_yscale("log")
-            # One scale for all, so that bars can be compared.
+            # The same scale for all, so that bars can be compared.
             axes.set_ylim(1.0, 10.0 ** math.ceil(math.log10(most)))
             axes.set_xticks([1, 5], ["not optimised", "optimised"])
             axes.set_title(TIMES[number].replace(" and ", ",\n"), fontsize="medium")
@@ -352,7 +353,7 @@ _SETTINGS = {"axes.spines.top": False, "axes.spines.right": False}
 def _plot_lengths(
     title: str, unit: str, of: dict[int, dict[str, dict[str, float]]], names: Mapping[str, str]
 ) -> str:
-    """Root mean squares with what 5 and 95 of 100 chains are below."""
+    """Plots root mean squares with the 5th and 95th percentiles."""
     lengths = sorted(of)
     with new_figure(title, (5.2, 2.8), _SETTINGS) as figure:
         axes = figure.add_subplot()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures 3.4 and 3.5: where every interpolation takes a point between two transforms."""
+"""Figures 3.4 and 3.5: the path of a point between two transforms under every interpolation."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ STEPS = 400
 
 @dataclass(frozen=True)
 class Path:
-    """One method from the first end to the second.
+    """One method's path from the first end to the second.
 
-    moved  [steps + 1, 3] of the point
-    other  [steps + 1, 3] of the other of the two points
-    rotated [steps + 1] degrees from the first end; NaN where the transform is not rigid
+    moved    [steps + 1, 3], positions of the point
+    other    [steps + 1, 3], positions of the other of the two points
+    rotated  [steps + 1], degrees from the first end; NaN where the transform is not rigid
     """
 
     moved: np.ndarray
@@ -50,7 +50,7 @@ def layout(method: str) -> ModuleType:
 
 
 def ends() -> np.ndarray:
-    """The two transforms as quaternion-vector pairs, [2, 7], with unit axes."""
+    """Returns the two transforms as quaternion-vector pairs, [2, 7], with unit axes."""
     pairs = []
     for angle, axis, shift in printed.ENDS:
         one = sinew.quat_vec.from_axis_angle(np.array(axis, float), np.radians(angle))
@@ -65,7 +65,8 @@ def in_layout(module: ModuleType, pairs: np.ndarray) -> np.ndarray:
 
 
 def paths(point: np.ndarray, steps: int = STEPS) -> dict[str, Path]:
-    """By method, for `point` [3]; `other` is that of the other end of (0, 0, 0) to (1, 1, 1)."""
+    """Returns paths by method, for `point` [3]; `other` is the path of the other end of (0, 0, 0) to (1, 1,
+    1)."""
     t = np.linspace(0.0, 1.0, steps + 1)
     other = CORNER if not point.any() else ORIGIN
     result: dict[str, Path] = {}
@@ -123,7 +124,8 @@ _PATH_CAPTION = "x and y of the point. Dots: t = 0, 0.1, ... 1."
 
 
 def _lengths(all_paths: dict[str, Path]) -> dict[str, np.ndarray]:
-    """[steps + 1] by method: the distance of the two points, sqrt(3) under a rigid transform, over that."""
+    """[steps + 1] by method: the distance of the two points, divided by sqrt(3), its value under a rigid
+    transform."""
     return {
         method: np.linalg.norm(path.moved - path.other, axis=1) / np.sqrt(3.0)
         for method, path in all_paths.items()
@@ -131,7 +133,7 @@ def _lengths(all_paths: dict[str, Path]) -> dict[str, np.ndarray]:
 
 
 def bends(all_paths: dict[str, Path]) -> dict[str, float]:
-    """By method: how far the path leaves the straight line between its ends."""
+    """Returns, by method, how far the path deviates from the straight line between its ends."""
     result = {}
     for method, path in all_paths.items():
         along = path.moved[-1] - path.moved[0]
@@ -193,7 +195,7 @@ def _shrinking(all_paths: dict[str, Path]) -> Fact:
 
 
 def _spline_note() -> str:
-    """Two keys make no curve: what the splines of Sinew give for these ends."""
+    """Two keys make no curve: returns what Sinew's splines give for these ends."""
     t = np.linspace(0.0, 1.0, 41)
     keys = sinew.quat_vec.to_dual_quat(ends())
     spline = sinew.spline.catmull_rom(keys, np.array([0.0, 1.0]), t, "dlb").transforms
@@ -208,7 +210,7 @@ def _spline_note() -> str:
 
 # --- Plots
 
-# Colour, width and dashes. Wide below and narrow above, so that paths that fall together are all seen.
+# Colour, width and dashes. Lower lines are wider, so that coinciding paths are all visible.
 _STYLES = {
     "matrix_linear": ("#d8b365", 8.0, "-"),
     "matrix_polar": ("#8c510a", 5.5, "-"),
@@ -240,7 +242,7 @@ def _plot_paths(all_paths: dict[str, Path], name: str) -> str:
 
 
 def _plot_over_t(values: dict[str, np.ndarray], label: str, name: str) -> str:
-    """values  [steps + 1] by method; a method of NaN is left out"""
+    """values: [steps + 1] by method; methods with NaN are left out."""
     with new_figure(f"{name} t", (6.4, 4.4)) as figure:
         axes = figure.add_subplot()
         for order, (method, (colour, width, dash)) in enumerate(_STYLES.items()):

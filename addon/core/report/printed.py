@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is printed in Smith 2013, chapter 3; the rows in the order matrices, pairs, dual quaternions."""
+"""The numbers printed in Smith 2013, chapter 3; rows in the order matrices, pairs, dual quaternions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ INTERPOLATION_SECONDS = {
 }
 SKINNING_SECONDS = {"lbs": 4.51, "qv": 1.47, "dq": 2.18}
 
-# Table 3.6: the point (0, 0, 0) after a turn about (0, 1, 1) by 80 degrees and a translation by (1, 0, 0.5).
+# Table 3.6: the point (0, 0, 0) after a rotation about (0, 1, 1) by 80 degrees and a translation by (1, 0,
+# 0.5).
 TRANSLATION = (80, (0, 1, 1), (1, 0, 0.5))
 TRANSLATED = {
     "affine": (1.0, 0.0, 0.5),
@@ -36,7 +37,8 @@ TRANSLATED = {
     "dual_quat": (1.00000012, -0.00000003, 0.5),
 }
 
-# Table 3.7: angle in degrees, axis and translation of transforms A to D, and where (0, 0, 0) is after each.
+# Table 3.7: angle in degrees, axis and translation of transforms A to D, and the position of (0, 0, 0) after
+# each.
 CHAIN = {
     "A": (70, (-0.089, 0.445, -0.89), (2, 2, 2)),
     "B": (70, (-0.667, -0.333, -0.667), (0, -2, -0.5)),
@@ -64,7 +66,7 @@ ONE_BY_ONE = {
     ),
 }
 
-# Table 3.8: the same by one transform.
+# Table 3.8: the same with one combined transform.
 COMBINED = {
     "affine": (10.8386087, -1.9554017, -4.0957837),
     "quat_vec": (10.8388386, -1.9558198, -4.0957308),
@@ -75,5 +77,5 @@ COMBINED = {
 ENDS = ((30, (0, 1, 0), (2, 0.5, 1)), (170, (0.707, -0.707, 0), (10, -1, -4)))
 
 # Section 3.5.2, after Kavan et al. 2006: ScLERP and DLB differ by at most this angle, in degrees, and this
-# part of the translation.
+# share of the translation.
 DLB_BOUND = (8.15, 0.15)

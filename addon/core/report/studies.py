@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the report concludes from one chain, over many random ones."""
+"""Repeats what the report concludes from one chain with many random ones."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .tables import LAYOUTS
 
 CHAINS = 2000
 LENGTHS = (4, 16, 64, 256)
-# By representation: what solves for a change of coordinates in it.
+# By representation: the method that solves for a change of coordinates.
 SOLVERS: dict[str, sinew.fit.Method] = {"affine": "kabsch", "quat_vec": "horn", "dual_quat": "walker"}
-# Where nlerp and slerp are farthest apart, and near it; from half way on it is the same mirrored.
+# Where nlerp and slerp differ most, and near it; the second half of the interval is symmetric.
 TIMES = (0.1, 0.2, 0.3)
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Of one number for each chain: root mean square, and what 5 and 95 of 100 chains are below."""
+    """The distribution of a number over all chains: root mean square, and 5th and 95th percentile."""
 
     rms: float
     low: float
@@ -40,7 +40,7 @@ def _random_axes(random: np.random.Generator, shape: tuple[int, int]) -> np.ndar
 
 
 def _links(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """float64 [chains, length, 7]: pairs that go on by 1 after they rotate."""
+    """float64 [chains, length, 7]: pairs that rotate, then move on by 1."""
     pairs = sinew.quat_vec.from_axis_angle(axes, angles)
     pairs[..., 4] = 1.0
     return pairs
@@ -48,8 +48,8 @@ def _links(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
 
 @cache
 def accuracy(length: int, chains: int = CHAINS) -> dict[str, Spread]:
-    """By representation: how far the end of a chain, combined in float32, is from where float64 has it, as a
-    part of the chain's length."""
+    """By representation: how far the end of a chain, combined in float32, is from the float64 result, as a
+    share of the chain's length."""
     random, shape = np.random.default_rng(length), (chains, length)
     pairs = _links(_random_axes(random, shape), random.uniform(-np.pi, np.pi, shape))
     exact = _end(sinew.quat_vec, pairs)
@@ -64,7 +64,7 @@ def accuracy(length: int, chains: int = CHAINS) -> dict[str, Spread]:
 
 
 def _end(module: Any, links: np.ndarray) -> np.ndarray:
-    """[chains, 3]: where the origin of the last link is."""
+    """[chains, 3]: the position of the last link's origin."""
     whole = links[:, 0]
     for link in range(1, links.shape[1]):
         whole = module.compose(whole, links[:, link])
@@ -73,8 +73,8 @@ def _end(module: Any, links: np.ndarray) -> np.ndarray:
 
 @cache
 def fits(sets: int = CHAINS) -> dict[str, Spread]:
-    """By representation: the degrees between the true rotation of 12 points and the one that is fitted in
-    float32 to them and to where they go, which is off by a hundredth of their size."""
+    """By representation: the degrees between the true rotation of 12 points and the one fitted in float32 to
+    them and their targets, which have errors of a hundredth of their size."""
     random = np.random.default_rng(sets)
     source = random.normal(size=(sets, 12, 3))
     true = sinew.affine.from_axis_angle(random.normal(size=(sets, 3)), random.uniform(-np.pi, np.pi, sets))
@@ -91,8 +91,8 @@ def fits(sets: int = CHAINS) -> dict[str, Spread]:
 
 @cache
 def drift(length: int, chains: int = CHAINS, most: float = np.pi / 4) -> Spread:
-    """How far apart DLB and ScLERP have the tip of a chain, at most over TIMES, as a part of its length. Each
-    joint rotates about an axis of its own from one angle to another, both up to `most` radians."""
+    """The largest distance over TIMES between the tips of a chain under DLB and ScLERP, as a share of its
+    length. Each joint rotates about its own axis from one angle to another, both up to `most` radians."""
     random, shape = np.random.default_rng(length), (chains, length)
     axes = _random_axes(random, shape)
     first, second = (
@@ -109,7 +109,7 @@ def drift(length: int, chains: int = CHAINS, most: float = np.pi / 4) -> Spread:
 
 
 def numbers() -> dict[str, dict[str, dict[str, float]]]:
-    """All of the above by "study, length" and representation or method, as report.json has them."""
+    """Returns all of the above by "study, length" and representation or method, as in report.json."""
     found: dict[str, dict[str, dict[str, float]]] = {}
     for length in LENGTHS:
         found[f"accuracy, {length}"] = {name: asdict(spread) for name, spread in accuracy(length).items()}

@@ -15,11 +15,11 @@ from .model import Fact, Row, Table
 from .orders import RATIO_TOLERANCE
 
 LAYOUTS = {"affine": sinew.affine, "quat_vec": sinew.quat_vec, "dual_quat": sinew.dual_quat}
-# The report's matrices normalise the axis, as glm::rotate does; its quaternions themselves.
+# The report's matrices normalise the axis, as glm::rotate does; its quaternions are normalised themselves.
 AS_REPORT = {"affine": "axis", "quat_vec": "quaternion", "dual_quat": "quaternion"}
 # Coordinates reach 10.8, where float32 has steps of 1e-6: ten of them.
 CHAIN_TOLERANCE = 1e-5
-# Angles that differ by so little that what is printed may be of any of them.
+# The number of neighbouring angles that are tried, any of which can have given the printed numbers.
 ANGLES = 2000
 HOW_TO_MEASURE = (
     "Not measured in this installation: it takes programs that are built against GLM and Eigen. In a "
@@ -29,7 +29,7 @@ HOW_TO_MEASURE = (
 
 
 def tables(measurements: Measurements | None) -> tuple[Table, ...]:
-    """All ten; those that need `measurements` say so where there are none."""
+    """Returns all ten tables; those that need `measurements` say so without them."""
     return (
         memory(),
         point_operations(measurements),
@@ -45,12 +45,12 @@ def tables(measurements: Measurements | None) -> tuple[Table, ...]:
 
 
 def error(got: object, expected: object) -> float:
-    """The largest difference of a component."""
+    """Returns the largest difference of a component."""
     return float(np.abs(np.asarray(got, np.float64) - np.asarray(expected, np.float64)).max())
 
 
 def memory() -> Table:
-    # The fourth row of a matrix, always (0, 0, 0, 1), is there in Python's arrays and nowhere else.
+    # The fourth row of a matrix, always (0, 0, 0, 1), exists only in Python's arrays.
     sizes = {name: module.identity().size for name, module in LAYOUTS.items()}
     sizes["affine"] = sinew.affine.identity()[:3].size
     rows = [
@@ -85,7 +85,7 @@ _OPERATION_NOTE = (
 
 
 def _operations(counts: dict[str, int]) -> tuple[int, int, int]:
-    """As the report counts; what is timed here has divisions and roots beside, these have none."""
+    """Counts as the report does. These operations have no divisions or roots, unlike those that are timed."""
     adds = counts["additions"] + counts["doublings"]
     return adds, counts["multiplications"], adds + counts["multiplications"]
 
@@ -158,7 +158,7 @@ def chain_operations(measurements: Measurements | None) -> Table:
 # --- Times
 
 _UNOPTIMISED = "ratio, not optimised"
-# Where a candidate's operations are counted.
+# The table in which a candidate's operations are counted.
 _COUNTED_IN = {"3.4": "3.3", "3.5": "3.2"}
 _COUNTED = {
     "sinew_affine": "affine",
@@ -183,11 +183,11 @@ def _time_table(
     glm: dict[str, str],
     notes: tuple[str, ...] = (),
 ) -> Table:
-    """A table of ratios to the first of `names`, plain 4x4 matrices.
+    """Returns a table of ratios to the first of `names`, plain 4x4 matrices.
 
     names    of candidates, for people
     seconds  printed, by candidate; the first is that of the report's matrices
-    glm      the candidates as the report had them, by those that `seconds` names
+    glm      the candidates as in the report, by those that `seconds` names
     """
     tolerance = (
         "Ratios to the report's matrices, 4x4 with all sixteen numbers; one agrees within "
@@ -243,7 +243,7 @@ def _time_table(
 
 
 def _times(number: str, key: str, measurements: Measurements) -> str:
-    """How many times as fast optimisation makes it."""
+    """Returns the factor by which optimisation makes it faster."""
     name = f"{number}/{key}"
     return f"{measurements.unoptimised[name].median / measurements.optimised[name].median:.0f}"
 
@@ -375,7 +375,7 @@ def skinning_times(measurements: Measurements | None) -> Table:
 def pair(
     angle: float, axis: tuple[float, ...], shift: tuple[float, ...], dtype: type, normalise: str
 ) -> np.ndarray:
-    """A quaternion-vector pair [7] built by normalising the `normalise`: "axis" or "quaternion".
+    """Returns a quaternion-vector pair [7], normalised as `normalise` says: "axis" or "quaternion".
 
     angle  degrees
     axis   as printed: rounded, and so not of unit length
@@ -389,7 +389,7 @@ def pair(
 
 
 def chain(name: str, dtype: type, normalise: str) -> np.ndarray:
-    """Transforms A to D of Table 3.7 in the representation `name`."""
+    """Returns transforms A to D of Table 3.7 in the representation `name`."""
     pairs = np.array([pair(*row, dtype, normalise) for row in printed.CHAIN.values()])
     return pairs if name == "quat_vec" else getattr(sinew.quat_vec, f"to_{name}")(pairs)
 
@@ -405,7 +405,7 @@ def moved_one_by_one(name: str, dtype: type, normalise: str) -> np.ndarray:
 
 
 def moved_combined(name: str, dtype: type, normalise: str) -> np.ndarray:
-    """[3]: the same by one transform, D C B A."""
+    """[3]: the same with one transform, D C B A."""
     module = LAYOUTS[name]
     a, b, c, d = chain(name, dtype, normalise)
     product = module.compose(d, module.compose(c, module.compose(b, a)))
@@ -428,7 +428,7 @@ def _text(numbers: np.ndarray) -> str:
 
 
 def translation_errors(name: str) -> np.ndarray:
-    """[ANGLES]: how far off the translation of Table 3.6 is in float32, over the half angles next to 40
+    """[ANGLES]: the error of the translation of Table 3.6 in float32, over the half angles next to 40
     degrees.
 
     A dual quaternion is normalised, as a chain of them is; its translation is read from 2 dual real*.
@@ -498,7 +498,7 @@ _CHAIN_COLUMNS = (
 def _chain_row(
     label: str, name: str, expected: tuple[float, ...], built: dict[tuple[str, type], np.ndarray]
 ) -> Row:
-    """built  [3] by what was normalised and element type."""
+    """built: [3] by what was normalised and element type."""
     ours = built[AS_REPORT[name], np.float64]
     unit, single = built["axis", np.float64], built[AS_REPORT[name], np.float32]
     difference = error(ours, expected)
@@ -535,12 +535,12 @@ _CHAIN_TOLERANCE_TEXT = (
 
 
 def chain_spreads() -> dict[str, float]:
-    """The largest differences between the columns of Table 3.7, of what is printed and of ours.
+    """The largest differences between the columns of Table 3.7, as printed and as computed here.
 
     as_report    ours, each built as in the report
     unit_axes    ours in float64, all with unit axes; unit_axes_float32 likewise
     quaternions  ours in float64, all with normalised quaternions
-    axis_error   how far from 1 the length of a printed axis is, at most
+    axis_error   the largest difference of a printed axis's length from 1
     """
 
     def spread(columns: dict[str, np.ndarray]) -> float:
@@ -592,7 +592,8 @@ def one_by_one() -> Table:
 
 
 def _divergence() -> tuple[Fact, ...]:
-    """What section 3.4.3 says of the chain, by the printed digits and by ours in float32 with unit axes."""
+    """Returns what section 3.4.3 says about the chain, by the printed digits and by ours in float32 with unit
+    axes."""
 
     def apart(columns: dict[str, np.ndarray]) -> list[float]:
         return [error(a, b) for a, b in zip(columns["affine"], columns["dual_quat"], strict=True)]

@@ -1,2 +1,3 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Sinew shows, as data that plays without it: shape keys, point caches and exported files."""
+"""Bakes: Sinew's deformation as data that plays without it, as shape keys, point caches, bones or exported
+files."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sinew's deformation as data that plays without Sinew: shape keys, point caches and exported files.
 
-A bake goes in steps, so that a window stays alive between them and it can be stopped anywhere: sample() reads
-the frames, place() puts the result into the stack, publish() gives files their names, discard() takes back
-what was written.
+A bake runs in steps, so that a window stays responsive and it can be stopped at any time: sample() reads the
+frames, place() puts the result into the stack, publish() gives files their names, discard() removes what was
+written.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...core.helper_bones import DEFAULT_HELPERS, HelperOptions
 from ...deform import evaluate, session
 from ...io import files
 from ...io.animation_paths import curves_of
-from . import bake_export, driven, shape_animation
+from . import bake_export, bake_state, shape_animation
 from .bake_bones import BoneBake
 from .take_off import take_off
 
@@ -29,12 +29,13 @@ SHAPE_KEYS = "shape-keys"
 
 
 def points_of(obj: bpy.types.Object) -> np.ndarray:
-    """What Sinew gives its modifier at the current frame, float32 [vertices, 3]; it stays the binding's."""
-    return driven.state_of(obj).points
+    """Returns the points that Sinew gives its modifier at the current frame, float32 [vertices, 3]; the array
+    belongs to the binding."""
+    return bake_state.state_of(obj).points
 
 
 class ShapeKeys:
-    """One shape key a frame, in the place of the mesh's own keys, which what Sinew shows has in it."""
+    """One shape key per frame. It replaces the mesh's own keys, which are part of the baked shapes."""
 
     def __init__(self, obj: bpy.types.Object, frames: Sequence[float]) -> None:
         if obj.override_library is not None:
@@ -50,13 +51,13 @@ class ShapeKeys:
         self.samples.append(points.copy())
 
     def end(self) -> None:
-        """Nothing is in files."""
+        """Does nothing, as nothing is in files."""
 
     def place(self) -> None:
         obj, shapes = self.obj, self.samples
         _take_off(obj)
         mesh = obj.data.copy()
-        # The mesh without the bake stays in the file for the way back.
+        # The mesh without the bake stays in the file, so that the artist can return to it.
         if obj.data.is_editable:
             obj.data.use_fake_user = True
         obj.data = mesh
@@ -74,7 +75,7 @@ class ShapeKeys:
 
 
 class Cache:
-    """A point cache, and a Mesh Cache modifier in the place of Sinew's that plays it."""
+    """A point cache, and a Mesh Cache modifier in place of Sinew's that plays it."""
 
     def __init__(self, obj: bpy.types.Object, frames: Sequence[float], path: Path, kind: str) -> None:
         vertices = len(points_of(obj))
@@ -105,7 +106,7 @@ class Cache:
         modifier.cache_format = self.kind.upper()
         modifier.filepath = _beside(self.file.path)
         modifier.interpolation, modifier.deform_mode, modifier.time_mode = "LINEAR", "OVERWRITE", "FRAME"
-        # Blender's own axes, which is no conversion at all.
+        # Blender's own axes, so nothing is converted.
         modifier.forward_axis, modifier.up_axis = "POS_Y", "POS_Z"
         times = shape_animation.key_times(self.frames)
         if bake.is_even(times, 1):
@@ -127,7 +128,7 @@ class Cache:
 
 
 class Bake:
-    """Several meshes at once, so that every frame is evaluated once."""
+    """A bake of several meshes at once, so that every frame is evaluated once."""
 
     def __init__(
         self,
@@ -163,7 +164,7 @@ class Bake:
         return ", ".join(one.obj.name for one in self.bakes)
 
     def sample(self) -> Generator[float, None, None]:
-        """Goes through the frames; how much is done, 0 to 1, after each."""
+        """Goes through the frames; yields the progress, 0 to 1, after each."""
         scene = bpy.context.scene
         before = scene.frame_float
         try:
@@ -184,7 +185,7 @@ class Bake:
     def place(self) -> None:
         try:
             for one in self.bakes:
-                # The place in the stack is that of Sinew at work, not left to Blender.
+                # Sinew's own position in the stack while it deforms, not the one while Blender does.
                 attach.switch(one.obj, on=True)
                 one.place()
         except BaseException:
@@ -194,7 +195,7 @@ class Bake:
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        """Each that is written, with the name that publish() gives it."""
+        """Each file that is written, with the name that publish() gives it."""
         return [pair for one in self.bakes for pair in one.files]
 
     def publish(self) -> None:
@@ -212,7 +213,7 @@ Started = Bake | BoneBake | bake_export.SceneExport | bake_export.MorphExport
 
 
 def suffix_of(kind: str) -> str:
-    """How the file ends that a bake is for."""
+    """The extension of the file that a bake is for."""
     return bake.EXPORTS.get(kind, ".blend")
 
 
@@ -224,12 +225,13 @@ def start(
     overwrite: bool,
     helpers: HelperOptions = DEFAULT_HELPERS,
 ) -> Started:
-    """A bake of skinned meshes; caches go to a folder beside `target`, exports to itself.
+    """Returns a bake of skinned meshes. Caches are written to a folder beside `target`, exports to `target`.
 
-    frames     in rising order
-    overwrite  whether files that are there already may be replaced
-    helpers    of a bake to bones
-    Raises SinewError where it can not be done.
+    frames     ascending
+    overwrite  whether existing files may be replaced
+    helpers    for a bake to bones
+
+    Raises SinewError where it is not possible.
     """
     if kind == bake.BONES:
         return BoneBake(meshes, frames, helpers)
@@ -243,7 +245,8 @@ def start(
 
 
 def _take_off(obj: bpy.types.Object) -> None:
-    """Takes Sinew off; the Armature modifiers stay, switched off, with their armatures for the way back."""
+    """Takes Sinew off; the Armature modifiers stay, switched off, with their armatures, so that the artist
+    can switch them on again."""
     run = [modifier.name for modifier in stack.armature_modifiers(obj)]
     take_off(obj)
     for name in run:
@@ -254,7 +257,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def _mute(obj: bpy.types.Object, start: str) -> bool:
-    """Whether nothing sets those paths any more: curves of a linked action do."""
+    """Mutes the curves that set those paths. Returns whether none is left: curves of a linked action stay."""
     found = [curve for curve in curves_of(obj) if curve.data_path.startswith(start)]
     for curve in found:
         if curve.id_data.library is None:
@@ -263,7 +266,7 @@ def _mute(obj: bpy.types.Object, start: str) -> bool:
 
 
 def _file_name(obj: bpy.types.Object, taken: set[str]) -> str:
-    """A name for an object's file, another one for each object."""
+    """Returns a name for an object's file, different for each object."""
     start = name = bpy.path.clean_name(obj.name)
     number = 1
     while name.lower() in taken:
@@ -274,9 +277,9 @@ def _file_name(obj: bpy.types.Object, taken: set[str]) -> str:
 
 
 def _beside(path: Path) -> str:
-    """As Blender writes a path, from the folder of the open file where it has one."""
+    """Returns a path as Blender writes it, relative to the folder of the open file if it has one."""
     try:
         return bpy.path.relpath(str(path.resolve())) if bpy.data.filepath else str(path.resolve())
     except ValueError:
-        # Another drive.
+        # On another drive.
         return str(path.resolve())

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An export in a second Blender, for the window: Blender's exporters take all frames in one call, which draws
-nothing and can not be stopped. A process can be.
+"""Exports in a second Blender, for use in a window: Blender's exporters process all frames in one call, which
+redraws nothing and cannot be stopped. A process can be stopped.
 
-It opens a copy of the open file, saved beside what is written, and does there what bake_export does here.
+The second Blender opens a copy of the open file, saved beside the output, and runs bake_export there.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Export = bake_export.SceneExport | bake_export.MorphExport
 
 
 def sample(started: Export) -> Generator[float, None, None]:
-    """In the place of started.sample(): how much is done, 0 to 1, several times a second. Closed or failing,
-    it ends the second Blender and leaves nothing behind."""
+    """Replaces started.sample(): yields the progress, 0 to 1, several times a second. If closed, or on an
+    error, it ends the second Blender and removes its files."""
     images = [image for image in bpy.data.images if image.source != "VIEWER" and image.users]
     painted = [image.name for image in images if image.is_dirty]
     if painted:
@@ -39,7 +39,7 @@ def sample(started: Export) -> Generator[float, None, None]:
                     share = (outcome or {}).get("share", share)
                     yield share
             finally:
-                # Its work is done or not wanted.
+                # It has finished, or is not wanted any more.
                 blender.end()
         if "error" in outcome:
             raise SinewError(outcome["error"])
@@ -52,7 +52,7 @@ def sample(started: Export) -> Generator[float, None, None]:
 
 
 def export(task: dict, report: Callable[..., None]) -> dict:
-    """In the second Blender: exports the objects of a task of _task(), and tells how far it is."""
+    """Runs in the second Blender: exports the objects of a task of _task(), and reports the progress."""
     report("opening it")
     files.open_file(Path(task["source"]), load_ui=True, scripts=task["scripts"])
     window = bpy.context.window
@@ -60,9 +60,9 @@ def export(task: dict, report: Callable[..., None]) -> dict:
     window.view_layer = window.scene.view_layers[task["view_layer"]]
     meshes = [bpy.data.objects[name, None] for name in task["objects"]]
     started = bake.start(meshes, task["kind"], task["frames"], Path(task["target"]), overwrite=True)
-    started.told = lambda share: report("exporting it", share=share)
+    started.report_progress = lambda share: report("exporting it", share=share)
     for share in started.sample():
-        started.told(share)
+        started.report_progress(share)
     return {}
 
 
@@ -76,14 +76,14 @@ def _task(started: Export, copy: Path) -> dict:
         "objects": [obj.name for obj in started.meshes],
         "scene": bpy.context.scene.name,
         "view_layer": bpy.context.view_layer.name,
-        # As they do here.
+        # The same as in this Blender.
         "scripts": not bpy.app.autoexec_fail,
     }
 
 
 @contextmanager
 def _copy(started: Export) -> Iterator[Path]:
-    """The open file as it is now, saved beside what is written."""
+    """Context with a copy of the open file as it is now, saved beside the output."""
     copy = started.unfinished.with_suffix(".blend")
     with started.whole_in_a_copy():
         files.save_beside(None, started.path, copy)
@@ -97,9 +97,9 @@ def _copy(started: Export) -> Iterator[Path]:
 
 
 def _link_caches(link: Path) -> None:
-    """Simulations look for their caches on disk by the name of the file."""
+    """Makes the disk caches of simulations available to the copy: they are found by the name of the file."""
     if not bpy.data.filepath:
-        # Imported, and never saved.
+        # The file was imported, and never saved.
         return
     source = Path(bpy.data.filepath)
     caches = source.with_name(f"blendcache_{source.stem}").absolute()
@@ -108,7 +108,7 @@ def _link_caches(link: Path) -> None:
     try:
         link.symlink_to(caches, target_is_directory=True)
     except OSError:
-        # Windows lets few users make links.
+        # On Windows, few users may create links.
         try:
             shutil.copytree(caches, link)
         except OSError as error:

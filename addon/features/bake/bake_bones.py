@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake to bones: helper bones beside a rig's own, and weights, which Blender's Armature modifier and every
-engine play. Helper bones have plain keys, or follow the pose by constraints of Blender's.
+"""A bake to bones: helper bones in addition to a rig's own, and weights, which Blender's Armature modifier
+and every engine can play. Helper bones have plain keys, or follow the pose by Blender's constraints.
 
-Like bake.Bake it goes in steps: sample(), place(), publish(), discard().
+Like bake.Bake it runs in steps: sample(), place(), publish(), discard().
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from ...core.stages import StageValues
 from ...deform import evaluate, session
 from ...deform.skinned_object import SkinnedObject
 from ...io import helper_bones_io
-from . import driven, shape_animation
+from . import bake_state, shape_animation
 from .take_off import take_off
 
-# Of the time that a bake takes, until the frames are read.
+# Share of the time that reading the frames takes.
 _SAMPLING = 0.2
-# Weights of envelopes, which are computed anew at each frame, are the same to this.
+# Envelopes' weights, which are computed again in each frame, may differ by this.
 _SAME_WEIGHT = 1e-3
-# Random poses that helper bones are made from, beside the frames, and others that they are tried with.
+# The number of random poses, besides the frames, for which helper bones are solved, and of those for testing.
 _POSES, _UNSEEN_POSES = 64, 32
 
-# What the shape of a mesh at a frame is made of: its rest points, its pose, the values of its stages.
+# The inputs of a mesh's shape at a frame: its rest points, its pose, the values of its stages.
 Shape = tuple[np.ndarray, SkinStageFrame, StageValues]
 
 
 class BoneBake:
-    """The meshes of each armature share its helper bones.
+    """A bake in which the meshes of each armature share helper bones.
 
-    reports  after sample(), of each armature
+    reports  of each armature, after sample()
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class BoneBake:
         try:
             rigs: dict[bpy.types.Object, list[bpy.types.Object]] = {}
             for obj in meshes:
-                _check_bones(obj, driven.posed_state_of(obj))
+                _check_bones(obj, bake_state.posed_state_of(obj))
                 rigs.setdefault(_rig_of(obj), []).append(obj)
         finally:
             evaluate.set_frame(scene, before)
@@ -69,11 +69,11 @@ class BoneBake:
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        """None."""
+        """No files."""
         return []
 
     def sample(self) -> Generator[float, None, None]:
-        """Goes through the frames, and solves; how much is done, 0 to 1."""
+        """Goes through the frames, and solves; yields the progress, 0 to 1."""
         scene = bpy.context.scene
         before = scene.frame_float
         try:
@@ -95,7 +95,7 @@ class BoneBake:
         session.forget()
 
     def publish(self) -> None:
-        """Nothing is in files."""
+        """Does nothing, as nothing is in files."""
 
     def discard(self) -> None:
         self._rigs.clear()
@@ -110,13 +110,13 @@ class _Rig:
         self._rest: list[np.ndarray] = []
         self._poses: list[np.ndarray] = []
         self._influences: list[Influences] = []
-        # Of each mesh, by which it is deformed in other poses; and of each frame, those of all meshes.
+        # For each mesh, the stack that deforms it in other poses; for each frame, the shapes of all meshes.
         self._stacks: list[SkinStack] = []
         self._shapes: list[list[Shape]] = []
 
     def take(self) -> None:
-        """The frame as it is evaluated."""
-        states = [driven.posed_state_of(obj) for obj in self.meshes]
+        """Records the evaluated frame."""
+        states = [bake_state.posed_state_of(obj) for obj in self.meshes]
         frames = [state.shown.frames[0] for state in states]
         bindings = [state.bound.binding for state in states]
         targets, rest = [], []
@@ -140,7 +140,7 @@ class _Rig:
             )
         if len(together) != len(self._targets[0]):
             raise SinewError(f"{self.rig.name}: the number of vertices changes; bake to alembic or usd")
-        # Where nothing but the armature moves them, one array stands for all.
+        # While only the armature moves the meshes, all frames share one array.
         is_same = bool(self._rest) and np.array_equal(together, self._rest[-1])
         self._rest.append(self._rest[-1] if is_same else together)
         points = [
@@ -151,7 +151,7 @@ class _Rig:
         self._shapes.append(list(zip(points, frames, values, strict=True)))
 
     def _check_same(self, influences: list[Influences]) -> None:
-        """Raises SinewError where others move vertices than at the first frame."""
+        """Raises SinewError where other bones move the vertices than at the first frame."""
         for obj, own, first in zip(self.meshes, influences, self._influences, strict=True):
             if own is not first and own.distance_from(first) > _SAME_WEIGHT:
                 raise SinewError(
@@ -189,7 +189,7 @@ class _Rig:
         )
 
     def _with(self, at_frames: Motion | None, count: int, seed: int) -> Motion:
-        """Random poses, behind those of the frames where these are given."""
+        """Adds random poses, after those of the frames if these are given."""
         joints = helper_bones_io.read_joints(self.rig, self._bones)
         frames, bones = len(self._poses), len(joints.parents)
         seen = np.array(self._poses)
@@ -202,8 +202,8 @@ class _Rig:
         return self._motion([*self._rest, *rest], [*self._targets, *targets], [*self._poses, *poses])
 
     def _shape_in(self, pose: np.ndarray, frame: int) -> np.ndarray:
-        """float32 [vertices, 3], armature space: what Sinew makes of all meshes in a pose, all else being as
-        at one of the frames."""
+        """float32 [vertices, 3], armature space: Sinew's shape of all meshes in a pose, with everything else
+        as at one of the frames."""
         points = []
         for skin_stack, (rest, at_frame, values) in zip(self._stacks, self._shapes[frame], strict=True):
             skin_stack.deform(rest, [replace(at_frame, pose=pose.astype(np.float32))], values=values)
@@ -214,7 +214,7 @@ class _Rig:
         solution, bones = self._solution, self._bones
         own = [bones.names[bone] for bone in solution.parents]
         follows_pose = bool(solution.blends)
-        # Only what is visible can be edited.
+        # Only visible objects can be edited.
         with nullcontext() if self.rig.visible_get() else evaluate.shown([self.rig]):
             helper_bones_io.use_copy_of_armature(self.rig)
             names = helper_bones_io.add_bones(self.rig, own, solution.heads, hanging=not follows_pose)
@@ -239,7 +239,7 @@ class _Rig:
 
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:
-    """Takes Sinew off; the Armature modifier blends linearly by vertex groups."""
+    """Takes Sinew off, and sets the Armature modifier to linear blending by vertex groups."""
     take_off(obj)
     modifier = stack.armature_modifier(obj)
     modifier.object = rig
@@ -247,14 +247,15 @@ def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None
     modifier.use_multi_modifier = modifier.invert_vertex_group = False
     modifier.use_vertex_groups, modifier.vertex_group = True, ""
     mesh = obj.data.copy()
-    # The mesh without the bake stays in the file for the way back.
+    # The mesh without the bake stays in the file, so that the artist can return to it.
     if obj.data.is_editable:
         obj.data.use_fake_user = True
     obj.data = mesh
 
 
 def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
-    """The armature object that deforms a mesh. Raises SinewError where bones can not reproduce it."""
+    """Returns the armature object that deforms a mesh. Raises SinewError where bones cannot reproduce the
+    deformation."""
     replaced = properties.of(obj).replaced_modifiers
     if len(replaced) != 1:
         raise SinewError(
@@ -276,7 +277,7 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def _check_bones(obj: bpy.types.Object, state: SkinnedObject) -> None:
-    """Raises SinewError for bendy bones: no engine has them."""
+    """Raises SinewError for bendy bones, which no engine has."""
     binding = state.bound.binding
     bendy = [name for name, n in zip(binding.bones.names, binding.bones.segments, strict=True) if n > 1]
     found = [name for name in bendy if name in binding.moving_bones]

@@ -19,14 +19,14 @@ from .bake_bones import BoneBake
 
 
 def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
-    """Opens a copy that is saved beside its target, and bakes those `meshes` that the settings mean: exports
-    to files of their own, all else to one .blend with its caches.
+    """Opens a copy that is saved beside its target, and bakes those `meshes` that the settings select:
+    exports to files of their own, everything else to one .blend with its caches.
 
-    task  as of reskin.reskin; "overwrite": whether what is there may be replaced; "ours": paths that may be
-          in any case
+    task  as for reskin.reskin; "overwrite": whether existing files may be replaced; "ours": paths that may
+          always be
 
-    "bakes": what each is, of what; "beside": where each file is, and where it is to be. Raises SinewError,
-    and leaves nothing behind, where one fails.
+    Returns "bakes": the kind and the objects of each; "beside": where each file is, and where it has to be
+    moved. Raises SinewError, and removes all files, if one fails.
     """
     source, target, settings = Path(task["source"]), Path(task["target"]), task["settings"]
     files.open_file(copy, load_ui=True)
@@ -71,7 +71,7 @@ def bake_copy(task: dict, copy: Path, meshes: set[str]) -> dict:
 
 
 def _wanted(settings: dict, meshes: set[str]) -> dict[str, list[bpy.types.Object]]:
-    """The objects of each kind of bake that there is to be."""
+    """Returns the objects for each kind of bake in the settings."""
     there = [obj for obj in bpy.data.objects if obj.name in meshes and properties.has_sinew(obj)]
     wanted = {kind: [obj for obj in there if kind in _kinds_of(obj, settings)] for kind in KINDS}
     in_scene = set(bpy.context.scene.objects)

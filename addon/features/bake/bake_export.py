@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes by Blender's own exporters: the final meshes, with UVs and materials.
 
-Like bake.Bake they go in steps: sample(), place(), publish(), discard().
+Like bake.Bake they run in steps: sample(), place(), publish(), discard().
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...core.output import remove, writing
 from ...core.spaces import transformed
 from ...deform import evaluate, session
 from ...io import files
-from . import driven, shape_animation, usd_textures
+from . import bake_state, shape_animation, usd_textures
 
 
 def _alembic(path: str, first: int, last: int) -> None:
@@ -41,7 +41,8 @@ def _alembic(path: str, first: int, last: int) -> None:
 
 
 def _usd(path: str, _first: int, _last: int) -> None:
-    # The final points: neither the armature nor the shape keys, which know nothing of Sinew.
+    # Exports the final points instead of the armature and the shape keys, which do not include Sinew's
+    # deformation.
     bpy.ops.wm.usd_export(
         filepath=path,
         check_existing=False,
@@ -59,15 +60,15 @@ def _usd(path: str, _first: int, _last: int) -> None:
 
 SCENES: dict[str, Callable[[str, int, int], None]] = {"alembic": _alembic, "usd": _usd}
 GLTF = "gltf"
-# The share of a glTF export that is done when its frames are read.
+# Reading the frames is this share of a glTF export.
 SAMPLED = 0.5
 
 
 class _Export:
-    """What ends as one file: written at `unfinished` first, then moved to `path`.
+    """An export to one file: written to `unfinished` first, then moved to `path`.
 
     meshes   that Sinew deforms
-    carried  that go along: carried_by()
+    carried  other meshes that are exported with them, from carried_by()
     """
 
     kind: str
@@ -77,13 +78,13 @@ class _Export:
     path: Path
     unfinished: Path
 
-    def told(self, share: float) -> None:
-        """Called with how much is done, 0 to 1, where sample() can not yield: within an exporter's one call.
-        Whoever wants to know puts a function here; it must not raise, as Blender goes on all the same."""
+    def report_progress(self, share: float) -> None:
+        """Called with the progress, 0 to 1, where sample() cannot yield: within an exporter's single call.
+        Callers may replace it by a function, which must not raise, as Blender ignores exceptions here."""
 
     @contextmanager
     def whole_in_a_copy(self) -> Iterator[None]:
-        """What is saved inside has all that the export takes."""
+        """A copy of the file that is saved inside this context has everything that the export needs."""
         yield
 
     @property
@@ -92,11 +93,11 @@ class _Export:
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        """Each that is written, with the name that publish() gives it."""
+        """Each file that is written, with the name that publish() gives it."""
         return [(self.unfinished, self.path)]
 
     def place(self) -> None:
-        """The open file stays as it is."""
+        """The open file is not changed."""
 
     def publish(self) -> None:
         for unfinished, path in self.files:
@@ -107,7 +108,7 @@ class _Export:
 
 
 class SceneExport(_Export):
-    """Alembic and USD. The exporter goes through the frames itself, and Sinew follows as in a render."""
+    """Alembic and USD. The exporter goes through the frames itself, and Sinew deforms as in a render."""
 
     def __init__(
         self,
@@ -133,10 +134,10 @@ class SceneExport(_Export):
         try:
             with _selected([*self.meshes, *self.carried]), self.textures.on_disk():
                 scene.frame_start, scene.frame_end = self.first, self.last
-                with _told_frames(self, 0.0):
+                with _reporting_frames(self, 0.0):
                     _export(lambda: SCENES[self.kind](str(self.unfinished), self.first, self.last), self)
             for obj in self.meshes:
-                driven.check_on(obj)
+                bake_state.check_on(obj)
             yield 1.0
         except BaseException:
             self.discard()
@@ -150,7 +151,7 @@ class SceneExport(_Export):
 
     @property
     def files(self) -> list[tuple[Path, Path]]:
-        # Textures have their names before the export that looks for them.
+        # Textures already have their final names, as the exported file refers to them.
         return [*((path, path) for path in self.textures.written), *super().files]
 
     def discard(self) -> None:
@@ -159,7 +160,7 @@ class SceneExport(_Export):
 
 
 class MorphExport(_Export):
-    """glTF: the final meshes of the first frame, and the others' points as morph targets."""
+    """glTF: the final meshes of the first frame, with the points of the other frames as morph targets."""
 
     def __init__(self, meshes: list[bpy.types.Object], frames: Sequence[float], path: Path) -> None:
         core.check_frames(GLTF, frames)
@@ -177,7 +178,7 @@ class MorphExport(_Export):
             for number, frame in enumerate(self.frames):
                 evaluate.set_frame(scene, frame)
                 for obj in self.meshes:
-                    driven.check_on(obj)
+                    bake_state.check_on(obj)
                 for obj, samples in self.samples.items():
                     points = self._in_first_space(obj)
                     if samples and len(points) != len(samples[0]):
@@ -194,7 +195,7 @@ class MorphExport(_Export):
                 first, last = scene.frame_start, scene.frame_end
                 scene.frame_start, scene.frame_end = int(self.frames[0]), int(self.frames[-1])
                 try:
-                    with _told_frames(self, SAMPLED):
+                    with _reporting_frames(self, SAMPLED):
                         _export(self._write, self)
                 finally:
                     scene.frame_start, scene.frame_end = first, last
@@ -207,7 +208,8 @@ class MorphExport(_Export):
         yield 1.0
 
     def _in_first_space(self, obj: bpy.types.Object) -> np.ndarray:
-        """The final points in the object's space of the first frame: targets are all that moves."""
+        """Returns the final points in the object's space of the first frame, as only morph targets are
+        animated."""
         points = evaluate.final_points(obj)
         world = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
         first = self.spaces.setdefault(obj, world)
@@ -225,7 +227,7 @@ class MorphExport(_Export):
         for obj in self.samples:
             evaluated = obj.evaluated_get(depsgraph)
             mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
-            # The exporter has to compute those of each shape.
+            # The exporter has to compute the normals of each shape.
             state = session.state_of(obj)
             if state is not None:
                 state.take_off_normals(mesh)
@@ -245,10 +247,10 @@ class MorphExport(_Export):
             check_existing=False,
             export_format="GLB",
             use_selection=True,
-            # Others have selections of their own.
+            # Other scenes have their own selections.
             use_active_scene=True,
             export_animations=True,
-            # All meshes in one animation, which is what players play.
+            # One animation for all meshes, as players play only one.
             export_animation_mode="ACTIVE_ACTIONS",
             export_morph=True,
             export_morph_animation=True,
@@ -267,8 +269,8 @@ class MorphExport(_Export):
 
 
 def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The visible meshes that hang on a bone of an armature that deforms one of `meshes`, by themselves or by
-    a parent: eyes, armour, props."""
+    """Returns the visible meshes that are parented, directly or not, to a bone of an armature that deforms
+    one of `meshes`: eyes, armour, props."""
     armatures = {armature for obj in meshes for armature in properties.of(obj).armatures}
 
     def hangs_on_bone(obj: bpy.types.Object) -> bool:
@@ -284,9 +286,9 @@ def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
-    """Where the export goes at first; raises SinewError where there is no room for it."""
+    """Returns the temporary path of the export; raises SinewError where the disk has no room for it."""
     for obj in export.meshes:
-        driven.check_on(obj)
+        bake_state.check_on(obj)
     vertices = sum(len(evaluate.final_points(obj)) for obj in (*export.meshes, *export.carried))
     # Points and normals.
     core.check_space(path.parent, 24 * vertices * len(export.frames))
@@ -294,7 +296,7 @@ def _prepare(export: SceneExport | MorphExport, path: Path) -> Path:
     remove(unfinished)
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Known before the frames are read, and not from an exporter's traceback.
+        # Finds errors before the frames are read, and without an exporter's traceback.
         unfinished.touch()
         unfinished.unlink()
     return unfinished
@@ -313,15 +315,15 @@ def _export(write: Callable[[], None], export: SceneExport | MorphExport) -> Non
 
 
 @contextmanager
-def _told_frames(export: SceneExport | MorphExport, start: float) -> Iterator[None]:
-    """Tells of each frame that an exporter goes to inside, from the share `start` on."""
+def _reporting_frames(export: SceneExport | MorphExport, start: float) -> Iterator[None]:
+    """Context that reports each frame that an exporter goes to, from the progress `start` on."""
     done = 0
 
     def on_frame(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
         nonlocal done
-        # At its end an exporter goes back to the frame that it came from.
+        # At its end an exporter returns to the frame where it started.
         done = min(done + 1, len(export.frames))
-        export.told(start + (1.0 - start) * done / len(export.frames))
+        export.report_progress(start + (1.0 - start) * done / len(export.frames))
 
     bpy.app.handlers.frame_change_post.append(on_frame)
     try:
@@ -332,7 +334,7 @@ def _told_frames(export: SceneExport | MorphExport, start: float) -> Iterator[No
 
 @contextmanager
 def _unstretched(scene: bpy.types.Scene) -> Iterator[None]:
-    """Without the scene's time remapping, of which glTF's exporter knows nothing."""
+    """Context without the scene's time remapping, which the glTF exporter ignores."""
     render = scene.render
     before = render.frame_map_old, render.frame_map_new
     render.frame_map_old = render.frame_map_new = 100
@@ -344,7 +346,7 @@ def _unstretched(scene: bpy.types.Scene) -> Iterator[None]:
 
 @contextmanager
 def _selected(objects: list[bpy.types.Object]) -> Iterator[None]:
-    """Selects these alone, and what was selected afterwards."""
+    """Context in which only these objects are selected; afterwards the selection is as before."""
     layer = bpy.context.view_layer
     before, active = [o for o in layer.objects if o.select_get()], layer.objects.active
     _select(objects)

@@ -53,7 +53,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         description="Where files go; // is beside this file",
         default="//",
         subtype="DIR_PATH",
-        # Without it, newer versions warn of "//"; older ones do not know it.
+        # Without it, newer versions warn about "//"; older ones do not know it.
         options={"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set(),
     )
     overwrite: bpy.props.BoolProperty(
@@ -114,13 +114,13 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
             layout.prop(self, name)
 
     def cancel(self, context: bpy.types.Context) -> None:
-        # Of the dialog there is nothing to end.
+        # The dialog itself has nothing to end.
         if self.in_steps:
             super().cancel(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "asked", False):
-            # A dialog's operator can not go on in steps itself.
+            # The operator of a dialog cannot run in steps itself.
             names = (
                 "kind",
                 "frames",
@@ -140,7 +140,7 @@ class SINEW_OT_bake(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self.started = self._start(context)
-        # In the window, where an exporter of Blender's would not let go.
+        # In a window, Blender's exporters would block.
         is_apart = self.in_steps and self.kind in EXPORTS
         yield from bake_apart.sample(self.started) if is_apart else self.started.sample()
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of bakes: an operator."""
+"""Registers bakes: an operator."""
 
 from .bake_operator import CLASSES as CLASSES
 
 
 def register() -> None:
-    """Nothing besides."""
+    """Nothing else to register."""
 
 
 def unregister() -> None:
-    """Nothing besides."""
+    """Nothing else to unregister."""

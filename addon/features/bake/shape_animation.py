@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of frames as shape keys with keyed values, and straight lines between keys."""
+"""Shapes of frames as shape keys with keyed values and linear interpolation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ...io import actions
 
 
 def add(obj: bpy.types.Object, frames: Sequence[float], shapes: Sequence[np.ndarray]) -> None:
-    """Gives an object whose mesh has none a shape key for each frame, float32 [vertices, 3], that is fully
-    on at it, and straight lines between frames.
+    """Adds a shape key, float32 [vertices, 3], for each frame to an object whose mesh has none; each is fully
+    on at its frame, with linear interpolation between frames.
 
     frames  of the scene
 
-    Relative keys with keyed values rather than absolute ones: glTF, FBX and other programs take only those.
+    Keys are relative, with keyed values, as glTF, FBX and other programs do not support absolute keys.
     """
     obj.shape_key_add(name="Basis", from_mix=False)
     ramps = bake.ramps(key_times(frames))
@@ -32,7 +32,8 @@ def add(obj: bpy.types.Object, frames: Sequence[float], shapes: Sequence[np.ndar
 
 
 def key_times(frames: Sequence[float]) -> list[float]:
-    """Where frames of the scene are for animation and caches, which its time remapping stretches."""
+    """Converts frames of the scene to times in animation and caches, which the scene's time remapping
+    stretches."""
     render = bpy.context.scene.render
     if render.frame_map_old == render.frame_map_new:
         return list(frames)
@@ -40,7 +41,7 @@ def key_times(frames: Sequence[float]) -> list[float]:
 
 
 def make_straight(owner: bpy.types.ID, path: str | None = None) -> None:
-    """Straight lines between the keys of an owner's curves, all or those of `path`."""
+    """Sets linear interpolation between the keys of an owner's curves, all or those of `path`."""
     animation = owner.animation_data
     for curve in actions.all_curves(animation.action, actions.slot_of(animation)):
         if path is None or curve.data_path == path:

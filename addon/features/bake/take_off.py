@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew off an object that has its shape in a bake from now on."""
+"""Takes Sinew off an object whose shape is in a bake from now on."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from ...attach import attach, corrective_smooth, properties
 
 
 def take_off(obj: bpy.types.Object) -> None:
-    """The Armature modifiers stay, as they were; what is in the bake is not done to it once more."""
-    # A parent that deforms would do so on top of the bake.
+    """Takes Sinew off; the Armature modifiers stay as they were, and anything that the bake already includes
+    is switched off."""
+    # A deforming parent would deform the baked shape again.
     properties.of(obj).parent_type = ""
     smooth = corrective_smooth.replaced_modifier(obj)
     attach.take_off(obj)

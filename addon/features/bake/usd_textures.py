@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Textures of an export to USD.
 
-Blender's exporter copies them into one folder `textures`, where those of several exports meet by their names
-and the first of a name stays. So what is on disk is named where it is, and what is only in the .blend goes
-into a folder of the export's own.
+Blender's exporter copies them into one folder `textures`, where textures of several exports can have the same
+name, and the first one stays. So files on disk are referred to where they are, and images that are only in
+the .blend go into a separate folder for the export.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LEFT_WHERE_THEY_ARE = (
 class Textures:
     """The textures of `objects` that are only in the open file, for an export to `path`.
 
-    written  their files, from on_disk() on
+    written  their files, after on_disk() has started
     """
 
     def __init__(self, objects: Sequence[bpy.types.Object], path: Path, overwrite: bool) -> None:
@@ -35,8 +35,8 @@ class Textures:
 
     @contextmanager
     def on_disk(self) -> Iterator[None]:
-        """Has materials use files meanwhile, as the exporter takes only those. Raises SinewError where one
-        can not be written."""
+        """Context in which materials use files, as the exporter takes only those. Raises SinewError where one
+        cannot be written."""
         replaced_modifiers: list[tuple[bpy.types.Image, bpy.types.Image]] = []
         try:
             for image in _only_in_file(self._objects):
@@ -87,8 +87,8 @@ def _save(image: bpy.types.Image, path: Path) -> None:
 
 
 def _only_in_file(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Image]:
-    """The images of the objects' materials that are packed or made by Blender; those of many files, as tiles
-    are, are not looked at."""
+    """Returns the images of the objects' materials that are packed or made by Blender. Images of several
+    files, such as tiles, are ignored."""
     materials = {slot.material for obj in objects for slot in obj.material_slots if slot.material}
     seen: set[bpy.types.NodeTree] = set()
     images: dict[bpy.types.Image, None] = {}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions of one armature blended into a new one."""
+"""Blends actions of one armature into a new one."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions of an armature read, blended, and written as a new action, in steps."""
+"""Reads actions of an armature, blends them, and writes a new action, in steps."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from ...io import actions, clips
 
 Result = TypeVar("Result")
 
-# Of the whole: reading curves takes as long as writing keys.
+# Share of the progress: reading curves takes as long as writing keys.
 READING = 0.5
 
 
 @dataclass(frozen=True)
 class Made:
-    """The new action, which nothing plays yet, what it was made of, and the vertical in armature space."""
+    """The new action, which nothing plays yet, what it was made from, and the vertical in armature space."""
 
     action: bpy.types.Action
     sources: list[Clip]
@@ -40,7 +40,7 @@ class Made:
         return self.blend.clip(self.action.name)
 
     def notes(self) -> list[str]:
-        """What a user should know of it, each a sentence."""
+        """What a user should know about it, each a sentence."""
         found, blend = [], self.blend
         unsure = [blend.rig.names[bone] for bone in blend.undefined.any(axis=0).nonzero()[0]]
         if unsure:
@@ -68,8 +68,8 @@ def make(
     settings: core.Settings,
     name: str = "",
 ) -> Generator[float, None, Made]:
-    """Yields the share that is done. The new action begins at the scene's first frame; closed before its
-    end, nothing has changed. Raises SinewError for what can not be blended."""
+    """Yields the progress. The new action begins at the scene's first frame; if closed before the end,
+    nothing has changed. Raises SinewError for what cannot be blended."""
     if not armature.is_editable:
         raise SinewError(f"{armature.name} is linked: make a library override of it first")
     if len(chosen) < 2:
@@ -89,14 +89,14 @@ def make(
 
 
 def play(armature: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Has the armature play the new action; the one before stays in the file."""
+    """Has the armature play the new action; the previous one stays in the file."""
     actions.play(armature, action, actions.slot_for(action, armature))
 
 
 def _part(
     steps: Generator[float, None, Result], start: float, share: float
 ) -> Generator[float, None, Result]:
-    """A generator as a part of another: what it yields, in the place of the whole; what it returns."""
+    """Runs a generator as part of another: scales the progress that it yields, and returns its result."""
     while True:
         try:
             done = next(steps)

@@ -19,7 +19,7 @@ from . import blend_actions, blend_settings
 
 
 def armature_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature whose actions are blended: the active one, or that of the active mesh."""
+    """The armature whose actions are blended: the active one, or the one of the active mesh."""
     return next(iter(operators.armatures(context)), None)
 
 
@@ -119,7 +119,7 @@ class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         armature = armature_of(context)
-        # By name: undo, or another file, would leave pointers to nothing.
+        # By name: after undo, or loading another file, pointers would be invalid.
         self._armature = armature.name
         chosen, blend = _chosen(armature), armature.sinew_blend
         self._made = yield from blend_actions.make(
@@ -141,7 +141,7 @@ class SINEW_OT_blend_actions(_OfArmature, stepped.Stepped, bpy.types.Operator):
 
 
 def _chosen(armature: bpy.types.Object) -> list[blend_settings.SinewBlendClip]:
-    """The clips of its blend that have an action."""
+    """Returns the clips of its blend that have an action."""
     blend = blend_settings.of(armature)
     return [clip for clip in blend.clips if clip.action is not None] if blend is not None else []
 

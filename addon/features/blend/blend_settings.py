@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an armature object has chosen for a blend of its actions, in the .blend file."""
+"""The settings of an armature object for a blend of its actions, in the .blend file."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class SinewBlend(bpy.types.PropertyGroup):
     )
 
     def weights(self, clips: Sequence[SinewBlendClip]) -> Weights:
-        """Of some of its clips. Raises SinewError for those that can not be."""
+        """Returns the weights of some of its clips. Raises SinewError for invalid ones."""
         last = [clip.weight for clip in clips]
         if not self.changes:
             return Weights.of(last, len(last))
@@ -153,13 +153,13 @@ class SinewBlend(bpy.types.PropertyGroup):
 
 
 def of(armature: bpy.types.Object) -> SinewBlend | None:
-    """The blend of an armature object; None where nothing was ever added: to look at it would already store
-    an empty one in the file."""
+    """Returns the blend of an armature object; None where nothing was ever added, as reading it would already
+    store an empty one in the file."""
     return armature.sinew_blend if armature.is_property_set("sinew_blend") else None
 
 
 def remove_clip(armature: bpy.types.Object, index: int) -> None:
-    """With the last action all of the blend is gone from the file."""
+    """Removes a clip. With the last one, the whole blend is removed from the file."""
     armature.sinew_blend.clips.remove(index)
     if not armature.sinew_blend.clips:
         armature.property_unset("sinew_blend")

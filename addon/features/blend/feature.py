@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of blends of actions: classes, and the settings of an armature object."""
+"""Registers blends of actions: classes, and the settings of an armature object."""
 
 from __future__ import annotations
 

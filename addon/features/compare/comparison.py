@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live copies of a character beside it, one for each method; all of it taken away again.
+"""Live copies of a character beside it, one for each method, which can be removed completely.
 
-A copy shares the original's mesh, follows its transform and has its modifiers. It is shown elsewhere by a
-modifier behind all others. What a copy needs is in objects and actions of its own, so that nothing of the
-original changes.
+A copy shares the original's mesh, follows its transform and has its modifiers. A modifier behind all others
+displays it at another position. Everything a copy needs is in separate objects and actions, so that nothing
+of the original changes.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ...deform import evaluate, session
 from ...io import actions
 from . import comparison_state, offset_nodes
 
-# Of a colour-blind-safe set (Okabe and Ito, 2008), in the order of the methods.
+# From a colour-blind-safe set (Okabe and Ito, 2008), in the order of the methods.
 COLOURS = (
     (0.90, 0.60, 0.00),
     (0.34, 0.71, 0.91),
@@ -42,7 +42,7 @@ COLOURS = (
     (0.80, 0.47, 0.65),
     (0.00, 0.45, 0.70),
 )
-# A copy would run them a second time, with caches of its own, or push other simulations about.
+# In a copy these would run a second time, with separate caches, or affect other simulations.
 LEFT_OUT = upstream_proxy.SIMULATIONS | {"COLLISION", "SURFACE"}
 ACTION_MARK = "sinew_comparison"
 
@@ -50,20 +50,20 @@ ACTION_MARK = "sinew_comparison"
 def start(
     context: bpy.types.Context, meshes: Sequence[bpy.types.Object], methods: Sequence[str], right: np.ndarray
 ) -> list[str]:
-    """Compares what is to be seen of a character under `methods` of evaluate.method_names(), in the context's
-    scene and instead of what is compared now; a sentence for each mesh that can not be, and for each method
-    that fails on one.
+    """Compares the visible parts of a character under `methods` of evaluate.method_names(), in the context's
+    scene and in place of the current comparison. Returns a sentence for each mesh that cannot be compared,
+    and for each method that fails on one.
 
-    right  [3], the direction of the screen's right in the world; the copies stand along the nearest axis
+    right  [3], the direction of the screen's right in the world; the copies are placed along the nearest axis
 
-    Raises SinewError, with no comparison on, where no mesh can be compared.
+    Raises SinewError, and leaves no comparison, where no mesh can be compared.
     """
     scene = context.scene
     before = comparison_state.of_scene(scene)
     arrangement = before.arrangement if before is not None else comparison_state.SIDE_BY_SIDE
     end(context)
     taken, problems = _comparable(meshes)
-    # Before there are copies: what the scene shows now needs no other evaluation.
+    # Before copies are made: the scene as it is now is already evaluated.
     axis = side_by_side.row_axis(right)
     depsgraph = context.evaluated_depsgraph_get()
     points = np.concatenate([corners(obj.evaluated_get(depsgraph)) for obj in taken])
@@ -89,13 +89,14 @@ def start(
 
 
 def _other_than(first: str, methods: Sequence[str]) -> str:
-    """What to flip to: the last of Sinew's own methods, if that is another."""
+    """Returns the method to flip to: the last of Sinew's own methods, if that is another one."""
     others = [method for method in methods if method != first]
     return next((m for m in reversed(others) if m != evaluate.BLENDER), others[-1] if others else first)
 
 
 def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Object], list[str]]:
-    """Those that can be copied, and a sentence for each of the others; SinewError where none can."""
+    """Returns the meshes that can be copied, and a sentence for each of the others; raises SinewError where
+    none can."""
     taken, problems = [], []
     for obj in meshes:
         try:
@@ -118,13 +119,13 @@ def is_on() -> bool:
 
 
 def originals(state: comparison_state.SinewComparison) -> list[bpy.types.Object]:
-    """What is compared; without what the artist deleted meanwhile."""
+    """Returns the compared objects, without those that the artist has deleted."""
     found = {properties.of(copy).copied: None for copy in comparison_state.copies_of(state)}
     return [obj for obj in found if obj is not None and obj.users_collection]
 
 
 def end(context: bpy.types.Context) -> None:
-    """Takes away all that any comparison made in the open file, whatever became of it since."""
+    """Removes everything that any comparison made in the open file, even if it was changed since."""
     copies = [obj for obj in bpy.data.objects if properties.is_copy(obj) and obj.library is None]
     if not is_on() and not copies:
         return
@@ -138,7 +139,7 @@ def end(context: bpy.types.Context) -> None:
     _remove_copies(copies)
     for scene, collection in collections:
         _remove_collection(scene, collection)
-    # What the artist deleted was kept in the file by its copies alone.
+    # An object that the artist deleted was kept in the file only by its copies.
     for obj in compared:
         if obj.users == 0:
             bpy.data.objects.remove(obj)
@@ -154,7 +155,7 @@ def _remove_copies(copies: list[bpy.types.Object]) -> None:
 
 
 def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """What the artist put into it stays in the scene."""
+    """Removes the collection. What the artist put into it stays in the scene."""
     for obj in collection.objects:
         if len(obj.users_collection) == 1:
             scene.collection.objects.link(obj)
@@ -165,7 +166,7 @@ def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection)
 
 
 def _remove_left_over() -> None:
-    """What belonged to copies that were deleted by hand."""
+    """Removes what belonged to copies that were deleted by hand."""
     for action in [action for action in bpy.data.actions if action.get(ACTION_MARK)]:
         bpy.data.actions.remove(action)
     offset_nodes.remove_unused()
@@ -173,13 +174,13 @@ def _remove_left_over() -> None:
 
 
 def corners(evaluated: bpy.types.Object) -> np.ndarray:
-    """float64 [8, 3]: of the box around an evaluated object, in the world."""
+    """float64 [8, 3]: the corners of an evaluated object's bounding box, in world space."""
     matrix = np.array(evaluated.matrix_world)
     return transformed(np.array([tuple(corner) for corner in evaluated.bound_box]), matrix)
 
 
 def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
-    """A copy that `method` deforms where an armature does, in no collection yet."""
+    """Returns a copy, deformed by `method` if an armature deforms it, in no collection yet."""
     copy = obj.copy()
     if copy.override_library is not None:
         copy.make_local(clear_liboverride=True)
@@ -190,7 +191,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     _take_sinew_off(copy)
     for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
         copy.modifiers.remove(modifier)
-    # As the original stands, whatever moves that.
+    # It follows the original, whatever moves that.
     for constraint in list(copy.constraints):
         copy.constraints.remove(constraint)
     copy.constraints.new("COPY_TRANSFORMS").target = obj
@@ -207,22 +208,22 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
             # A copy shows one method, without another mixed in.
             properties.copy_groups(original, settings, (*properties.METHOD_GROUPS, *ORDER))
             if smooth is not None:
-                # The stage does what it did.
+                # The stage replaces it.
                 copy.modifiers.remove(copy.modifiers[smooth])
     offset_nodes.add(copy)
     return copy
 
 
 def _take_sinew_off(copy: bpy.types.Object) -> None:
-    """Leaves a copy as its original was before Sinew."""
+    """Makes a copy like its original before Sinew was added."""
     if not properties.has_sinew(copy):
         return
     _use_own_actions(copy)
-    # Those that it names are the original's.
+    # The referenced objects belong to the original.
     settings = properties.of(copy)
     settings.point_buffer = settings.upstream_proxy = None
     settings.attribute = ""
-    # Blender 5.2 goes on counting them as used by a modifier that is removed.
+    # Otherwise Blender 5.2 counts them as used even after the modifier is removed.
     nodes = stack.sinew_modifier(copy)
     if nodes is not None:
         node_group.forget_helpers(nodes)
@@ -230,7 +231,8 @@ def _take_sinew_off(copy: bpy.types.Object) -> None:
 
 
 def _use_own_actions(copy: bpy.types.Object) -> None:
-    """So that keys of Sinew's settings can be taken off the copy: each copy keeps to its method."""
+    """Gives the copy its own actions, so that keys of Sinew's settings can be removed: each copy keeps its
+    method."""
     animation = copy.animation_data
     if animation is None:
         return

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The methods' names over a comparison's characters, drawn in the 3D views; nothing of it is in the file."""
+"""The methods' names above a comparison's characters, drawn in the 3D views; nothing of this is in the
+file."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from ...ui.translations import tr
 from . import comparison, comparison_state
 
 FONT = 0
-# Points at scale 1.
+# In points, at scale 1.
 SIZE, PADDING, STRIPE, ABOVE = 13, 6, 3, 16
 # Room for the headers and for some labels above each other.
 BELOW_TOP = 150
@@ -39,8 +40,8 @@ def unregister() -> None:
 
 
 def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, float], Vector]]:
-    """The text, the colour, and the place in the world of each label: in the middle above a method's copies
-    that are shown, or above the originals."""
+    """Returns text, colour and world position of each label: centred above a method's visible copies, or
+    above the originals."""
     state = comparison_state.of_scene(context.scene)
     if state is None:
         return []
@@ -70,7 +71,7 @@ def _method_label(obj: bpy.types.Object) -> str:
 def _top(
     objects: list[bpy.types.Object], context: bpy.types.Context, depsgraph: bpy.types.Depsgraph
 ) -> Vector | None:
-    """None where nothing of the objects is visible."""
+    """Returns None where none of the objects is visible."""
     visible = [obj for obj in objects if obj.visible_get(viewport=context.space_data)]
     if not visible:
         return None
@@ -91,9 +92,9 @@ def _draw() -> None:
         point = location_3d_to_region_2d(context.region, context.region_data, place)
         if point is None:
             continue
-        # Close up, the label stays in sight.
+        # Close up, the label stays visible.
         point.y = min(point.y, context.region.height - BELOW_TOP * scale)
-        # Those of copies that lie over each other stand above each other.
+        # Labels of copies at the same position are stacked.
         width = blf.dimensions(FONT, text)[0]
         spot = next((known for known in lowest if abs(known[0] - point.x) < 4 * line), None)
         spot = spot or (round(point.x), round(point.y))
@@ -105,7 +106,7 @@ def _draw() -> None:
 def _draw_label(
     text: str, colour: tuple[float, float, float], x: float, y: float, width: float, scale: float
 ) -> None:
-    """White on dark, which is legible on any view, over a stripe of the colour."""
+    """White on dark, which is legible on any view, above a stripe of the colour."""
     padding = PADDING * scale
     left, right = x - padding, x + width + padding
     bottom, top = y - padding, y + SIZE * scale * 0.75 + padding

@@ -16,8 +16,8 @@ from . import comparison, comparison_state, framing
 
 
 def character(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The visible meshes that the armatures meant deform, and those that hang on their bones: clothes and
-    eyes belong to the body that is selected. None where nothing is deformed."""
+    """Returns the visible meshes that the selected armatures deform, and those parented to their bones:
+    clothes and eyes belong to the selected body. Empty where nothing is deformed."""
     armatures, viewport = operators.armatures(context), _viewport(context)
     visible = [
         obj
@@ -80,7 +80,7 @@ class SINEW_OT_compare(bpy.types.Operator):
         options={"ENUM_FLAG"},
         default=set(USUAL_METHODS),
     )
-    # Of a flag, a click takes all others away.
+    # Clicking an enum flag would clear all others.
     choices: bpy.props.CollectionProperty(
         type=SinewComparisonChoice,
         name="Choices",
@@ -144,7 +144,7 @@ def _right_of_view(context: bpy.types.Context) -> np.ndarray:
     viewport = _viewport(context)
     if viewport is None or viewport.region_3d is None:
         return np.array([1.0, 0.0, 0.0])
-    # Also where the button is in the sidebar, a region without a view of its own.
+    # Also if the button is in the sidebar, a region without its own view.
     return np.array(viewport.region_3d.view_matrix)[0, :3]
 
 
@@ -161,8 +161,8 @@ class SINEW_OT_flip_comparison(_WhileComparing, bpy.types.Operator):
     bl_idname = "sinew.flip_comparison"
     bl_label = "Flip Comparison"
     bl_description = "Show the other of the two copies that are compared, at the same place"
-    # A view of the comparison: a step of undo for each flip would push out the artist's own, and take longer
-    # than the flip.
+    # Only a view of the comparison: an undo step for each flip would push out the artist's own steps, and
+    # take longer than the flip.
     bl_options = {"REGISTER"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:

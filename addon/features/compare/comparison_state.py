@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a scene holds of a comparison, and where its copies are shown."""
+"""A scene's settings of a comparison, and the positions of its copies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
 
 
 def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
-    # What the file stores stays that of the method where the list gets others.
+    # The stored number stays that of the method, even if the list of methods changes.
     numbers = {name: method.number + 1 for name, method in properties.METHODS.items()}
     return [
         (
@@ -82,32 +82,32 @@ CLASSES = (SinewComparison,)
 
 def of_scene(scene: bpy.types.Scene) -> SinewComparison | None:
     """None where the scene shows no comparison."""
-    # Asking for what is not set would leave an empty group in the file.
+    # Reading an unset property would leave an empty group in the file.
     return scene.sinew_comparison if scene.is_property_set("sinew_comparison") else None
 
 
 def copies_of(state: SinewComparison) -> list[bpy.types.Object]:
-    """Those that are still in the comparison's collection."""
+    """Returns the copies that are still in the comparison's collection."""
     if state.collection is None:
         return []
     return [obj for obj in state.collection.all_objects if properties.is_copy(obj)]
 
 
 def methods_of(state: SinewComparison) -> list[str]:
-    """Those that there are copies for, in the table's order."""
+    """Returns the methods that have copies, in the table's order."""
     there = {properties.of(obj).copied_for for obj in copies_of(state)}
     return [name for name in evaluate.method_names() if name in there]
 
 
 def arrange(state: SinewComparison) -> None:
-    """Puts all copies where the arrangement has them."""
+    """Moves all copies to the positions of the arrangement."""
     methods = methods_of(state)
     shown = shown_methods(state)
     for copy in copies_of(state):
         method = properties.of(copy).copied_for
         place = 1 + methods.index(method) if state.arrangement == SIDE_BY_SIDE else 1
         offset_nodes.set_offset(copy, tuple(place * state.spacing * x for x in state.axis))
-        # Hidden so, and not by their own flag, which would make Blender build its depsgraph anew.
+        # Hidden per view layer, as the copies' own flag would make Blender rebuild its depsgraph.
         for layer in state.id_data.view_layers:
             if copy.name in layer.objects:
                 copy.hide_set(method not in shown, view_layer=layer)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of comparisons: classes, what a scene stores, labels in the 3D views."""
+"""Registers comparisons: classes, what a scene stores, labels in the 3D views."""
 
 from __future__ import annotations
 

@@ -12,19 +12,19 @@ from mathutils import Vector
 
 from . import comparison, comparison_state
 
-# Of the view's height, on each side.
+# Share of the view's height, on each side.
 MARGIN = 0.04
-# How much farther away for each look, and how often.
+# The factor by which the view moves away in each step, and the number of steps.
 STEP, MOST_STEPS = 1.1, 60
 
 
 def show_all(
     context: bpy.types.Context, viewport: bpy.types.SpaceView3D, meshes: Sequence[bpy.types.Object]
 ) -> None:
-    """Moves the view to the middle of them, and away as far as is needed; a view that shows them all, one
-    through a camera and one that is locked to something stay.
+    """Moves the view to the middle of them, and away as far as needed. Does not change a view that shows them
+    all, one through a camera, or one that is locked to something.
 
-    meshes  that are compared
+    meshes  the compared meshes
     """
     view, area = viewport.region_3d, context.area
     state = comparison_state.of_scene(context.scene)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes group "Sinew Offset": moves what an object shows, in the world's axes, and leaves the
-object where it is: the bones' motions are relative to that."""
+"""The Geometry Nodes group "Sinew Offset": moves an object's evaluated geometry, in world axes, and does not
+move the object, as the bones' motions are relative to it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ...attach import node_group
 
-# A custom property on the group, so that a renamed one is still known as ours.
+# A custom property on the group, by which a renamed group is recognised.
 MARK = "sinew_offset"
 
 
@@ -18,14 +18,14 @@ def find(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def add(obj: bpy.types.Object) -> None:
-    """Behind all modifiers of the object but Subdivision at the very end: that gives the same shape when it
-    comes after, and Blender does it on the graphics card only there."""
+    """Adds the modifier behind all others except a Subdivision at the end: its result is the same, and only
+    at the end Blender subdivides on the graphics card."""
     last = _last_place(obj)
     behind = list(obj.modifiers)[last:]
     modifier = obj.modifiers.new("Offset", "NODES")
     modifier.node_group = next((g for g in bpy.data.node_groups if _is_ours(g)), None) or _make()
     modifier.show_expanded = False
-    # Modifiers that are pinned stand behind all that are not.
+    # Pinned modifiers are behind all others.
     modifier.use_pin_to_last = all(m.use_pin_to_last for m in behind)
     obj.modifiers.move(list(obj.modifiers).index(modifier), last)
 
@@ -38,10 +38,10 @@ def _last_place(obj: bpy.types.Object) -> int:
 
 
 def set_offset(obj: bpy.types.Object, offset: tuple[float, float, float]) -> None:
-    """Of an object that add() was called for; `offset` in world space."""
+    """Sets the world-space offset of an object for which add() was called."""
     modifier = find(obj)
     if modifier is None or np.allclose(node_group.get_input(modifier, "Offset"), offset, 1e-6, 0.0):
-        # Nothing would move, and Blender would evaluate it again.
+        # Nothing would move, but Blender would evaluate it again.
         return
     node_group.set_inputs(modifier, {"Offset": offset})
     obj.update_tag(refresh={"DATA"})

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape keys that bring what Sinew shows in one pose to the Armature modifiers."""
+"""Shape keys with which the Armature modifiers show Sinew's shape in one pose."""

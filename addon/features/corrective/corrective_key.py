@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A shape key by which the Armature modifiers alone show what Sinew shows in this pose: for a file
-that is to do without Sinew, or for an engine."""
+"""A shape key with which the Armature modifiers alone show Sinew's shape in this pose, for files without
+Sinew, or for an engine."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from ...attach import properties, upstream_proxy
 from ...core.corrective import NEAR, offsets
 from ...core.errors import SinewError
 from ...deform import pose, session
-from ...deform.plan import MODES_OF_THE_MODIFIER
+from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
 
-# Of a turn of the bone, in radians: with less its key would be all or nothing.
+# The bone's smallest rotation, in radians: below it, the key would be all or nothing.
 LEAST_TURN = 0.05
 
 
 @dataclass
 class Made:
-    """name           of the shape key
+    """The result.
+
+    name           of the shape key
     before, after  the largest distance of the Armature modifiers' shape from Sinew's, without and with it, in
-                   units of the scene
+                   scene units
     """
 
     name: str
@@ -34,12 +36,12 @@ class Made:
 
 
 def add(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, bone: bpy.types.PoseBone | None) -> Made:
-    """Adds the key, muted, as what Sinew shows has it already.
+    """Adds the key, muted, as Sinew already shows this shape.
 
-    bone  drives it: from 0 where it is turned against its parent as at rest, to 1 as it is now; None: its
-          value is 1
+    bone  drives the key: its value is 0 where the bone is rotated relative to its parent as at rest, and 1 in
+          the current pose; None: its value is 1
 
-    Raises SinewError, and changes nothing, where there can be none.
+    Raises SinewError, and changes nothing, where a key is not possible.
     """
     _check(obj)
     pairs = session.states_of([obj], depsgraph)
@@ -69,7 +71,7 @@ def _check(obj: bpy.types.Object) -> None:
     keys = obj.data.shape_keys
     if not obj.data.is_editable or obj.override_library is not None:
         raise SinewError(f"{obj.name}: its mesh comes from another file, where shape keys have to be made")
-    if obj.mode in MODES_OF_THE_MODIFIER:
+    if obj.mode in ARMATURE_MODIFIER_MODES:
         raise SinewError(f"{obj.name}: leave its mode first, in which the Armature modifier deforms it")
     if keys is not None and not keys.use_relative:
         raise SinewError(f"{obj.name}: its shape keys are absolute; a corrective key is a relative one")
@@ -77,8 +79,8 @@ def _check(obj: bpy.types.Object) -> None:
 
 
 def _by_modifiers(obj: bpy.types.Object, skinned: SkinnedObject) -> Callable[[np.ndarray], np.ndarray]:
-    """What makes of rest points, float32 [vertices, 3], the shape that the object's Armature modifiers give
-    them in the pose that is shown."""
+    """Returns a function from rest points, float32 [vertices, 3], to the shape that the object's Armature
+    modifiers give them in the current pose."""
     skin_stack = skinned.bound.skin_stack.another()
     frames = pose.of_modifiers(obj, skinned.shown.frames or [])
 
@@ -93,7 +95,8 @@ def _by_modifiers(obj: bpy.types.Object, skinned: SkinnedObject) -> Callable[[np
 
 
 def _turns(bone: bpy.types.PoseBone) -> tuple[float, float]:
-    """By how much it is turned against its parent at rest and now, in radians, as drivers say it."""
+    """Returns the angles of its rotation relative to its parent at rest and now, in radians, as drivers
+    measure them."""
     if bone.parent is None:
         raise SinewError(
             f"{bone.name} has no parent: choose a bone that is turned against one to drive the key"
@@ -117,7 +120,7 @@ def _drive(key: bpy.types.ShapeKey, bone: bpy.types.PoseBone, rest_turn: float, 
     variable.name, variable.type = "turn", "ROTATION_DIFF"
     for target, each in zip(variable.targets, (bone.parent, bone), strict=True):
         target.id, target.bone_target = bone.id_data, each.name
-    # The one that Blender makes multiplies what the keys say.
+    # Blender's default modifier would multiply the keys' values.
     for modifier in list(curve.modifiers):
         curve.modifiers.remove(modifier)
     for at, value in sorted(((rest_turn, 0.0), (turn, 1.0))):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with weights and rig, in the panel, and its vertices selected."""
+"""Faults of weights and rig, shown in the panel, with their vertices selected."""

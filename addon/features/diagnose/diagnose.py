@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks a mesh's weights and poses, on the mesh as it is edited, and remembers what was found until the
+"""Checks a mesh's weights and poses, on the mesh as it is edited, and remembers the findings until the
 weights change."""
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from ..pages import measure
 
 @dataclass
 class Check:
-    """What was found on an object, and of what.
+    """The findings on an object, and what was checked.
 
     mesh     the session_uid of the mesh
-    frames   which poses were looked at, in words
-    over     one of stepped.OVER; empty where it was one pose
+    frames   which poses were checked, in words
+    over     one of stepped.OVER; empty for a single pose
     suspect  the mesh was touched since
-    stale    weights, groups or bones are known to be others than those that were checked
+    stale    weights, groups or bones have changed since the check
     """
 
     findings: list[Finding]
@@ -61,21 +61,21 @@ class _Reading:
     points: np.ndarray
     poses: PoseCheck
 
-    def look(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
+    def add_pose(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
         armature = attach.armature_of(self.obj).evaluated_get(depsgraph)
         bones = self.weighting.bones
         pose = armature_io.read_pose(armature, bones).astype(np.float64)
-        # A bone of no size turns nothing.
+        # A bone without size rotates nothing.
         motions = pose[:, :3, :3] @ np.linalg.pinv(bones.rest[:, :3, :3].astype(np.float64))
         self.poses.add_pose(rotations_of(motions), frame)
 
 
 def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int) -> None:
-    """Checks weights, and the pose of now. Raises SinewError that says why an object can not be checked."""
+    """Checks weights, and the current pose. Raises SinewError that says why an object cannot be checked."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     readings = [_read(obj, depsgraph) for obj in objects]
     for reading in readings:
-        reading.look(scene.frame_current, depsgraph)
+        reading.add_pose(scene.frame_current, depsgraph)
         poses = tr("pose of frame {frame}", frame=scene.frame_current)
         _keep(reading, most_influences, poses)
 
@@ -83,7 +83,7 @@ def check(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_infl
 def check_frames(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], most_influences: int, over: str
 ) -> Iterator[float]:
-    """Checks weights, and the poses of all frames; yields the share that is done."""
+    """Checks weights, and the poses of all frames; yields the progress."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     readings = [_read(obj, depsgraph) for obj in objects]
     armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in objects))
@@ -93,7 +93,7 @@ def check_frames(
             evaluate.set_frame(scene, frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             for reading in readings:
-                reading.look(frame, depsgraph)
+                reading.add_pose(frame, depsgraph)
             yield (number + 1) / len(frames)
     poses = tr("poses of frames {first} to {last}", first=frames[0], last=frames[-1])
     for reading in readings:
@@ -101,7 +101,7 @@ def check_frames(
 
 
 def of(obj: bpy.types.Object) -> Check | None:
-    """What was found on an object; its `stale` is of now."""
+    """Returns the findings on an object; `stale` is up to date."""
     found = _checks.get(obj.session_uid)
     if found is not None and not found.stale:
         groups = tuple(group.name for group in obj.vertex_groups)
@@ -112,7 +112,7 @@ def of(obj: bpy.types.Object) -> Check | None:
 
 
 def check_again(scene: bpy.types.Scene, obj: bpy.types.Object, most_influences: int) -> Iterator[float]:
-    """As it was checked last; yields the share that is done."""
+    """Repeats the last check; yields the progress."""
     found = of(obj)
     if found is not None and found.over:
         yield from check_frames(scene, [obj], most_influences, found.over)
@@ -121,7 +121,7 @@ def check_again(scene: bpy.types.Scene, obj: bpy.types.Object, most_influences: 
 
 
 def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
-    """Raises SinewError where no such fault is known, or the mesh has other vertices now."""
+    """Raises SinewError where no such fault is known, or the mesh now has other vertices."""
     found = of(obj)
     finding = next((f for f in found.findings if f.name == name), None) if found is not None else None
     if finding is None:
@@ -134,9 +134,9 @@ def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
 
 
 def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
-    """Enters edit mode with exactly the vertices of a finding selected; how many they are.
+    """Enters edit mode with exactly the vertices of a finding selected. Returns their number.
 
-    Raises SinewError where that can not be done.
+    Raises SinewError where that is not possible.
     """
     _found, finding = finding_of(obj, name)
     if obj.name not in context.view_layer.objects or not obj.visible_get():
@@ -144,7 +144,7 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     active = context.view_layer.objects.active
     if active is not None and active.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-    # All selected meshes would come along into edit mode, with selections of their own.
+    # All selected meshes would enter edit mode, too, with their own selections.
     for other in context.selected_objects:
         other.select_set(False)
     obj.select_set(True)
@@ -154,12 +154,12 @@ def select(obj: bpy.types.Object, name: str, context: bpy.types.Context) -> int:
     chosen[finding.vertices] = True
     hidden = np.empty(len(mesh.vertices), dtype=bool)
     mesh.vertices.foreach_get("hide", hidden)
-    # What is hidden can not be selected.
+    # Hidden vertices cannot be selected.
     mesh.vertices.foreach_set("hide", hidden & ~chosen)
-    # Not of the context: asked for that, Blender 4.2 keeps the scene with the context and crashes without it.
+    # Not through the context: Blender 4.2 would keep the scene with the context, and crash without it.
     context.scene.tool_settings.mesh_select_mode = (True, False, False)
     bpy.ops.object.mode_set(mode="EDIT")
-    # Not by foreach_set before that: Blender 5.0 crashed in it, on edges or faces of a mesh with hidden ones.
+    # Not by foreach_set before: Blender 5.0 crashed in it, on edges or faces of a mesh with hidden ones.
     edited = bmesh.from_edit_mesh(mesh)
     for elements in (edited.faces, edited.edges, edited.verts):
         for element in elements:
@@ -212,14 +212,14 @@ def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
     if obj.mode == "EDIT":
         return _edited_weights(obj.data).equals(weights)
     state = session.state_of(obj)
-    if state is not None and not state.bound.source.from_front:
-        # Read already, as Sinew follows them.
+    if state is not None and not state.bound.source.from_upstream:
+        # Sinew has read them already.
         return state.bound.source.weights.equals(weights)
     return mesh_io.read_group_weights(obj.data).equals(weights)
 
 
 def _edited_weights(mesh: bpy.types.Mesh) -> GroupWeights:
-    """Of the mesh in edit mode, before anything is written back from it."""
+    """Returns the weights of a mesh in edit mode, before it is written back."""
     vertices = bmesh.from_edit_mesh(mesh).verts
     layer = vertices.layers.deform.active
     entries = [vertex[layer].items() if layer is not None else [] for vertex in vertices]
@@ -235,7 +235,7 @@ def _edited_weights(mesh: bpy.types.Mesh) -> GroupWeights:
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not _checks:
         return
-    # By names, of evaluated data: originals may be gone by now, as handlers before this one deleted them.
+    # By names from evaluated data: earlier handlers may have deleted the originals.
     meshes, armatures = set(), set()
     for update in depsgraph.updates:
         if isinstance(update.id, bpy.types.Mesh) and update.is_updated_geometry:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar's diagnostics: what is wrong in weights and poses, what to do about it, and where it is."""
+"""The sidebar's diagnostics: faults of weights and poses, what to do about them, and where they are."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class SINEW_OT_check(_OnDeformed, bpy.types.Operator):
         except SinewError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        return _tell(self, context)
+        return _report(self, context)
 
 
 class SINEW_OT_check_frames(_OnDeformed, stepped.Stepped, bpy.types.Operator):
@@ -63,10 +63,10 @@ class SINEW_OT_check_frames(_OnDeformed, stepped.Stepped, bpy.types.Operator):
         return diagnose.check_frames(scene, _checkable(context), scene.sinew_most_influences, self.over)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
-        return _tell(self, context)
+        return _report(self, context)
 
 
-def _tell(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+def _report(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
     kinds = sum(len(diagnose.of(obj).findings) for obj in _checkable(context))
     operator.report({"INFO"}, tr("{count} kinds of faults", count=kinds) if kinds else "Nothing found")
     return {"FINISHED"}

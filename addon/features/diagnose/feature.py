@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of diagnostics: a panel, and what forgets findings when weights change."""
+"""Registers diagnostics: a panel, and handlers that forget findings when weights change."""
 
 from .diagnose import register as register
 from .diagnose import unregister as unregister

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What mends a finding: the buttons that do what its sentence says, on exactly its vertices."""
+"""The buttons that mend a finding, on exactly its vertices."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ...io import mesh_io
 from ...ui.translations import counted, tr
 from . import diagnose
 
-# How far from the mirrored place a vertex may be, as a part of the mesh's diagonal.
+# How far a vertex may be from the mirrored position, as a share of the mesh's diagonal.
 MIRROR_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class Mend:
-    """A button: what it is called, and what it does in one sentence."""
+    """A button: its name, and what it does in one sentence."""
 
     name: str
     label: str
@@ -46,7 +46,7 @@ MIRROR = Mend(
 REMOVE = Mend("remove", "Remove Groups", "Delete these vertex groups; those that are locked stay")
 ALL = {mend.name: mend for mend in (LIMIT, NORMALIZE, SMOOTH, FILL, MIRROR, REMOVE)}
 
-# By the finding.
+# By the finding's name.
 MENDS = {
     "no_weights": (FILL, MIRROR),
     "small_sums": (NORMALIZE, FILL, MIRROR),
@@ -59,7 +59,7 @@ MENDS = {
 
 
 def mend(obj: bpy.types.Object, finding: str, how: str, most_influences: int) -> str:
-    """Changes weights or groups; what was done, in words.
+    """Changes weights or groups. Returns what was done, in words.
 
     Raises SinewError, and changes nothing, where nothing can be done.
     """
@@ -102,7 +102,7 @@ def _rows(
     obj: bpy.types.Object, check: diagnose.Check, found: Finding, how: str, most_influences: int
 ) -> Rows:
     if obj.mode == "EDIT":
-        # What the check has read.
+        # The check has read the edited mesh, too.
         obj.update_from_editmode()
     mirror_of = _mirrored_groups(obj, check) if how == MIRROR.name else []
     is_bone = check.bones.of_groups([group.name for group in obj.vertex_groups]) >= 0
@@ -119,7 +119,7 @@ def _rows(
 
 
 def _mirrored_groups(obj: bpy.types.Object, check: diagnose.Check) -> list[int]:
-    """[groups that were checked]: the group of the other side, made where its bone has none yet; else the
+    """[groups that were checked]: the group of the other side, made if its bone has none yet; otherwise the
     group itself."""
     bones = {name for name, deforms in zip(check.bones.names, check.bones.deform, strict=True) if deforms}
     found = []
@@ -133,7 +133,8 @@ def _mirrored_groups(obj: bpy.types.Object, check: diagnose.Check) -> list[int]:
 
 
 def _mirror_pairs(obj: bpy.types.Object, vertices: Sequence[int]) -> dict[int, int]:
-    """The vertex at the mirrored place of each that has one; not itself, and none that is mended, too."""
+    """Returns the vertex at the mirrored position, for each vertex that has one; not itself, and no other
+    vertex that is mended."""
     points, mended = mesh_io.read_points(obj.data), set(vertices)
     tolerance = MIRROR_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
     others = [index for index in range(len(points)) if index not in mended]

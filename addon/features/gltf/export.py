@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How Sinew deforms a mesh, in a glTF file: extras of the mesh name the method, and application-specific
-attributes of its vertices (glTF 2.0, 3.7.2.1: names that begin with an underscore) have what the method keeps
-of each.
+"""Writes how Sinew deforms a mesh to a glTF file: extras of the mesh name the method, and
+application-specific vertex attributes (glTF 2.0, 3.7.2.1: names that begin with an underscore) have the
+method's vertex data.
 
-Meshes have these attributes for the time of an export, as the exporter splits vertices at seams and knows
-best which is which. They are made where it calls before an export and removed at its end.
+Meshes have these attributes only during an export, as the exporter splits vertices at seams, and copies
+attributes to the right ones. They are made when it calls before an export, and removed at its end.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from ...core.spaces import transformed
 from ...deform import session
 from ...io import armature_io, mesh_io
 
-# Raised where a reader of the files before would not read these rightly.
+# Raised when readers of earlier files could not read new ones correctly.
 VERSION = 1
 CENTRE, SHARE = "_SINEW_CENTRE", "_SINEW_MIX"
 EXTRAS = "sinew"
 
-# By glTF's axes: x, z, -y.
+# In glTF's axes: x, z, -y.
 _Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
 
 
@@ -36,7 +36,7 @@ _Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtyp
 class Skinning:
     """How one mesh is deformed.
 
-    extras   in the file's words
+    extras   as written to the file
     centres  float32 [vertices, 3], object space; None where its methods have none
     shares   float32 [vertices], of the mixed method; None without one
     """
@@ -49,12 +49,12 @@ class Skinning:
 
 @dataclass
 class _Export:
-    """The one that runs, or the last.
+    """The current export, or the last one.
 
     written     extras by the names of objects
-    left_out    a sentence for each object that the file says nothing of
-    meshes      that have attributes for its time
-    all_custom  the artist wants the meshes' other attributes that begin with an underscore, too
+    left_out    a sentence for each object without extras
+    meshes      that have attributes during the export
+    all_custom  the artist exports the meshes' other attributes that begin with an underscore, too
     """
 
     written: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -67,8 +67,8 @@ _current = _Export()
 
 
 def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
-    """How the meshes that Sinew deforms now are deformed, and a sentence for each that no file can say it
-    of. While Sinew still deforms them."""
+    """Returns how Sinew deforms the meshes now, and a sentence for each mesh for which a file cannot say it.
+    Call it while Sinew still deforms them."""
     found, left_out = [], []
     depsgraph = context.evaluated_depsgraph_get()
     objects = [
@@ -116,9 +116,9 @@ def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinn
 
 
 def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str, Any]) -> None:
-    """Gives meshes their attributes.
+    """Adds the attributes to meshes.
 
-    found, left_out  of collect()
+    found, left_out  from collect()
     settings         the exporter's own
     """
     end()
@@ -131,7 +131,7 @@ def begin(found: Sequence[Skinning], left_out: Sequence[str], settings: dict[str
     for sentence in _current.left_out:
         settings["log"].warning(sentence)
     if not bpy.app.background:
-        # An exporter that fails does not say that it has ended.
+        # An exporter that fails does not announce its end.
         bpy.app.timers.register(end, first_interval=0.0)
 
 
@@ -145,7 +145,7 @@ def _add(skinning: Skinning, y_up: bool) -> None:
         return
     _current.written[obj.name] = skinning.extras
     if skinning.centres is not None:
-        # As the exporter has the positions of a skin: in world space.
+        # In world space, as the exporter writes the positions of a skin.
         space = np.array(obj.matrix_world, dtype=np.float64)
         space = _Y_UP @ space if y_up else space
         mesh_io.write_vectors(mesh, CENTRE, transformed(skinning.centres, space).astype(np.float32))
@@ -156,42 +156,42 @@ def _add(skinning: Skinning, y_up: bool) -> None:
 
 
 def end() -> None:
-    """Takes the attributes off again."""
+    """Removes the attributes again."""
     meshes, _current.meshes = _current.meshes, []
     for mesh in meshes:
-        # After an export that failed, the file may be another one.
+        # After an export that failed, another file may be open.
         with suppress(ReferenceError):
             for name in (CENTRE, SHARE):
                 mesh_io.remove_attribute(mesh, name)
 
 
 def written() -> dict[str, dict[str, Any]]:
-    """Of the last export the extras, by the names of objects."""
+    """The extras of the last export, by the names of objects."""
     return dict(_current.written)
 
 
 def left_out() -> list[str]:
-    """Of the last export a sentence for each object that the file says nothing of."""
+    """A sentence for each object of the last export without extras."""
     return list(_current.left_out)
 
 
 class GltfExtension:
-    """What the exporter asks while it reads meshes."""
+    """The functions that the exporter calls while it reads meshes."""
 
     def gather_attribute_keep(self, attribute: Any, _settings: dict[str, Any]) -> None:
-        """Of those that begin with an underscore, by the artist's choice all or these alone."""
+        """Keeps attributes that begin with an underscore: all or only these, as the artist chose."""
         if not _current.all_custom and attribute.attr_name not in (CENTRE, SHARE):
             attribute.keep = False
 
     def gather_mesh_hook(
         self, gltf_mesh: Any, _mesh: bpy.types.Mesh, obj: bpy.types.Object | None, *_: Any
     ) -> None:
-        """obj: that the mesh is exported for, None for one without a skin."""
+        """obj: the object that the mesh is exported for, None for one without a skin."""
         extras = _current.written.get(obj.name) if obj is not None else None
         if extras is not None:
             gltf_mesh.extras = {**(gltf_mesh.extras or {}), EXTRAS: extras}
             return
-        # Of another object with this mesh.
+        # The attributes belong to another object with this mesh.
         for primitive in gltf_mesh.primitives:
             for name in (CENTRE, SHARE):
                 primitive.attributes.pop(name, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of it: a check box in the glTF exporter, kept in the scene."""
+"""Registers the glTF export: a check box in the exporter, stored in the scene."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...attach.subscribers import subscribers
 
 
 class SinewGltf(bpy.types.PropertyGroup):
-    """What the glTF exporter writes besides."""
+    """What the glTF exporter writes in addition."""
 
     skinning: bpy.props.BoolProperty(
         name="Skinning Data",
@@ -29,7 +29,7 @@ _ADDON = __package__.rpartition(".features")[0]
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
-    """In the side bar of the exporter."""
+    """Draws in the exporter's sidebar."""
     header, body = layout.panel("GLTF_sinew", default_closed=False)
     header.label(text="Sinew", translate=False)
     if body is not None:
@@ -38,7 +38,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
 
 
 def before_export(settings: dict[str, Any], begin_export: Callable[[], None]) -> None:
-    """settings: the exporter's own. begin_export: from there on Sinew deforms nothing."""
+    """settings: the exporter's own. begin_export: from then on Sinew deforms nothing."""
     from . import export
 
     context = bpy.context
@@ -65,11 +65,11 @@ def unregister() -> None:
 
 
 def _exporters_panels() -> dict[str, Callable]:
-    """What draws in the exporter's side bar, by the names of extensions. Blender 4.2 finds draw_export() of
-    an extension by itself, and keeps it here; newer ones expect it here."""
+    """Returns the functions that draw in the exporter's sidebar, by the names of extensions. Blender 4.2
+    finds an extension's draw_export() by itself, and stores it here; newer ones expect it here."""
     try:
         import io_scene_gltf2
     except ImportError:
-        # Blender can be built without.
+        # Blender can be built without the exporter.
         return {}
     return getattr(io_scene_gltf2, "exporter_extension_layout_draw", {})

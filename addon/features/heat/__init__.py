@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures of the deformation, live: as colours of the mesh, as numbers, and over frames."""
+"""Live measures of the deformation: as colours of the mesh, as numbers, and over frames."""

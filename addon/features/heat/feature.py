@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of heat maps, and how they take part in what Sinew does with its objects."""
+"""Registers heat maps, and subscribes to what Sinew does with its objects."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def unregister() -> None:
 def _heat_changed(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     if not properties.has_sinew(obj):
         return
-    # Else it is seen to at the end of the render.
+    # Otherwise this is done at the end of the render.
     if not is_rendering_in_window() and not properties.of(obj).heat:
         heat_view.take_off(obj)
     session.setting_changed(obj, context)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The legend of the heat map, drawn over the 3D views: what is shown, and which values colours stand for."""
+"""The legend of the heat map, drawn over the 3D views: what is shown, and the values of the colours."""
 
 from __future__ import annotations
 
@@ -18,19 +18,22 @@ BACKGROUND, TEXT = (0.08, 0.08, 0.08, 0.75), (1.0, 1.0, 1.0, 1.0)
 
 @dataclass
 class Content:
-    """title  what is shown, under which methods"""
+    """What the legend shows.
+
+    title  the measure, and the methods
+    """
 
     scale: HeatScale
     title: str
 
 
-# By the session_uid of the scene that is measured.
+# By the session_uid of the measured scene.
 contents: dict[int, Content] = {}
 _handle: object | None = None
 
 
 def show(on: bool) -> None:
-    """Has the legend drawn, or not."""
+    """Switches the drawing of the legend on or off."""
     global _handle
     if on and _handle is None and not bpy.app.background:
         _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
@@ -40,7 +43,7 @@ def show(on: bool) -> None:
 
 
 def labels(scale: HeatScale, scene: bpy.types.Scene, count: int = 5) -> list[str]:
-    """The values at even distances along the legend, with their unit."""
+    """Returns the values at equal distances along the legend, with their unit."""
     texts = [units.text(scene, scale.metric.unit, value) for value in scale.ticks(count)]
     if scale.clipped:
         texts[-1] = f"\u2265 {texts[-1]}"
@@ -72,7 +75,7 @@ def _draw() -> None:
         texts = [texts[0], *[""] * (len(texts) - 2), texts[-1]]
     for number, text in enumerate(texts):
         share, wide = number / (len(texts) - 1), blf.dimensions(0, text)[0]
-        # The first begins and the last ends with the bar.
+        # The first begins at the start of the bar, and the last ends at its end.
         _write(
             blf,
             text,
@@ -84,7 +87,7 @@ def _draw() -> None:
 
 
 def _visible(context: bpy.types.Context) -> tuple[float, float]:
-    """From where to where neither toolbar nor sidebar covers the view, in pixels from its left edge."""
+    """Returns the range, in pixels from the view's left edge, that neither toolbar nor sidebar covers."""
     left, right = 0.0, float(context.region.width)
     for region in context.area.regions:
         if (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map: on each frame the chosen measure of the objects that show it, as their vertices' colours."""
+"""The heat map: in each frame, the chosen measure as vertex colours of the objects that show it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ...ui.translations import joined, tr
 from . import heat_legend, heat_nodes, live, measures
 from .measures import SinewMeasures
 
-# What colours were made from, by the session_uid of the scene.
+# The inputs of the last colours, by the session_uid of the scene.
 _last: dict[int, tuple] = {}
 
 
 def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
-    """Colours those of the objects with a heat map that are in the scene that was evaluated, if anything
-    changed. One that its Armature modifier deforms has no point buffer, and shows no colours."""
+    """Colours those objects with a heat map that are in the evaluated scene, if anything changed. An object
+    that its Armature modifier deforms has no point buffer, and shows no colours."""
     if not heated:
         if _last:
             live.forget()
@@ -41,7 +41,7 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
     subject = live.measure(shown, settings.other, depsgraph)
     if subject is None:
         return
-    # Kept whole, not by id: that of an object that is gone may be another's.
+    # The object, not its id: an id could be reused after the object is gone.
     inputs = (subject.measured, *_choices(settings))
     if _equal(inputs, _last.get(scene)) and all(heat_nodes.has_colours(obj) for obj, _state in shown):
         return
@@ -55,13 +55,13 @@ def update(heated: live.Pairs, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def _has_points(obj: bpy.types.Object, skinned: SkinnedObject) -> bool:
-    """Whether its point buffer is filled: that of a copy of an object is not, until the copy is deformed."""
+    """Whether its point buffer is filled: that of a copied object is not, until the copy is deformed."""
     buffer = properties.of(obj).point_buffer
     return buffer is not None and len(buffer.data.vertices) == len(skinned.bound.source.points)
 
 
 def scale_of(settings: SinewMeasures, measured: Measured, values: np.ndarray) -> HeatScale:
-    """What the colours of these values stand for."""
+    """Returns the range of values that the colours cover."""
     metric, diagonal = settings.metric, measured.rest.diagonal
     least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
     if settings.range == measures.PER_FRAME or not settings.end:
@@ -78,7 +78,7 @@ def _equal(inputs: tuple, last: tuple | None) -> bool:
 
 
 def _title(settings: SinewMeasures, shown: live.Pairs) -> str:
-    """Of what, under which methods."""
+    """Returns the measure, and the methods."""
     methods = list(dict.fromkeys(properties.method_label(properties.of(obj).method) for obj, _state in shown))
     text = f"{tr(settings.metric.label)}, {joined(methods)}"
     if settings.quantity != "distance":

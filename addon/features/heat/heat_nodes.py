@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Geometry Nodes groups that also colour the mesh: around those of node_group, for as long as a heat map
-is shown.
+"""The Geometry Nodes groups that also colour the mesh: they contain those of node_group, while a heat map is
+shown.
 
-The colours are an attribute of the evaluated mesh alone, under one name for all objects, so that objects with
-one mesh have colours of their own, and the material that shows them is one.
+The colours are an attribute of the evaluated mesh only, with the same name for all objects: so objects that
+share a mesh have separate colours, and one material shows them all.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from ...io import mesh_io
 
 # The colour attribute of evaluated meshes.
 NAME = "Sinew Heat"
-# The attribute of a point buffer that holds each vertex's colour.
+# The attribute of a point buffer with each vertex's colour.
 COLOURS = "sinew_colours"
 MARK = "sinew_heat"
 _KIND = 12
 
 
 def group_of(obj: bpy.types.Object) -> bpy.types.NodeTree | None:
-    """For an object that shows a heat map; None for others."""
+    """Returns the group for an object that shows a heat map; None for others."""
     return get_or_make() if properties.of(obj).heat else None
 
 
 def get_or_make() -> bpy.types.NodeTree:
-    """The group that takes points and colours from a point buffer."""
+    """Returns the group that takes points and colours from a point buffer."""
     return node_group.find(_KIND) or _make()
 
 
@@ -56,8 +56,8 @@ def remove_colours(obj: bpy.types.Object) -> None:
 
 
 def remove_applied(mesh: bpy.types.Mesh) -> None:
-    """What a mesh has of the group that was applied to it: the colours and their material. Faces get the
-    material of the slot in front: which they had is not in the mesh any more."""
+    """Removes colours and material from a mesh to which the group was applied. Faces get the material of the
+    previous slot: the mesh no longer knows which one they had."""
     if not mesh.is_editable or mesh.is_editmode:
         return
     mesh_io.remove_attribute(mesh, NAME)
@@ -97,13 +97,13 @@ def _make() -> bpy.types.NodeTree:
     link = group.links.new
     for name in ("Geometry", *inputs):
         link(source.outputs[name], place.inputs[name])
-    # Each vertex takes the colour of the point buffer's vertex of that index.
+    # Each vertex takes the colour of the point buffer's vertex with the same index.
     link(source.outputs["Points"], info.inputs["Object"])
     link(info.outputs["Geometry"], sample.inputs["Geometry"])
     link(named.outputs["Attribute"], enabled_socket(sample.inputs, "Value"))
     link(index.outputs["Index"], sample.inputs["Index"])
     link(enabled_socket(sample.outputs, "Value"), enabled_socket(store.inputs, "Value"))
-    # Without colours, as before the first are written, the material is left alone too.
+    # Without colours, as before the first ones are written, the material is not changed either.
     same = node_group.same_count(group, source.outputs["Geometry"], info.outputs["Geometry"])
     link(same, store.inputs["Selection"])
     link(same, paint.inputs["Selection"])
@@ -114,13 +114,13 @@ def _make() -> bpy.types.NodeTree:
 
 
 def _material() -> bpy.types.Material:
-    """Shows the colours as they are, whatever light there is."""
+    """Returns a material that shows the colours unchanged, whatever the light."""
     for material in bpy.data.materials:
         if material.get(MARK) and material.library is None:
             return material
     material = bpy.data.materials.new(NAME)
     material[MARK] = True
-    if bpy.app.version < (5, 0):  # later ones have nodes always
+    if bpy.app.version < (5, 0):  # newer ones always have nodes
         material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()

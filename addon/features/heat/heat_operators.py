@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons of heat map and worst frames."""
+"""The buttons of the heat map and of worst frames."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar's heat map, numbers of the current frame, and worst frames."""
+"""The sidebar's heat map, measures of the current frame, and worst frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import joined, tr
 from . import heat_operators, live, measures, redraw, worst_frames
 
-# What the number is that a frame is bad by.
+# What a frame's badness is measured by.
 _WORST = {"stretch_rms": "{value} RMS", "area_rms": "{value} RMS", "flipped_area": "{value} of the area"}
 
 
@@ -49,10 +49,10 @@ class SINEW_PT_numbers(Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        # Blender asks only what is open and visible to draw itself: elsewhere nothing is measured.
+        # Blender draws only panels that are open and visible, so nothing is measured otherwise.
         redraw.wanted = True
         settings = measures.of(context.scene)
-        # As it was evaluated last: while drawing nothing may be evaluated, for that can write.
+        # The last evaluation: nothing may be evaluated while drawing, as that can write.
         depsgraph = context.view_layer.depsgraph
         pairs = session.states_of(operators.sinew_targets(context), depsgraph)
         subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
@@ -86,8 +86,8 @@ def _draw_row(layout: bpy.types.UILayout, texts: Sequence[str]) -> None:
 
 
 def rows(scene: bpy.types.Scene, measured: Measured, other: Measured | None) -> list[tuple[str, ...]]:
-    """What each number is, and its values with their units in one frame: at rest, of the shape that is shown
-    and, where it is given, of the other method's."""
+    """Returns, for each measure of a frame, its label and its values with units: at rest, of the current
+    shape and, if given, of the other method's."""
     shapes = [measured] if other is None else [measured, other]
 
     def row(label: str, name: str, unit: str, at_rest: str, signed: bool = False) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ def rows(scene: bpy.types.Scene, measured: Measured, other: Measured | None) -> 
 
 
 def distances(scene: bpy.types.Scene, measured: Measured) -> list[tuple[str, str]]:
-    """Between the shape that is shown and the other method's."""
+    """Returns the distances between the current shape and the other method's."""
     most, rms = (units.text(scene, "length", measured.entry(f"distance_{name}")) for name in ("max", "rms"))
     return [("Distance", tr("at most {value}", value=most)), ("Distance, RMS", rms)]
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What has to be set around an object for its heat map to be seen, and given back afterwards: the colour
-attribute that its mesh shows, and what the 3D views in Solid shading take colours from."""
+"""Changes what has to be set for a heat map to be visible, and restores it afterwards: the active colour
+attribute of meshes, and the colour source of 3D views in Solid shading."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FROM_ATTRIBUTE = "VERTEX"
 
 
 def sync(objects: Iterable[bpy.types.Object]) -> None:
-    """Brings the file and the views in line with which of the objects show a heat map."""
+    """Updates the file and the views for the objects that show a heat map."""
     shown = [obj for obj in objects if properties.of(obj).heat and properties.of(obj).enabled]
     _choose_attributes({obj.data for obj in shown if obj.data.is_editable})
     _choose_colours(bool(shown))
@@ -24,16 +24,16 @@ def sync(objects: Iterable[bpy.types.Object]) -> None:
 
 
 def take_off(obj: bpy.types.Object) -> None:
-    """Takes the heat map off an object, but for its node group."""
+    """Removes the heat map from an object, except its node group."""
     properties.of(obj).property_unset("heat")
-    # First, as Blender 4.2 makes another colour attribute the active one when any attribute goes.
+    # First, as Blender 4.2 activates another colour attribute when any attribute is removed.
     sync(_objects())
     heat_nodes.remove_colours(obj)
     heat_nodes.remove_applied(obj.data)
 
 
 def tidy() -> None:
-    """Takes away what no object needs any more."""
+    """Removes what no object needs any more."""
     objects = _objects()
     node_group.remove_unused()
     heat_nodes.remove_unused_material()
@@ -53,7 +53,7 @@ def _choose_attributes(meshes: set[bpy.types.Mesh]) -> None:
         kept = mesh.is_property_set("sinew_active_colour")
         if mesh in meshes and not kept:
             mesh.sinew_active_colour = mesh.attributes.active_color_name
-            # The attribute is one of the evaluated mesh alone: a name is all that it needs.
+            # The attribute exists only in the evaluated mesh, so setting the name is enough.
             mesh.attributes.active_color_name = heat_nodes.NAME
         elif kept and mesh not in meshes and mesh.is_editable:
             if mesh.attributes.active_color_name == heat_nodes.NAME:
@@ -63,7 +63,7 @@ def _choose_attributes(meshes: set[bpy.types.Mesh]) -> None:
 
 
 def _choose_colours(heat: bool) -> None:
-    """Makes the 3D views take colours from attributes, or from what they took them before."""
+    """Makes the 3D views take colours from attributes, or restores their earlier source."""
     for screen in bpy.data.screens:
         kept = screen.is_property_set("sinew_colour_types")
         if heat and not kept:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures skinned objects as they are now, from what Sinew knows of them: Blender evaluates nothing for it.
+"""Measures skinned objects in their current shape, from what Sinew knows about them, without any evaluation
+by Blender.
 
-Shapes are those that the skinning leaves, in world space; several objects are measured as one.
+Shapes are the results of skinning alone, in world space; several objects are measured as one.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
 from ...io import armature_io, mesh_io
 
-# Sets of objects that are kept ready to be measured: those of the heat map and those of the panel.
+# Sets of objects that are kept prepared: those of the heat map and those of the panel.
 MOST_SUBJECTS = 2
 
 Pairs = Sequence[tuple[bpy.types.Object, SkinnedObject]]
@@ -32,7 +33,7 @@ Pairs = Sequence[tuple[bpy.types.Object, SkinnedObject]]
 
 @dataclass
 class Part:
-    """One of the objects: what it was bound to when it was read, and what other methods make of it."""
+    """One of the objects: its binding when it was read, and a skin stack for other methods."""
 
     obj: bpy.types.Object
     skinned: SkinnedObject
@@ -43,11 +44,11 @@ class Part:
 
 @dataclass
 class Subject:
-    """Objects that are measured as one, their vertices one after the other.
+    """Objects that are measured as one, with concatenated vertices.
 
-    stamp  what `measured` was worked out from
-    rest   world points at rest, and what they were made from
-    under_other  the same frame under the method that distances are measured to, once somebody asked
+    stamp        the inputs of `measured`
+    rest         world points at rest, with their inputs in rest_made_from
+    under_other  the measures of the same frame under the method that distances are measured to, once needed
     """
 
     parts: list[Part]
@@ -59,7 +60,7 @@ class Subject:
     under_other: Measured | None = None
 
     def split(self, values: np.ndarray) -> list[np.ndarray]:
-        """Values of all vertices, for each object its own."""
+        """Splits values of all vertices by object."""
         return np.split(values, np.cumsum([part.surface.vertex_count for part in self.parts])[:-1])
 
 
@@ -71,11 +72,12 @@ def forget() -> None:
 
 
 def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject | None:
-    """The objects with `measured` of now; the same result object where nothing differs from the last call.
+    """Returns the objects with `measured` of the current frame; the same result object where nothing differs
+    from the last call.
 
     other  the method that distances are measured to
 
-    None where there is nothing to measure, or a mesh and its shape have other vertices for a moment.
+    None where there is nothing to measure, or where a mesh and its shape momentarily have different vertices.
     """
     key = tuple(obj.session_uid for obj, _skinned in pairs)
     subject = _subjects.pop(key, None)
@@ -108,17 +110,17 @@ def measure(pairs: Pairs, other: str, depsgraph: bpy.types.Depsgraph) -> Subject
 
 
 def measured_under(subject: Subject, method: str, depsgraph: bpy.types.Depsgraph) -> Measured:
-    """Of the frame that measure() was called for last, by another method; distances are to the shape that is
-    shown."""
+    """Measures the frame of the last call of measure() under another method; distances are to the current
+    shape."""
     worlds = [_world(part.obj, depsgraph) for part in subject.parts]
     shape = _in_world([_Other.of(part, method).points() for part in subject.parts], worlds)
     return subject.gauge.measure(shape, subject.measured.shape.points.T)
 
 
 def measured_under_other(subject: Subject, other: str, depsgraph: bpy.types.Depsgraph) -> Measured | None:
-    """As measured_under(), worked out once for a frame; None where all of it is shown by this method.
+    """Like measured_under(), computed once per frame; None where everything is shown under this method.
 
-    other  as it was given to measure()
+    other  as given to measure()
     """
     shown = [frame for part in subject.parts for frame in part.skinned.shown.frames if frame is not None]
     if all(frame.method == other and not frame.mix for frame in shown):
@@ -133,7 +135,7 @@ def _is_current(part: Part, pair: tuple[bpy.types.Object, SkinnedObject]) -> boo
 
 
 def _read(pairs: Pairs, depsgraph: bpy.types.Depsgraph, old: Subject | None) -> Subject | None:
-    """Reads topology and weights; keeps the old gauge where they came out the same."""
+    """Reads topology and weights; keeps the old gauge where they are unchanged."""
     parts = []
     for obj, skinned in pairs:
         mesh = (
@@ -176,20 +178,20 @@ def _is_alike(part: Part, known: Part) -> bool:
 
 
 def _space(part: Part, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """The object's space to armature space."""
+    """From the object's space to armature space."""
     frame = part.skinned.shown.frames[0]
     if frame is not None:
         return frame.bones_from_model
     armature = properties.of(part.obj).armature
     if armature is None:
-        # Deleted: others deform the mesh.
+        # It was deleted, and other armatures deform the mesh.
         return np.identity(4)
     space = armature_io.bones_from_model(part.obj.evaluated_get(depsgraph), armature.evaluated_get(depsgraph))
     return np.identity(4) if space is None else space
 
 
 def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
-    """What each Armature modifier would do itself, where that is asked for."""
+    """Returns the methods of the Armature modifiers themselves, if `other` is Blender."""
     if other != properties.BLENDER:
         return ()
     return tuple(attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj))
@@ -197,7 +199,7 @@ def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
 
 @dataclass
 class _Other:
-    """An object's shape of now under another method, deformed only where it is asked for."""
+    """An object's current shape under another method, deformed only when needed."""
 
     skin_stack: SkinStack
     rest_points: np.ndarray
@@ -225,7 +227,7 @@ class _Other:
 
 
 def _bring_rest(subject: Subject, worlds: list[np.ndarray]) -> None:
-    """Brings the world points at rest up to date; the same array where nothing moved them."""
+    """Updates the world points at rest; the same array where nothing moved them."""
     shapes = [part.skinned.shown.rest_points for part in subject.parts]
     if subject.rest_made_from:
         known_shapes, known_worlds = subject.rest_made_from
@@ -243,20 +245,20 @@ def _frame_of_rig(subject: Subject, armatures: list[np.ndarray]) -> FrameOfRig:
         posed = at_rest if frame is None else armature @ frame.pose
         rest_axes.append(bone_axes(bones, at_rest))
         posed_axes.append(bone_axes(bones, posed))
-        # An armature of no size moves nothing that could be measured.
+        # An armature of zero scale moves nothing that could be measured.
         motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
     return FrameOfRig(subject.rest, *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
 
 def _world(obj: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """The identity for an armature that was deleted: its bones are none."""
+    """Returns the world matrix; the identity for a deleted armature, which has no bones."""
     if obj is None:
         return np.identity(4)
     return np.array(obj.evaluated_get(depsgraph).matrix_world, dtype=np.float64)
 
 
 def _in_world(shapes: Sequence[np.ndarray], worlds: Sequence[np.ndarray]) -> np.ndarray:
-    """float64 [vertices of all, 3], in memory axis by axis, as measuring wants it."""
+    """float64 [vertices of all, 3], stored axis by axis, as measuring needs them."""
     return np.concatenate(
         [
             np.ascontiguousarray(shape.T, dtype=np.float64)

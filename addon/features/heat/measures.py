@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is measured in a scene, and how a heat map's colours stand for it: settings, in the .blend file."""
+"""The settings of measures and heat maps, stored in the scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PER_FRAME, FIXED = "FRAME", "FIXED"
 
 
 class Listener:
-    """Who hears of changed settings; set on registration."""
+    """The function that is called when settings change; set on registration."""
 
     changed: Callable[[bpy.types.Context], None] | None = None
 
@@ -27,7 +27,7 @@ def _changed(_settings: SinewMeasures, context: bpy.types.Context) -> None:
 
 
 class SinewMeasures(bpy.types.PropertyGroup):
-    """Of a scene: its meshes share one range and one legend."""
+    """Settings of a scene: its meshes share one range and one legend."""
 
     quantity: bpy.props.EnumProperty(
         name="Measure",
@@ -90,18 +90,18 @@ class SinewMeasures(bpy.types.PropertyGroup):
 
     @property
     def end(self) -> str:
-        """The setting that a fixed range ends at; empty where it needs none."""
+        """The setting with the end of a fixed range; empty for measures that need none."""
         return {"length": "length", "ratio": "ratio", "share": ""}[self.metric.unit]
 
     def fix(self, scale: HeatScale) -> None:
-        """The range of a scale from now on."""
+        """Fixes the range to that of a scale."""
         if self.end:
             setattr(self, self.end, scale.high)
         self.range = FIXED
 
 
 def of(scene: bpy.types.Scene) -> SinewMeasures:
-    """Asking makes them, in a scene that had none."""
+    """Reading them makes them, in a scene that had none."""
     return scene.sinew_measures
 
 
@@ -115,7 +115,7 @@ CLASSES = (SinewMeasures,)
 
 def register() -> None:
     bpy.types.Scene.sinew_measures = bpy.props.PointerProperty(type=SinewMeasures)
-    # Beside them, as unlike them it is asked for in files without anything of Sinew's.
+    # Not in that group, as this setting is also read in files without anything of Sinew's.
     bpy.types.Scene.sinew_most_influences = bpy.props.IntProperty(
         name="Most Influences",
         description="How many bones may move a vertex before it is reported",
@@ -124,7 +124,7 @@ def register() -> None:
         soft_max=8,
         options=set(),
     )
-    # What the artist had while a heat map is shown, to be given back.
+    # The artist's settings while a heat map is shown, to be restored.
     bpy.types.Mesh.sinew_active_colour = bpy.props.StringProperty(options={"HIDDEN"})
     bpy.types.Screen.sinew_colour_types = bpy.props.StringProperty(options={"HIDDEN"})
 

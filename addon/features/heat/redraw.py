@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps numbers in the sidebar up to date where Blender would not draw it again, as on playback."""
+"""Keeps numbers in the sidebar up to date where Blender would not redraw it, as in playback."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import bpy
 
 from ...attach.updates import is_rendering_in_window
 
-# A panel that shows numbers was drawn since they last changed: it is open.
+# A panel with numbers was drawn since they last changed, so it is open.
 wanted = False
 
 
 def request() -> None:
-    """The numbers have changed."""
+    """Redraws the sidebar after the numbers have changed."""
     global wanted
     if not wanted or is_rendering_in_window():
         return

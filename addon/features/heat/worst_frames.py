@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Goes through frames for those at which a measure is worst, and for the range that holds all its values."""
+"""Goes through frames to find those where a measure is worst, and the range of all its values."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class Scan:
-    """What was found.
+    """The result of going through frames.
 
-    frames  each with how bad it is, by the entry `metric.worst` of a summary
-    scale   wide enough for all of them
-    methods what the objects were deformed with
+    frames   each with its badness, by the entry `metric.worst` of a summary
+    scale    a range that covers all of them
+    methods  the objects' methods
     """
 
     metric: Metric
@@ -36,13 +36,13 @@ class Scan:
     diagonal: float
 
     def worst(self, count: int = SHOWN) -> list[tuple[float, float]]:
-        """At most `count` frames and values, the worst first; none that are rounding."""
+        """Returns at most `count` frames and values, the worst first, without rounding errors."""
         least = ROUNDING * (self.diagonal if self.metric.worst in LENGTHS else 1.0)
         chosen = peaks([value for _frame, value in self.frames], count)
         return [self.frames[place] for place in chosen if self.frames[place][1] > least]
 
 
-# By the session_uid of the scene: found anew in no time, and no part of the file.
+# By the session_uid of the scene. Quickly computed again, so not stored in the file.
 scans: dict[int, Scan] = {}
 
 
@@ -51,7 +51,7 @@ def armatures_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def check_measurable(objects: Sequence[bpy.types.Object]) -> None:
-    """Raises SinewError for one that Sinew does not deform now."""
+    """Raises SinewError for an object that Sinew does not deform now."""
     for obj in objects:
         if not properties.of(obj).enabled or obj.mode == "EDIT":
             raise SinewError(
@@ -62,7 +62,8 @@ def check_measurable(objects: Sequence[bpy.types.Object]) -> None:
 def measure_at(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], other: str, frame: float
 ) -> tuple[live.Subject, bpy.types.Depsgraph]:
-    """Goes to the frame and measures there, as live.measure(). Raises SinewError where nothing is."""
+    """Goes to the frame and measures there, as live.measure(). Raises SinewError where there is nothing to
+    measure."""
     evaluate.set_frame(scene, frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     subject = live.measure(session.states_of(objects, depsgraph), other, depsgraph)
@@ -74,9 +75,9 @@ def measure_at(
 def scan(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], quantity: str, other: str, over: str
 ) -> Iterator[float]:
-    """Yields the share that is done; then scans[scene.session_uid] has the result.
+    """Yields the progress; then scans[scene.session_uid] has the result.
 
-    Raises SinewError where an object can not be measured.
+    Raises SinewError where an object cannot be measured.
     """
     check_measurable(objects)
     armatures, metric, found = armatures_of(objects), METRICS[quantity], []

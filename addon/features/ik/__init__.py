@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones brought to where Blender's IK constraints want them, by Sinew's solver."""
+"""Solves Blender's IK constraints with Sinew's solver."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of inverse kinematics: classes, what a bake and live trees remember, and events."""
+"""Registers inverse kinematics: classes, what bakes and live trees store, and handlers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def register() -> None:
 
 def unregister() -> None:
     ik_handlers.unsubscribe()
-    ik_handlers.let_go()
+    ik_handlers.detach_all()
     ik_in_depsgraph.unregister()
     ik_records.unregister()
     ik_bake.unregister()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sinew's inverse kinematics as plain keys in an action of their own, which plays without Sinew, in the place
-of Blender's constraints; and back."""
+"""Bakes Sinew's inverse kinematics to plain keys in a separate action, which plays without Sinew, in place of
+Blender's constraints; and restores these."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class SinewIkBake(bpy.types.PropertyGroup):
     is_on: bpy.props.BoolProperty(description="Whether keys of Sinew IK play")
     before: bpy.props.PointerProperty(type=bpy.types.Action, description="The action before the bake")
     baked: bpy.props.PointerProperty(type=bpy.types.Action, description="The action with the baked keys")
-    # JSON: [bone, constraint] of each; by bone, as pose_io.read_channels() has them.
+    # JSON: a list of [bone, constraint]; and channels by bone, as from pose_io.read_channels().
     muted: bpy.props.StringProperty(description="The IK constraints that the bake muted")
     channels: bpy.props.StringProperty(description="The pose before the bake")
 
 
 @dataclass
 class Baked:
-    """What a bake found of a tree: `errors` [frames], of the tips, in lengths of the chain."""
+    """The result of baking a tree: `errors` [frames], of the tips, in lengths of the chain."""
 
     tree: core.Tree
     solution: core.ik.Solution
@@ -61,12 +61,12 @@ def steps(
     method: core.ik.Method,
     found: list[Baked],
 ) -> Iterator[float]:
-    """Bakes trees, nearest to the root first: yields the share that is done. At the end the armature plays a
-    copy of its action with keys of the bones' rotations at every frame, straight between them, and the
-    constraints are muted; what has keys at other frames keeps them. Closed before the end, all is as it was.
+    """Bakes trees, those nearest to the root first; yields the progress.
 
-    The caller keeps the scene's frame, and suspends what is live (ik_live): baked, it no longer is. Raises
-    SinewError where the armature can not be keyed.
+    At the end the armature plays a copy of its action with keys of the bones' rotations at every frame, with
+    linear interpolation, and the constraints are muted; keys at other frames stay. If closed before the end,
+    everything is as before. The caller restores the scene's frame, and suspends live trees (ik_live): baked
+    ones are not live any more. Raises SinewError where the armature cannot be keyed.
     """
     _check(armature, trees)
     record = armature.sinew_ik_bake
@@ -112,7 +112,7 @@ def steps(
 
 
 def restore(armature: bpy.types.Object) -> None:
-    """Gives back what steps() replaced: the action, the poses that it did not key, the constraints."""
+    """Restores what steps() replaced: the action, the poses that it did not key, the constraints."""
     record = armature.sinew_ik_bake
     baked, animation = record.baked, armature.animation_data
     if animation is not None and (animation.action == baked or baked is None):
@@ -152,7 +152,7 @@ def _check(armature: bpy.types.Object, trees: Sequence[core.Tree]) -> None:
 def _own_action(
     armature: bpy.types.Object, action: bpy.types.Action | None, handle: int
 ) -> bpy.types.Action | None:
-    """A copy of the action that the armature plays from now on; None where it has none, as the first key
+    """Makes the armature play a copy of the action, and returns it; None where it has none, as the first key
     makes one."""
     if action is None:
         return None
@@ -206,7 +206,7 @@ def _write_keys(
         near = pose_io.channels_of(pose_io.Poses(rigid, scale), mode, near)
         values[number] = near[0]
     path = pose_io.ROTATION_PROPERTIES.get(bone.rotation_mode, "rotation_euler")
-    # Makes the action, its slot and the curves, as each version has them.
+    # Makes the action, its slot and the curves in each version's way.
     bone.keyframe_insert(path, frame=frames[0], group=name)
     animation = armature.animation_data
     for curve, channel in actions.bone_curves(animation.action, actions.slot_of(animation))[name]:
@@ -215,7 +215,7 @@ def _write_keys(
 
 
 def _replace_keys(curve: bpy.types.FCurve, frames: Sequence[int], values: np.ndarray) -> None:
-    """Keys at `frames` in the place of all between the first and the last of them; those outside stay."""
+    """Replaces all keys from the first to the last of `frames` by keys at `frames`; those outside stay."""
     points = curve.keyframe_points
     for point in reversed([point for point in points if frames[0] <= point.co.x <= frames[-1]]):
         points.remove(point, fast=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What neither a bake nor live inverse kinematics can keep."""
+"""Checks for what neither a bake nor live inverse kinematics can keep."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's inverse kinematics and Sinew's, measured on the same bones and frames."""
+"""Measures Blender's inverse kinematics and Sinew's on the same bones and frames."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ TURNS, UPDATES = 7, 20
 
 @dataclass(frozen=True)
 class Measured:
-    """One solver on one tree.
+    """The result of one solver for one tree.
 
     errors        [frames], of the tips, in lengths of the chain
     acceleration  core.angular_acceleration()
-    iterations    their mean; NaN where the solver does not tell
-    microseconds  of one solve: the median over turns, and half the range of the middle half of them
+    iterations    their mean; NaN where the solver does not report them
+    microseconds  of one solve: the median of several runs, and half their interquartile range
     """
 
     solver: str
@@ -45,9 +45,9 @@ def measure(
     methods: Sequence[core.ik.Method],
     progress: Callable[[float], None] = lambda _part: None,
 ) -> list[Measured]:
-    """Blender's solver first, then `methods`. Blender's time is that of an update with the constraints less
-    that without them, by turns; it holds what Blender does for a constraint besides. All times are the
-    processor's. The caller keeps the frame."""
+    """Measures Blender's solver first, then `methods`. Blender's time is that of an update with the
+    constraints minus one without them, alternately; it includes Blender's other work for a constraint. All
+    times are processor time. The caller restores the frame."""
     scene = bpy.context.scene
     theirs, posed = [], []
     for number, frame in enumerate(frames):
@@ -108,7 +108,7 @@ def _time_of(work: Callable[[], object], count: int) -> tuple[float, float]:
 
 def _time_of_blender(armature: bpy.types.Object, tree: core.Tree) -> tuple[float, float]:
     def update() -> float:
-        # The first one builds relations anew.
+        # The first update rebuilds the relations.
         bpy.context.view_layer.update()
         began = time.process_time()
         for _update in range(UPDATES):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When what is solved live is put on and taken off: changed settings, undo, loading and saving. Nothing here
-acts at a change of frame but to say that something failed."""
+"""Attaches and detaches live trees: on changed settings, undo, loading and saving. At a change of frame it
+only reports failures."""
 
 from __future__ import annotations
 
@@ -59,19 +59,19 @@ def _note_problems() -> None:
 
 
 def _may_change() -> bool:
-    """The thread of a render in a window reads what the main one would change."""
+    """Not on other threads: the thread of a render in a window reads what the main one would change."""
     return is_main_thread() and not is_rendering_in_window() and not _State.is_saving
 
 
 class _State:
     is_saving = False
-    # Ends what a save began.
+    # Contexts of the running save, closed after it.
     out_of_the_file = ExitStack()
 
 
 @persistent
 def before_undo(*_args: object) -> None:
-    ik_live.let_go()
+    ik_live.remove_unrecorded()
 
 
 @persistent
@@ -90,7 +90,7 @@ def on_undone(*_args: object) -> None:
 @persistent
 def on_loaded(*_args: object) -> None:
     on_data_new()
-    # Blender makes the file's first step of undo after this.
+    # Blender makes the file's first undo step after this.
     ik_live.note_step()
 
 
@@ -136,8 +136,8 @@ def adopt_open_file() -> None:
         on_data_new()
 
 
-def let_go() -> None:
-    """Blender's constraints play, as in a saved file."""
+def detach_all() -> None:
+    """Detaches all live trees: Blender's constraints play, as in a saved file."""
     for armature in list(_armatures()):
         ik_live.detach(armature)
         ik_live.remove_followers(armature)

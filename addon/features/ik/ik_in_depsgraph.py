@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trees of bones solved within Blender's own evaluation: a follower's driver asks for it, after all that a
+"""Solves trees of bones within Blender's evaluation: a follower's driver requests it, after everything that a
 tree depends on and before the bones that follow.
 
-Blender evaluates on many threads, and for a render beside the window: only evaluated data is read and
-written. Each dependency graph has its own follower, and nothing is kept from one evaluation to the next but
-the solver of a tree, which holds no pose.
+Blender evaluates on many threads, and renders beside the window, so only evaluated data is read and written.
+Each dependency graph has its own follower, and nothing is kept between evaluations except a tree's solver,
+which stores no pose.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .ik_records import Listener, live_constraints
 
 log = logging.getLogger(__name__)
 
-# By the name of an armature object, why its trees could not be solved. Threads add to it; handlers empty it.
+# Why an armature object's trees could not be solved, by its name. Threads add to it; handlers empty it.
 problems: dict[str, str] = {}
 
 
@@ -37,11 +37,11 @@ class _Known:
 
 
 class _Thread(threading.local):
-    """Keeps Python's state of each of Blender's threads, which takes long to make anew each time."""
+    """Keeps the Python thread state of each of Blender's threads, as making it takes long."""
 
     def __init__(self) -> None:
         sinew.keep_thread_state()
-        # By the follower's name and what pulls: one of each thread, as a solver has one user at a time.
+        # By the follower's name and the constraints. One for each thread, as a solver has one user at a time.
         self.known: dict[tuple[str, str], _Known] = {}
 
 
@@ -51,16 +51,16 @@ _thread = _Thread()
 def requested(follower: bpy.types.Object, root: str, constraints: str) -> None:
     """Solves the tree of an evaluated follower."""
     if not follower.is_evaluated:
-        # Somebody else reads the property.
+        # Something other than the driver reads the property.
         return
-    # Evaluated, as the follower is.
+    # The driver's target is evaluated, as the follower is.
     armature = follower.animation_data.drivers[0].driver.variables[0].targets[0].id
     if armature is None or armature.pose is None:
         return
     try:
         one_frame = _one_frame_of(follower, armature, root, constraints)
     except SinewError:
-        # Changed since it was put on, which the handler of this update sees, too.
+        # It has changed since it was attached; the handler of this update notices that, too.
         return
     settings, bones = armature.sinew_ik, one_frame.tree.bones
     try:
@@ -95,8 +95,8 @@ def _write(
     bones: tuple[str, ...],
     rotations: np.ndarray | None,
 ) -> None:
-    """Into the follower's channels; without rotations, the bones' own. By foreach_set(), as an assignment
-    would tell Blender that a file has changed."""
+    """Writes rotations to the follower's channels; without rotations, the bones' own. By foreach_set(), as an
+    assignment would tell Blender that the file has changed."""
     for number, name in enumerate(bones):
         own, channels = armature.pose.bones.get(name), follower.pose.bones.get(name)
         if own is None or channels is None:

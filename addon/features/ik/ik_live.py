@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trees of bones that Sinew solves live, in the place of Blender's IK constraints.
+"""Trees of bones that Sinew solves live, in place of Blender's IK constraints.
 
-Of each such tree there is a follower: an armature object with the same bones, in no scene, as bones wait for
-other objects' bones but not for what is computed of their own channels. One of each tree, as where Blender
-evaluates one driver of an object it evaluates them all.
+Each such tree has a follower: an armature object with the same bones, in no scene. It is needed as bones can
+depend on other objects' bones, but not on what is computed from their own channels. Each tree has its own, as
+Blender evaluates all drivers of an object where it evaluates one.
+- A driver of the follower depends on everything that the tree's pose depends on: its bones' own channels, the
+  tree's parent bone, targets and poles. Its last variable reads a property whose getter solves the tree
+  (ik_in_depsgraph) and writes the follower's channels.
+- Each bone copies its pose from the follower's by a constraint, so children, meshes and renders get it in the
+  same evaluation.
+- Blender's constraints are muted. Their settings still define the problem.
 
-- A driver of the follower depends on all that the tree's pose does: its bones' own channels, what is above
-  them, targets and poles. Its last variable reads a property whose getter solves the tree (ik_in_depsgraph)
-  and writes the follower's channels;
-- each bone copies its pose from the follower's by a constraint, so children, meshes and renders see it in the
-  same evaluation;
-- Blender's constraints are muted. Their settings stay what decides.
-
-That is all of Blender's own graph: no handler acts at a change of frame. A saved file has none of it, and
-Blender's constraints play; which of them are Sinew's stays at the bones (ik_records).
+All this is part of Blender's own graph: no handler acts at a change of frame. A saved file has none of it,
+and Blender's constraints play; the bones store which of them Sinew solves (ik_records).
 """
 
 from __future__ import annotations
@@ -39,15 +38,15 @@ class _Session:
     """What is known of armatures, by their session_uid."""
 
     def __init__(self) -> None:
-        # The trees, and what _state() said of them.
+        # The trees, and the result of _state() for them.
         self.attached: dict[int, tuple[list[core.Tree], list]] = {}
-        # Why constraints that are Sinew's are not solved live; until the settings change, or for good.
+        # Why constraints that Sinew should solve are not solved live; until the settings change, or for good.
         self.problems: dict[int, str] = {}
         self.failed: set[int] = set()
         self.suspended: set[int] = set()
-        # Whose follower was made or changed since Blender's last step of undo, and is so in none.
+        # Armatures whose follower was made or changed since Blender's last undo step, so that no step has it.
         self.in_no_step: set[int] = set()
-        # The followers that there were before a step of undo.
+        # The followers that existed before an undo step.
         self.before_step: set[int] = set()
 
 
@@ -55,19 +54,20 @@ _session = _Session()
 
 
 def is_live(armature: bpy.types.Object) -> bool:
-    """Whether it is switched on for any tree, at work or not."""
+    """Whether it is switched on for any tree, even if it does not work now."""
     return armature.type == "ARMATURE" and bool(live_constraints(armature))
 
 
 def problem_of(armature: bpy.types.Object) -> str:
-    """Why Blender's constraints play where Sinew is switched on, in one sentence; else empty."""
+    """Returns why Blender's constraints play although Sinew is switched on, in one sentence; otherwise ""."""
     if not is_live(armature):
         return ""
     return SAFE_MODE if safe_mode.is_on() else _session.problems.get(armature.session_uid, "")
 
 
 def switch_on(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[core.Tree]:
-    """Solves the trees of these bones live from now on, or all. Raises SinewError where that can not be."""
+    """Solves the trees of these bones, or all, live from now on. Raises SinewError where that is not
+    possible."""
     live = live_constraints(armature)
     trees = ik_io.read_trees(armature, only, live)
     check(armature, trees)
@@ -83,8 +83,8 @@ def switch_on(armature: bpy.types.Object, only: Collection[str] | None = None) -
 
 
 def switch_off(armature: bpy.types.Object, only: Collection[str] | None = None) -> None:
-    """Blender's constraints play again, of the trees of these bones or of all; with the last tree goes all
-    that was made for it."""
+    """Lets Blender's constraints play again, for the trees of these bones or for all; with the last tree,
+    everything made for it is removed."""
     live = live_constraints(armature)
     detach(armature)
     try:
@@ -105,7 +105,7 @@ def switch_off(armature: bpy.types.Object, only: Collection[str] | None = None) 
 
 @contextmanager
 def suspended(armature: bpy.types.Object) -> Iterator[None]:
-    """Inside, Blender's constraints play, as if nothing were live."""
+    """Context in which Blender's constraints play, as if nothing were live."""
     uid = armature.session_uid
     _session.suspended.add(uid)
     detach(armature)
@@ -117,14 +117,14 @@ def suspended(armature: bpy.types.Object) -> Iterator[None]:
 
 
 def forget() -> None:
-    """What was known of the file's objects."""
+    """Forgets what was known of the file's objects."""
     _session.attached.clear()
     _session.problems.clear()
     _session.failed.clear()
 
 
-def let_go() -> None:
-    """Before undo: what is in no step of it must not be referred to (references)."""
+def remove_unrecorded() -> None:
+    """Called before undo: removes references to what is in no undo step (references)."""
     for armature in [obj for obj in bpy.data.objects if obj.session_uid in _session.in_no_step]:
         detach(armature)
         remove_followers(armature)
@@ -133,27 +133,28 @@ def let_go() -> None:
 
 
 def remove_returned() -> None:
-    """After undo: those that it brought back. A view layer that was not shown goes on with its evaluated copy
-    of the one that was deleted, which writes to bones that are gone (4.2 to 5.2). sync() makes others."""
+    """Called after undo: removes followers that it restored. A view layer that was not shown would use its
+    evaluated copy of the deleted follower, which writes to bones that are gone (4.2 to 5.2). sync() makes new
+    ones."""
     for follower in _all_followers():
         if follower.session_uid not in _session.before_step:
             _remove(follower)
 
 
 def note_step() -> None:
-    """All that there is will be in the next step of undo."""
+    """Notes that everything that exists now will be in the next undo step."""
     _session.in_no_step.clear()
 
 
 def fail(armature: bpy.types.Object, text: str) -> None:
-    """It could not be solved: Blender's constraints play until it is switched on anew."""
+    """Notes that it could not be solved: Blender's constraints play until it is switched on again."""
     _session.failed.add(armature.session_uid)
     _session.problems[armature.session_uid] = text
     detach(armature)
 
 
 def check(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
-    """Raises SinewError for what can not be solved live."""
+    """Raises SinewError for what cannot be solved live."""
     if not armature.is_editable:
         raise SinewError(f"{armature.name} is linked: only in its own file is inverse kinematics live")
     if armature.override_library is not None:
@@ -180,7 +181,7 @@ def check(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
 
 
 def check_apart(trees: list[core.Tree]) -> None:
-    """Raises SinewError where trees have a bone in common: it can follow one."""
+    """Raises SinewError where trees share a bone, as it can follow only one."""
     roots: dict[str, str] = {}
     for tree in trees:
         for bone in tree.bones:
@@ -192,7 +193,7 @@ def check_apart(trees: list[core.Tree]) -> None:
 
 
 def sync(armature: bpy.types.Object) -> None:
-    """Makes an armature's constraints and its follower agree with what is switched on."""
+    """Updates an armature's constraints and its followers to what is switched on."""
     uid = armature.session_uid
     trees, state = _session.attached.get(uid, ([], []))
     if trees and not safe_mode.is_on() and _state(armature, trees) == state:
@@ -219,7 +220,7 @@ def sync(armature: bpy.types.Object) -> None:
 
 
 def detach(armature: bpy.types.Object) -> None:
-    """Blender's constraints play; the follower stays, without users."""
+    """Lets Blender's constraints play; the followers stay, without users."""
     _session.attached.pop(armature.session_uid, None)
     if armature.pose is None or not armature.is_editable:
         return
@@ -233,7 +234,7 @@ def detach(armature: bpy.types.Object) -> None:
 
 
 def remove_followers(armature: bpy.types.Object | None, but: Collection[bpy.types.Object] = ()) -> None:
-    """Of an armature; None: those whose armature is gone."""
+    """Removes the followers of an armature; None: those whose armature is gone."""
     for follower in [each for each in _followers(armature) if each not in but]:
         _remove(follower)
 
@@ -247,7 +248,7 @@ def _remove(follower: bpy.types.Object) -> None:
 
 @contextmanager
 def out_of_the_file() -> Iterator[None]:
-    """Inside, Blender can save: nothing of followers is written, as neither they nor their bones have a
+    """Context in which Blender can save: followers are not written, as neither they nor their bones have a
     user."""
     remove_followers(None)
     bones = {}
@@ -264,8 +265,8 @@ def out_of_the_file() -> Iterator[None]:
 
 
 def _drop_what_the_artist_switched_off(armature: bpy.types.Object) -> None:
-    """A constraint that is deleted, or on while Sinew solves it, or off while Sinew does not, is Blender's
-    again. One that was renamed is still meant."""
+    """Gives constraints back to Blender that are deleted, unmuted while Sinew solves them, or muted while it
+    does not. A renamed one is still recognised."""
     for bone, name in live_constraints(armature).items():
         owner = armature.pose.bones[bone]
         constraint = owner.constraints.get(name)
@@ -281,7 +282,7 @@ def _drop_what_the_artist_switched_off(armature: bpy.types.Object) -> None:
 
 
 def _state(armature: bpy.types.Object, trees: list[core.Tree]) -> list:
-    """Changes with all that _attach() depends on and with what it makes; empty where a bone is gone."""
+    """Changes with everything that _attach() depends on and makes; empty where a bone is gone."""
     state: list[object] = []
     bones = armature.pose.bones
     for tree in trees:
@@ -316,23 +317,24 @@ def _attach(armature: bpy.types.Object, trees: list[core.Tree]) -> None:
             constraint = armature.pose.bones[name].constraints.new("COPY_TRANSFORMS")
             constraint.name = ik_io.FOLLOWS
             constraint.target, constraint.subtarget = follower, name
-            # By the channels, so that each bone inherits from its own parent as it always does.
+            # Through the channels, so that each bone inherits from its own parent as usual.
             constraint.owner_space = constraint.target_space = "LOCAL"
         ik_io.set_muted(armature, tree.constraints, True)
     remove_followers(armature, but=followers)
 
 
 def _add_driver(follower: bpy.types.Object, armature: bpy.types.Object, tree: core.Tree) -> None:
-    """Of a property of the follower's root bone that means nothing: so all below is posed after it."""
+    """Adds the driver to an unused property of the follower's root bone: everything below is posed after
+    it."""
     follower.animation_data_clear()
     curve = follower.driver_add(f"{_path(tree.bones[0])}.ik_stretch")
-    # Its value is 0, whatever the variables are.
+    # The modifier maps any value of the variables to 0.
     curve.modifiers.new("GENERATOR").coefficients.foreach_set((0.0, 0.0))
     curve.driver.type = "SUM"
     curve.driver.expression = ""
     reads = [(armature, "matrix_world[0][0]")]
     owners = [bone for bone, _name in tree.constraints if bone not in tree.bones]
-    # What is read of a bone's channels waits for keys and drivers of the bone and of its constraints.
+    # Reading a bone's channel waits for keys and drivers of the bone and of its constraints.
     reads += [(armature, f"{_path(name)}.location[0]") for name in (*tree.bones, *owners)]
     above = armature.pose.bones[tree.bones[0]].parent
     if above is not None:
@@ -346,7 +348,7 @@ def _add_driver(follower: bpy.types.Object, armature: bpy.types.Object, tree: co
                 reads.append((target, "matrix_world[0][0]"))
                 if target.type == "ARMATURE" and part in target.pose.bones:
                     reads.append((target, f"{_path(part)}.matrix[0][0]"))
-    # Whatever has Blender pose the follower anew has it solved anew.
+    # Whenever Blender poses the follower again, the tree is solved again.
     reads += [(follower, f"{_path(name)}.location[0]") for name in tree.bones[1:]]
     reads.append((follower, "sinew_ik_follower.request"))
     for number, (obj, path) in enumerate(dict.fromkeys(reads)):
@@ -361,7 +363,7 @@ def _path(bone: str) -> str:
 
 
 def _follower_of(armature: bpy.types.Object, tree: core.Tree) -> bpy.types.Object:
-    """The one that there is, where it has these bones; else a new one."""
+    """Returns the existing follower, if it has these bones; otherwise a new one."""
     root, data = tree.bones[0], None
     for follower in _followers(armature):
         if set(tree.bones) <= set(follower.data.bones.keys()):
@@ -371,11 +373,11 @@ def _follower_of(armature: bpy.types.Object, tree: core.Tree) -> bpy.types.Objec
     name = f"{armature.name} {root} {ik_io.FOLLOWS}"
     follower = bpy.data.objects.new(name, armature.data)
     if data is None:
-        # The artist's own would have a second user.
+        # With the artist's own armature data, that would have a second user.
         data = armature.data.copy()
         data.name = name
         data.animation_data_clear()
-    # By an assignment, which makes bones to be posed.
+    # Assigning the data makes its pose bones.
     follower.data = data
     follower.sinew_ik_is_follower = True
     follower.sinew_ik_follower.root = root
@@ -383,7 +385,7 @@ def _follower_of(armature: bpy.types.Object, tree: core.Tree) -> bpy.types.Objec
 
 
 def _followers(armature: bpy.types.Object | None) -> list[bpy.types.Object]:
-    """Of an armature; None: of those that are gone."""
+    """Returns the followers of an armature; None: those whose armature is gone."""
     return [follower for follower in _all_followers() if _followed_by(follower) == armature]
 
 

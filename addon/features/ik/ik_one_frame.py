@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A tree at one frame, within Blender's evaluation.
 
-core.ik does it for any bones and many frames at once, and its arrays cost a frame a millisecond of Python.
-Bones that inherit rotation and even scale, as nearly all do, need little of it: what the solver takes and
-gives are then their own channels.
+core.ik solves any bones and many frames at once, and its arrays take a millisecond of Python per frame. Bones
+that inherit rotation and uniform scale, as nearly all do, need little of that: the solver's inputs and
+outputs are then their own channels.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from sinew import affine
 from ...core import ik as core
 from ...io import ik_io
 
-# How even a scale is, relative to its size.
+# Tolerance of a uniform scale, relative to its size.
 _EVEN = 1e-5
 
 
 class OneFrame:
-    """Of an evaluated armature's tree; it keeps nothing of a frame. One thread at a time uses it."""
+    """Solves an evaluated armature's tree; keeps nothing of a frame. Only one thread at a time may use it."""
 
     def __init__(self, armature: bpy.types.Object, tree: core.Tree) -> None:
         self.tree = tree
@@ -44,14 +44,14 @@ class OneFrame:
 
     def solve(self, armature: bpy.types.Object, method: core.ik.Method, iterations: int) -> np.ndarray:
         """[bones, 4]: the rotations of the bones' channels. Raises SinewError for mirrored bones, and where a
-        target can not be read."""
+        target cannot be read."""
         found = self._solve_plain(armature, method, iterations) if self._inherits_all else None
         return self._solve_any(armature, method, iterations) if found is None else found
 
     def _solve_plain(
         self, armature: bpy.types.Object, method: core.ik.Method, iterations: int
     ) -> np.ndarray | None:
-        """None where a scale is uneven or below 0."""
+        """Returns None where a scale is not uniform or negative."""
         tree, pose = self.tree, armature.pose.bones
         above = pose[tree.bones[0]].parent
         before = above.matrix if above is not None else Matrix()

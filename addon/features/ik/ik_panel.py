@@ -20,7 +20,8 @@ from .ik_records import live_constraints
 
 
 def _selected(armature: bpy.types.Object) -> list[str] | None:
-    """The bones that are selected in pose mode; None elsewhere, and where none are: all."""
+    """Returns the bones that are selected in pose mode; None, which means all, in other modes and without a
+    selection."""
     if armature.mode != "POSE":
         return None
     # Of bones up to Blender 4.5, of pose bones since 5.0.
@@ -63,7 +64,7 @@ class SINEW_OT_bake_ik(_OnArmature, stepped.Stepped, bpy.types.Operator):
             yield from ik_bake.steps(armature, trees, frames, self.method, self._found)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
-        # The baked action has its say on the frame that the scene is at.
+        # The baked action applies at the current frame, too.
         evaluate.set_frame(context.scene, context.scene.frame_float)
         bones = sum(len(each.tree.bones) for each in self._found)
         worst = max(float(np.max(each.errors)) for each in self._found)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a file keeps of live inverse kinematics: which constraints Sinew solves, and how."""
+"""What a file stores about live inverse kinematics: which constraints Sinew solves, and how."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...core import ik as core
 
 
 class Listener:
-    """Who solves; set by ik_in_depsgraph, as records know nothing of it."""
+    """The function that solves; set by ik_in_depsgraph, which this module does not import."""
 
     requested: Callable[[bpy.types.Object, str, str], None] | None = None
 
@@ -24,7 +24,7 @@ def _requested(follower: SinewIkFollower) -> float:
 
 
 def _setting_changed(settings: SinewIkLive, _context: bpy.types.Context) -> None:
-    # Blender evaluates nothing for a property without keys.
+    # Blender evaluates nothing when a property without keys changes.
     settings.id_data.update_tag()
 
 
@@ -33,7 +33,7 @@ class SinewIkFollower(bpy.types.PropertyGroup):
 
     root: bpy.props.StringProperty(description="The tree's root bone", options={"HIDDEN"})
     constraints: bpy.props.StringProperty(description="What pulls the tree", options={"HIDDEN"})
-    # What the last variable of its driver reads.
+    # Read by the last variable of its driver.
     request: bpy.props.FloatProperty(get=_requested, options={"HIDDEN"})
 
 
@@ -65,14 +65,14 @@ CLASSES = (SinewIkFollower, SinewIkLive)
 
 
 def live_constraints(armature: bpy.types.Object) -> dict[str, str]:
-    """By bone, the name of the IK constraint that Sinew is to solve live."""
+    """Returns, by bone, the name of the IK constraint that Sinew has to solve live."""
     if not armature.sinew_ik_is_live or armature.pose is None:
         return {}
     return {bone.name: bone.sinew_ik_live for bone in armature.pose.bones if bone.sinew_ik_live}
 
 
 def register() -> None:
-    # Not in the groups below, which each object would get that is asked. The first saves reading all bones.
+    # Not in the groups below, which reading would add to each object. This flag saves reading all bones.
     bpy.types.Object.sinew_ik_is_live = bpy.props.BoolProperty(
         description="Whether Sinew solves chains of it live",
         options={"HIDDEN"},
@@ -83,7 +83,7 @@ def register() -> None:
     )
     bpy.types.Object.sinew_ik_follower = bpy.props.PointerProperty(type=SinewIkFollower)
     bpy.types.Object.sinew_ik = bpy.props.PointerProperty(type=SinewIkLive, override=properties.OVERRIDABLE)
-    # At the bone, so that it stays where bones are renamed.
+    # Stored with the bone, so that it survives renaming.
     bpy.types.PoseBone.sinew_ik_live = bpy.props.StringProperty(
         name="Live",
         description="The bone's IK constraint that Sinew solves live",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of in-betweens: classes, properties, handlers."""
+"""Registers in-betweens: classes, properties, handlers."""
 
 from __future__ import annotations
 

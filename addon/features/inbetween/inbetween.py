@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an armature object has chosen for its in-betweens, in the .blend file, and whether it can have it."""
+"""An armature object's choice of in-betweens, stored in the .blend file, and whether it is possible."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...io import actions
 
 
 class Listener:
-    """Who reacts to another choice; set on registration, as what reacts also reads it."""
+    """The function that reacts to another choice; set on registration, as it also reads the choice."""
 
     changed: Callable[[bpy.types.Object, bpy.types.Context], None] | None = None
 
@@ -24,8 +24,8 @@ def _changed(armature: bpy.types.Object, context: bpy.types.Context) -> None:
         Listener.changed(armature, context)
 
 
-# Of objects themselves, as a group that the linked file does not have is lost from a library override on
-# saving (Blender 5.0 and 5.2).
+# On objects themselves, as a library override loses a group that the linked file does not have when it is
+# saved (Blender 5.0 and 5.2).
 _PROPERTIES = {
     "sinew_inbetween": bpy.props.EnumProperty(
         name="In-betweens",
@@ -79,7 +79,7 @@ def is_on(armature: bpy.types.Object) -> bool:
 
 
 def action_of(armature: bpy.types.Object) -> tuple[bpy.types.Action | None, bpy.types.bpy_struct | None]:
-    """The action that an armature object plays, and its slot."""
+    """Returns the action that an armature object plays, and its slot."""
     animation = armature.animation_data
     if animation is None or animation.action is None:
         return None, None
@@ -87,8 +87,8 @@ def action_of(armature: bpy.types.Object) -> tuple[bpy.types.Action | None, bpy.
 
 
 def obstacle(armature: bpy.types.Object) -> str | None:
-    """Why Blender's own curves play although a method is chosen, in one sentence; None where nothing is in
-    the way."""
+    """Returns why Blender's own curves play although a method is chosen, in one sentence; None where nothing
+    prevents it."""
     animation, (action, slot) = armature.animation_data, action_of(armature)
     if animation is None or action is None:
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In-betweens as plain keys in an action of their own, which plays without Sinew."""
+"""Bakes in-betweens to plain keys in a separate action, which plays without Sinew."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from . import inbetween, keyed_poses
 
 @dataclass
 class Baked:
-    """The new action, how many bones it moves by new keys, and those of `keyed_poses.Pose.far`."""
+    """The new action, the number of bones with new keys, and the bones of `keyed_poses.Pose.far`."""
 
     action: bpy.types.Action
     bones: int
@@ -28,12 +28,13 @@ def bake(
     armature: bpy.types.Object, step: int = 1, progress: Callable[[float], None] = lambda _part: None
 ) -> Baked:
     """Copies the action that Sinew plays on `armature`, with keys at every `step` frames between its first
-    and last and straight lines between them, and plays the copy with Blender's curves.
+    and last key and linear interpolation, and plays the copy with Blender's curves.
 
     The keyed poses stay, also those between whole frames; in-betweens are keys of type Breakdown. The old
     action stays in the file.
 
-    progress  is told how much is done, 0 to 1
+    progress  called with the progress, 0 to 1
+
     Raises SinewError where Sinew makes no in-betweens.
     """
     action, slot = inbetween.action_of(armature)
@@ -69,15 +70,15 @@ def bake(
 
 
 def _times(group: keyed_poses.Group, curves: Sequence[bpy.types.FCurve], step: int) -> np.ndarray:
-    """The times of the keys that a group's bones get, float32: the frames, and the artist's keys."""
+    """Returns the times of the keys that a group's bones get, float32: the frames, and the artist's keys."""
     first, last = group.times[0], group.times[-1]
     frames = np.arange(np.ceil(first), np.floor(last) + 1, step)
-    # A curve that goes on in a straight line takes its slope from the last two keys.
-    outside = [first - 1.0, last + 1.0] if any(_goes_on(curves[n]) for n in group.curves) else []
+    # A curve with linear extrapolation takes its slope from the last two keys.
+    outside = [first - 1.0, last + 1.0] if any(_extrapolates(curves[n]) for n in group.curves) else []
     return np.unique(np.concatenate([group.times, frames, outside]).astype(np.float32))
 
 
-def _goes_on(curve: bpy.types.FCurve) -> bool:
+def _extrapolates(curve: bpy.types.FCurve) -> bool:
     return curve.extrapolation == "LINEAR" and all(modifier.mute for modifier in curve.modifiers)
 
 
@@ -87,8 +88,8 @@ def _sample(
     times: np.ndarray,
     progress: Callable[[float], None],
 ) -> tuple[np.ndarray, set[str]]:
-    """float32 [times, bones, 10]: the channels at each time, rotations written close to those before; and
-    the bones that somewhere turn far between keys."""
+    """float32 [times, bones, 10]: the channels at each time, with rotation values close to the previous ones;
+    and the bones that rotate too far between keys somewhere."""
     method, path = armature.sinew_inbetween, armature.sinew_inbetween_path
     modes = np.array([bone.rotation_mode for bone in armature.pose.bones])
     samples, far = [], set()
@@ -104,7 +105,7 @@ def _write_keys(
     curve: bpy.types.FCurve, group: keyed_poses.Group, bone: int, times: np.ndarray, values: np.ndarray
 ) -> None:
     inside = (times >= group.times[0]) & (times <= group.times[-1])
-    chosen = inside | _goes_on(curve)
+    chosen = inside | _extrapolates(curve)
     times, values = times[chosen], values[chosen]
     points = curve.keyframe_points
     points.clear()

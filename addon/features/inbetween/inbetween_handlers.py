@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's events, for in-betweens: poses the bones before each frame is evaluated.
+"""Blender's events for in-betweens: poses the bones before each frame is evaluated.
 
-Blender evaluates constraints, drivers and all that follows the bones after `frame_change_pre`, for the same
-frame; it calls that at the sub-frames of a motion-blurred render, too.
+Blender evaluates constraints, drivers and everything else that follows the bones after `frame_change_pre`,
+for the same frame; it calls that at the sub-frames of a motion-blurred render, too.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ log = logging.getLogger("sinew")
 
 @dataclass
 class Player:
-    """An armature whose action is held, and what it was given last.
+    """An armature whose action is held, and its last pose.
 
-    left   its bones that Blender's curves play, and why
+    left   bones that Blender's curves play, each with the reason
     keyed  its keyed poses, None where they may have changed
     """
 
@@ -39,16 +39,16 @@ class Player:
 
     @property
     def bones(self) -> int:
-        """How many bones Sinew plays."""
+        """The number of bones that Sinew plays."""
         return sum(len(group.rows) for group in self.keyed.groups) if self.keyed is not None else 0
 
 
 @dataclass
 class Session:
-    """Who plays what in the open file; made anew whenever it may be out of date.
+    """Which armatures play what in the open file; made again whenever it may be out of date.
 
-    players  by session_uid: the armatures that play a held action, also one that only shares it
-    stamps   what to look at of these, and of those that wait for an action, to see that it is
+    players  by session_uid: the armatures that play a held action, also those that only share it
+    stamps   what to compare for these, and for those that wait for an action, to notice changes
     errors   of armatures that are left to Blender because playing them failed
     """
 
@@ -60,7 +60,7 @@ class Session:
 
     @property
     def idle(self) -> bool:
-        """Nothing is on, and nothing has come since that was seen."""
+        """Nothing is on, and no object has been added since that was found."""
         return self.players == {} and not self.stamps and self.object_count == len(bpy.data.objects)
 
     @property
@@ -82,17 +82,17 @@ session = Session()
 
 
 def player_of(armature: bpy.types.Object) -> Player | None:
-    """What the panel shows of an armature; None where Blender's curves play."""
+    """Returns what the panel shows of an armature; None where Blender's curves play."""
     return (session.players or {}).get(armature.session_uid)
 
 
 def problem_of(armature: bpy.types.Object) -> str | None:
-    """Why Blender's curves play although a method is chosen, in one sentence."""
+    """Returns why Blender's curves play although a method is chosen, in one sentence."""
     return session.errors.get(armature.session_uid) or inbetween.obstacle(armature)
 
 
 def refresh(scene: bpy.types.Scene) -> None:
-    """Holds what is to be held, and poses all bones for the scene's frame."""
+    """Holds the slots that have to be held, and poses all bones for the scene's frame."""
 
     def work() -> None:
         _settle()
@@ -102,28 +102,28 @@ def refresh(scene: bpy.types.Scene) -> None:
     _subscribe_to_needed_frames()
 
 
-def let_go() -> None:
-    """Gives all curves back as the artist had them, until the next refresh()."""
+def release_all() -> None:
+    """Restores all curves as the artist had them, until the next refresh()."""
     _release()
     session.players = None
 
 
 def _guarded(work: Callable[[], None]) -> None:
-    # What is written here comes back as an update.
+    # Sinew's own writing causes another update.
     if session.updating:
         return
     session.updating = True
     try:
         work()
     except ReferenceError:
-        # Deleted since it was listed.
+        # It was deleted since the list was made.
         session.players = None
     finally:
         session.updating = False
 
 
 def _settle() -> None:
-    """Holds the slots that armatures with a method play, lets go of all others, and lists who plays what."""
+    """Holds the slots that armatures with a method play, releases all others, and lists who plays what."""
     armatures = [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.pose is not None]
     wanted = {}
     for armature in filter(inbetween.is_on, armatures):
@@ -159,7 +159,7 @@ def _slot_key(action: bpy.types.Action | None, slot: bpy.types.bpy_struct | None
 
 
 def _stamp(armature: bpy.types.Object) -> tuple:
-    """Changes with what of an armature decides who plays its bones."""
+    """Changes with everything about an armature that decides who plays its bones."""
     animation = armature.animation_data
     nla = ()
     if animation is not None:
@@ -172,8 +172,8 @@ def _stamp(armature: bpy.types.Object) -> tuple:
 def _play(scene: bpy.types.Scene, acted: set[int] | None = None) -> None:
     """Poses the scene's players for its frame.
 
-    acted  session_uids of actions whose keys may have changed: only what that changes is written, as bones
-           posed by hand and not keyed yet must stay; None: everything is
+    acted  session_uids of actions whose keys may have changed: only bones that this changes are written, as
+           bones posed by hand and not keyed yet must stay; None: everything is written
     """
     time = scene.frame_current_final
     for uid, player in list(session.players.items()):
@@ -223,12 +223,12 @@ def _changed(_armature: bpy.types.Object, context: bpy.types.Context) -> None:
 
 
 def subscribe_to_frames() -> None:
-    """Blender calls before each frame, until it is known that there is nothing to do."""
+    """Has Blender call before each frame, until it is known that there is nothing to do."""
     events.subscribe(*_BEFORE_FRAMES)
 
 
 def _subscribe_to_needed_frames() -> None:
-    """Only where something plays: a function of Python's takes 3 to 10 us of a frame in any case."""
+    """Subscribes only where something plays: a Python handler takes 3 to 10 us of a frame."""
     if session.idle and events.IMPORTS_ARE_ANNOUNCED:
         events.unsubscribe(*_BEFORE_FRAMES)
     else:
@@ -241,7 +241,7 @@ def on_frame_change(scene: bpy.types.Scene, *_args: object) -> None:
         return
 
     def work() -> None:
-        # Keys that a script set since the last update are not evaluated yet, and no event has told of them.
+        # Keys that a script set since the last update are not evaluated yet, and there was no event for them.
         layers = [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
         if session.outdated or any(depsgraph.id_type_updated("ACTION") for depsgraph in layers):
             _settle()
@@ -279,21 +279,21 @@ def on_data_replaced(*_args: object) -> None:
 
 @persistent
 def on_data_new(*_args: object) -> None:
-    """After undo, redo and loading Blender plays its curves anew, and so are these."""
+    """After undo, redo and loading Blender plays its curves again, so bones are posed again."""
     session.forget()
     refresh(bpy.context.scene)
 
 
 @persistent
 def on_imported(*_args: object) -> None:
-    """Scripts can go to another frame without any other event."""
+    """Importing scripts can change the frame without any other event."""
     subscribe_to_frames()
 
 
 @persistent
 def on_save(*_args: object) -> None:
-    """A saved file has its curves as the artist left them: without Sinew it plays them."""
-    let_go()
+    """In a saved file the curves are as the artist left them, and play without Sinew."""
+    release_all()
 
 
 @persistent
@@ -325,13 +325,13 @@ def register() -> None:
 
 
 def adopt_open_file() -> None:
-    """Plays what was chosen in a file that was open before Sinew was registered."""
+    """Plays in-betweens in a file that was open before Sinew was registered."""
     if hasattr(bpy.data, "objects") and getattr(bpy.context, "view_layer", None) is not None:
         refresh(bpy.context.scene)
 
 
 def unregister() -> None:
-    let_go()
+    release_all()
     session.forget()
     events.unsubscribe_all(_HANDLERS)
     events.unsubscribe(*_BEFORE_FRAMES)

@@ -15,7 +15,7 @@ from ...core import inbetween as core
 from ...io import actions, pose_io
 from . import inbetween
 
-# Keyed poses kept at hand: those that playback uses now and soon.
+# The number of keyed poses that are kept: those that playback uses now and soon.
 KEPT = 8
 
 
@@ -23,14 +23,15 @@ KEPT = 8
 class Group:
     """Bones that have keys at the same times.
 
-    times   [keys]
-    rows    [bones] where they stand in the pose; modes [bones] how they rotate
-    keyed   [bones, 10] the channels that have curves
-    curves  [curves] their numbers among all curves; bones, columns [curves] what they move, of `keyed`
-    still   [keys, bones] whether a bone holds its pose up to the next key
-    gains   [2] what the channels [bones, 10] gain by a round of the keys, before the first and after the
-            last; None where the keys do not repeat
-    poses   [bones, 10] of some keys, by number; what has no curves is 0
+    times           [keys]
+    rows, modes     [bones], their index in the pose, and their rotation mode
+    keyed           [bones, 10], the channels that have curves
+    curves          [curves], their indices among all curves
+    bones, columns  [curves], the channel that each moves, as indices of `keyed`
+    still           [keys, bones], whether a bone holds its pose until the next key
+    gains           [2], how much the channels [bones, 10] increase in a cycle of the keys, before the first
+                    and after the last; None where the keys do not repeat
+    poses           [bones, 10] of some keys, by index; channels without curves are 0
     """
 
     times: np.ndarray
@@ -47,10 +48,10 @@ class Group:
 
 @dataclass
 class KeyedPoses:
-    """What was read of a held slot for an armature; good until the action changes.
+    """What was read of a held slot for an armature; valid until the action changes.
 
-    curves  what each curve of the slot moves, held or not
-    bones   the armature's bones with the property that turns each
+    curves  the channel of each curve of the slot, held or not
+    bones   the armature's bones, each with its rotation property
     """
 
     curves: list[tuple[str, int]]
@@ -60,11 +61,11 @@ class KeyedPoses:
 
 @dataclass
 class Pose:
-    """What an armature's bones are to have at a time.
+    """The pose of an armature's bones at a time.
 
-    channels  float32 [bones, 10], as pose_io.read_channels() gives them
-    far       bones whose keys are too far apart: the method has no one answer, or the angles tell of a longer
-              way than it takes
+    channels  float32 [bones, 10], as from pose_io.read_channels()
+    far       bones whose keys are too far apart: the method does not define a unique result, or the angles
+              mean a longer way than it takes
     """
 
     channels: np.ndarray
@@ -73,8 +74,13 @@ class Pose:
 
 @dataclass
 class Span:
-    """Where a time lies in a group: the numbers of four keys, it being from the second to the third, each
-    with the round it is of; and the time and the keys' times in the first round, moved to where they lie."""
+    """The position of a time in a group.
+
+    keys    the indices of four keys; the time is between the second and the third
+    rounds  the cycle that each key belongs to
+    time    moved by whole cycles to the first one
+    times   of the four keys, moved by the same amount
+    """
 
     keys: tuple[int, int, int, int]
     rounds: tuple[int, int, int, int]
@@ -83,7 +89,7 @@ class Span:
 
 
 def read(armature: bpy.types.Object) -> KeyedPoses:
-    """The keyed poses that Sinew plays on an armature; none where its action is not held."""
+    """Reads the keyed poses that Sinew plays on an armature; none where its action is not held."""
     action, slot = inbetween.action_of(armature)
     rotations = pose_io.rotation_properties(armature.pose.bones)
     everything = [actions.key_of(curve) for curve in actions.all_curves(action, slot)]
@@ -99,7 +105,7 @@ def read(armature: bpy.types.Object) -> KeyedPoses:
 
 
 class _Bone(NamedTuple):
-    """What a group is made of; `gains` [2] of its curves, before the first key and after the last."""
+    """A bone of a group; `gains` [2] of its curves, before the first key and after the last."""
 
     row: int
     mode: str
@@ -154,9 +160,9 @@ def fits(poses: KeyedPoses, armature: bpy.types.Object) -> bool:
 
 
 def pose_at(armature: bpy.types.Object, poses: KeyedPoses, time: float, method: str, path: str) -> Pose:
-    """The pose at `time`: at keys, and before the first and after the last, what Blender's curves have.
+    """Returns the pose at `time`; at keys, and before the first and after the last, that of Blender's curves.
 
-    poses   of read(), where fits()
+    poses   from read(), where fits()
     method  of core.METHODS, or core.BLENDER
     """
     curves = actions.all_curves(*inbetween.action_of(armature))
@@ -174,7 +180,8 @@ def pose_at(armature: bpy.types.Object, poses: KeyedPoses, time: float, method: 
 
 
 def span_at(group: Group, time: float) -> Span | None:
-    """Where `time` lies among the keys; None at a key, and outside of them where they do not repeat."""
+    """Returns the position of `time` among the keys; None at a key, and outside of them where they do not
+    repeat."""
     times = group.times
     first, count = times[0], len(times)
     length = times[-1] - first
@@ -188,7 +195,7 @@ def span_at(group: Group, time: float) -> Span | None:
     if after == count or times[after - 1] == time:
         return None
     keys, rounds = [max(after - 2, 0), after - 1, after, min(after + 1, count - 1)], [here] * 4
-    # Across the seam of a repetition the neighbour is of another round.
+    # Across the seam of a repetition, the neighbouring key belongs to another cycle.
     if after == 1 and _repeats(group, here - 1):
         keys[0], rounds[0] = count - 2, here - 1
     if after == count - 1 and _repeats(group, here + 1):
@@ -209,8 +216,8 @@ def _between(
     method: str,
     path: str,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """float64 [bones, 10], and which bones turn far, [bones]; `now` [bones, 10] as Blender has it."""
-    # A channel without keys has its own value at all of them.
+    """float64 [bones, 10], and which bones rotate too far, [bones]; `now` [bones, 10] is Blender's pose."""
+    # A channel without keys has its current value at all of them.
     keys = np.stack(
         [
             np.where(group.keyed, _channels_at(group, curves, key, number), now)
@@ -227,7 +234,7 @@ def _between(
     channels = pose_io.channels_of(found.poses, group.modes, near=keys[1])
     if path == core.SPLINE:
         channels = np.where(group.still[span.keys[1]][:, None], keys[1], channels)
-    # Angles tell how far they mean to go; quaternions do not. The method takes the shorter way.
+    # Angles say how far they mean to rotate; quaternions do not. The method takes the shorter way.
     angles = np.abs(keys[2] - keys[1])[:, 3:7].max(axis=1)
     return channels, ~found.is_defined | ((group.modes != "QUATERNION") & (angles > np.pi + 1e-4))
 
@@ -235,7 +242,7 @@ def _between(
 def _channels_at(
     group: Group, curves: Sequence[bpy.types.FCurve], key: int, number_of_round: int
 ) -> np.ndarray:
-    """float64 [bones, 10]: the channels at a key, in a round of the keys."""
+    """float64 [bones, 10]: the channels at a key, in a cycle of the keys."""
     channels = group.poses.get(key)
     if channels is None:
         channels = np.zeros(group.keyed.shape)
@@ -250,8 +257,8 @@ def _channels_at(
 
 
 def _poses(group: Group, channels: np.ndarray) -> core.Poses:
-    """What has no keys takes no part: a bone that only turns does not swing about wherever it was moved to
-    by hand."""
+    """Converts channels to poses. Channels without keys are left out: otherwise a bone that is only rotated
+    would swing around the position where it was moved by hand."""
     poses = pose_io.poses_of(channels, group.modes)
     poses.rigid[~group.keyed[:, 3:7].any(axis=1), :4] = (1.0, 0.0, 0.0, 0.0)
     poses.rigid[~group.keyed[:, :3].any(axis=1), 4:] = 0.0

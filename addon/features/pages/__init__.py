@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes measured and pictures rendered for the pages that commands write."""
+"""Measures shapes and renders pictures for the pages that commands write."""

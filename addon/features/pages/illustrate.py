@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a comparison: methods beside each other, heat maps, close-ups of the worst places."""
+"""The pictures of a comparison: methods side by side, heat maps, close-ups of the worst positions."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from .render import Studio
 
 @dataclass
 class HeatPlan:
-    """A heat map to draw: at the worst frame of its metric, of each method.
+    """A heat map to draw, at the worst frame of its metric, for each method.
 
     colours  by method, [vertices of all meshes, 3]
-    close    at the worst place
-    title    which place and frame that is
+    close    a view of the worst position
+    title    names the position and the frame
     """
 
     metric: Metric
@@ -47,7 +47,7 @@ class Illustrator:
         self._methods = list(comparison.methods)
 
     def plan(self, frame_count: int) -> None:
-        """Chooses frames and places: frames at which a measure is worst, and each metric's worst place."""
+        """Chooses the frames at which a measure is worst, and each metric's worst position."""
         comparison = self._comparison
         self.frames = comparison.worst_frames(frame_count)
         self._heat = [
@@ -64,7 +64,7 @@ class Illustrator:
         return len(self._methods) * (len(self.frames) + 3 * len(self._heat))
 
     def draw(self) -> Iterator[None]:
-        """Draws all that was planned; yields after each picture. Then `sheets` has them."""
+        """Draws everything that was planned; yields after each picture. Afterwards `sheets` has them."""
         rows: dict[float, list[Path]] = {frame: [] for frame in self.frames}
         heat_rows: list[list[list[Path]]] = [[[], [], []] for _ in self._heat]
         for method in self._methods:
@@ -141,7 +141,7 @@ def film(subject: Subject, comparison: Comparison, studio: Studio, folder: Path)
     """Draws each frame of the comparison into one picture, the methods side by side. Requires Pillow."""
     methods = list(comparison.methods)
     views = evaluate.whole_views(subject.meshes, methods, comparison.frames)
-    # A method at a time would be faster by what changing it costs, and need all pictures at once.
+    # One method at a time would be faster, as it is changed less often, but would need all pictures at once.
     for index, (frame, view) in enumerate(zip(comparison.frames, views, strict=True)):
         columns = []
         for method, label in comparison.methods.items():

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What metrics and diagnostics need from the open file: surfaces, weights, rest shapes, bones, shapes.
+"""Reads what metrics and diagnostics need from the open file: surfaces, weights, rest shapes, bones, shapes.
 
-Shapes are those that skinning leaves, in world space, before the modifiers behind it: every method has the
-same vertices. The open file's frame and methods are changed: for files that are opened only to be looked at.
+Shapes are the results of skinning, in world space, before the downstream modifiers: so every method has the
+same vertices. The open file's frame and methods are changed: use it only for files that are not saved
+afterwards.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from ...core.surface import joined
 from ...deform import evaluate, group_uses, session
 from ...io import armature_io, mesh_io
 
-# Shapes of as many frames are kept as fit into this: methods take turns on them.
+# Shapes are kept for as many frames as fit into this, as each method plays all of them.
 MOST_BYTES = 256_000_000
 
 
@@ -37,8 +38,8 @@ class Part:
     """One of the meshes.
 
     weighting, weights, rest_points  of the mesh as it is edited; points in armature space
-    vertex_count                     of what comes to the Armature modifier
-    influences                       the same, over bones and joints
+    vertex_count                     of the mesh that the Armature modifier gets
+    influences                       of that mesh, over bones and joints
     """
 
     obj: bpy.types.Object
@@ -58,7 +59,7 @@ class Part:
 
 @dataclass
 class Subject:
-    """The meshes that are measured as one, their vertices one after the other."""
+    """The meshes that are measured as one, with concatenated vertices."""
 
     scene: bpy.types.Scene
     parts: list[Part]
@@ -69,11 +70,11 @@ class Subject:
         return [part.obj for part in self.parts]
 
     def split(self, values: np.ndarray) -> list[np.ndarray]:
-        """Values of all vertices, for each mesh its own."""
+        """Splits values of all vertices by mesh."""
         return np.split(values, np.cumsum([part.vertex_count for part in self.parts])[:-1])
 
     def owner_of(self, vertex: int) -> tuple[str, int]:
-        """The mesh that a vertex of all is in, and its index there."""
+        """Returns the mesh that a vertex of all belongs to, and its index there."""
         for part in self.parts:
             if vertex < part.vertex_count:
                 return part.obj.name, vertex
@@ -81,7 +82,8 @@ class Subject:
         raise IndexError(vertex)
 
     def character_of(self, vertex: int, points: np.ndarray) -> np.ndarray:
-        """[n, 3]: of `points` [vertices, 3] those of the meshes that have the armature of a vertex's mesh."""
+        """[n, 3]: those of `points` [vertices, 3] that belong to meshes with the same armature as a vertex's
+        mesh."""
         ends = np.cumsum([part.vertex_count for part in self.parts])
         armature = self.parts[int(np.searchsorted(ends, vertex, side="right"))].armature
         own = zip(self.parts, self.split(points), strict=True)
@@ -90,10 +92,10 @@ class Subject:
 
 @dataclass
 class Measurements:
-    """Of each frame, by method.
+    """Measures of each frame, by method.
 
     times  milliseconds that Blender took for the whole frame
-    own    milliseconds of these that Sinew took; 0 for the Armature modifier
+    own    the milliseconds of this that Sinew took; 0 for the Armature modifier
     """
 
     summaries: dict[str, list[Summary]]
@@ -117,7 +119,7 @@ def gather(scene: bpy.types.Scene, meshes: Sequence[bpy.types.Object]) -> Subjec
 
 
 def batches(subject: Subject, frames: Sequence[float], methods: int) -> list[Sequence[float]]:
-    """The frames in groups whose shapes, under as many methods, are small enough to keep."""
+    """Returns the frames in groups whose shapes, for this number of methods, are small enough to keep."""
     bytes_a_frame = 24 * max(subject.gauge.surface.vertex_count, 1) * (methods + 1)
     size = int(np.clip(MOST_BYTES // bytes_a_frame, 1, 64))
     return [frames[first : first + size] for first in range(0, len(frames), size)]
@@ -140,7 +142,7 @@ def measure(
     for index, (rest, pose) in enumerate(zip(rests, poses, strict=True)):
         rig = _frame_of_rig(subject, rest, pose)
         subject.gauge.set_frame(rig)
-        _look_at_pose(subject, rig, frames[index])
+        _check_pose(subject, rig, frames[index])
         for method in methods:
             measured = subject.gauge.measure(shapes[method][index], shapes[reference][index])
             result.summaries[method].append(measured.summary())
@@ -148,7 +150,7 @@ def measure(
 
 
 def shapes_at(subject: Subject, methods: Sequence[str], frame: float) -> dict[str, np.ndarray]:
-    """World points under each method at one frame, which the gauge is set to."""
+    """Returns world points under each method at one frame, and sets the gauge to it."""
     with skinning_alone(subject.meshes):
         rest = _play_rest(subject, [frame])[0]
         poses: list[list[np.ndarray]] = []
@@ -159,7 +161,7 @@ def shapes_at(subject: Subject, methods: Sequence[str], frame: float) -> dict[st
 
 @contextmanager
 def skinning_alone(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Inside, modifiers behind the skinning are switched off."""
+    """Context in which modifiers behind the skinning are switched off."""
     hidden = []
     for obj in meshes:
         kept = [*stack.upstream(obj), *stack.armature_modifiers(obj), stack.sinew_modifier(obj)]
@@ -175,7 +177,7 @@ def skinning_alone(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
 
 @contextmanager
 def _at_rest(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Inside, armatures are in rest position: whatever deforms with them, deforms nothing."""
+    """Context in which armatures are in rest position, so that nothing is deformed by them."""
     armatures = {attach.armature_of(obj).data for obj in meshes}
     before = {armature: armature.pose_position for armature in armatures}
     for armature in armatures:
@@ -196,13 +198,13 @@ def _play(
     result: Measurements | None = None,
     poses: list[list[np.ndarray]] | None = None,
 ) -> list[np.ndarray]:
-    """World points [vertices, 3] at each frame.
+    """Returns world points [vertices, 3] at each frame.
 
-    result  takes the times, where it holds the method
-    poses   takes each frame's matrices of each mesh's bones in world space
+    result  receives the times, if it contains the method
+    poses   receives each frame's matrices of each mesh's bones in world space
     """
     evaluate.use_method_on(subject.meshes, method)
-    # Binding happens once and is no part of a frame's time; nor is a frame timed that was there already.
+    # Before the first frame: binding is not part of a frame's time, and a frame has to change to be timed.
     evaluate.set_frame(subject.scene, frames[0] - 1)
     shapes = []
     for frame in frames:
@@ -220,7 +222,8 @@ def _play(
 
 
 def _play_rest(subject: Subject, frames: Sequence[float]) -> list[tuple[np.ndarray, list[np.ndarray]]]:
-    """World points at each frame with no bone at work, and the matrices of each mesh's bones then."""
+    """Returns world points at each frame without any bone's effect, with the matrices of each mesh's
+    bones."""
     evaluate.use_method_on(subject.meshes, evaluate.BLENDER)
     rests = []
     with _at_rest(subject.meshes):
@@ -254,12 +257,12 @@ def _frame_of_rig(
     for part, at_rest, posed in zip(subject.parts, rest[1], pose, strict=True):
         rest_axes.append(bone_axes(part.weighting.bones, at_rest))
         posed_axes.append(bone_axes(part.weighting.bones, posed))
-        # An armature of no size moves nothing that could be measured.
+        # An armature of zero scale moves nothing that could be measured.
         motions.append(posed[:, :3, :3] @ np.linalg.pinv(at_rest[:, :3, :3]))
     return FrameOfRig(rest[0], *map(np.concatenate, (rest_axes, posed_axes, motions)))
 
 
-def _look_at_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
+def _check_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
     first = 0
     for part in subject.parts:
         count = len(part.weighting.bones.rest)
@@ -268,7 +271,7 @@ def _look_at_pose(subject: Subject, rig: FrameOfRig, frame: float) -> None:
 
 
 def _show(armature: bpy.types.Object) -> None:
-    """Blender evaluates no pose that nothing visible needs."""
+    """Shows an armature: Blender does not evaluate poses that nothing visible needs."""
     armature.hide_viewport = False
     if armature.name in bpy.context.view_layer.objects:
         armature.hide_set(False)
@@ -277,7 +280,8 @@ def _show(armature: bpy.types.Object) -> None:
 def read_edited(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Weighting, GroupWeights, np.ndarray]:
-    """Of the mesh as it is edited: how bones hold it, its groups as stored, its points in armature space."""
+    """Returns, for the mesh as it is edited: its weighting, its groups as stored, its points in armature
+    space."""
     armature = attach.armature_of(obj)
     bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
     weights = mesh_io.read_group_weights(obj.data)
@@ -302,7 +306,7 @@ def _weighting(obj: bpy.types.Object, weights: GroupWeights, bones: Bones) -> We
     modifier = stack.armature_modifier(obj)
     if modifier is not None:
         return ModifierOptions.read(modifier).weighting(obj, weights, bones)
-    # Parent type Armature deforms by groups, and by envelopes where there are none.
+    # The parent type Armature deforms by groups, and by envelopes where there are none.
     entries = entries_of_bones(weights, bones.of_groups([group.name for group in obj.vertex_groups]))
     return Weighting(bones, entries, use_envelopes=True)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PNG files to arrays and back, by Blender itself: nothing to install."""
+"""Reads and writes PNG files with Blender itself, so that nothing has to be installed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def read_picture(path: Path) -> np.ndarray:
         if not width:
             raise SinewError(f"{path}: can not be read as a picture")
         pixels = np.empty(width * height * image.channels, dtype=np.float32)
-        # Reads the file; without it size is known and pixels are not.
+        # Reads the file: before, only the size is known.
         image.pixels.foreach_get(pixels)
     finally:
         bpy.data.images.remove(image)
@@ -32,7 +32,7 @@ def read_picture(path: Path) -> np.ndarray:
 
 
 def write_picture(path: Path, pixels: np.ndarray) -> None:
-    """The reverse: a PNG of 8 bits a channel."""
+    """Writes a PNG with 8 bits per channel."""
     height, width, _channels = pixels.shape
     image = bpy.data.images.new("Sinew Picture", width, height, alpha=True)
     try:

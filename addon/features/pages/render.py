@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of meshes in the open file, in clay or as heat maps: without its own lights, materials, cameras.
+"""Pictures of meshes in the open file, in clay or as heat maps, without the file's lights, materials and
+cameras.
 
-The open file's render settings, visibility and camera are changed: for files that are opened only to be
-looked at.
+The open file's render settings, visibility and camera are changed: use it only for files that are not saved
+afterwards.
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ def check_size(size: int) -> None:
 
 
 def chosen_engine(wanted: str) -> str:
-    """The engine, "workbench" or "cycles", wanted by name or "auto".
+    """Returns the engine, "workbench" or "cycles", for a name or "auto".
 
-    Raises SinewError where it can not render here.
+    Raises SinewError where it cannot render here.
     """
     if wanted == "cycles":
         return wanted
@@ -48,7 +49,7 @@ def chosen_engine(wanted: str) -> str:
 
 
 class Studio:
-    """Renders nothing but some meshes, on a clear background."""
+    """Renders only some meshes, on a transparent background."""
 
     def __init__(
         self,
@@ -58,10 +59,12 @@ class Studio:
         size: int,
         halved: bool = False,
     ) -> None:
-        """
+        """Sets the scene up.
+
         engine  "workbench" or "cycles"
         size    pixels of a picture's longer side
-        halved  pictures are shown at half their size, which smooths edges: fewer samples a pixel will do
+        halved  pictures are displayed at half their size, which smooths edges: so fewer samples per pixel are
+                enough
         """
         self.scene, self.engine, self._size = scene, engine, size
         for obj in scene.objects:
@@ -84,7 +87,7 @@ class Studio:
     def painted(
         self, meshes: Sequence[bpy.types.Object], colours: Sequence[np.ndarray]
     ) -> AbstractContextManager[None]:
-        """A context in which copies of the meshes, as they are evaluated now, stand in their place.
+        """Context in which painted copies of the meshes, as they are evaluated now, are shown instead.
 
         colours  for each mesh [vertices, 3], sRGB in 0..1
         """
@@ -117,13 +120,13 @@ class Studio:
 
     def _show_heat(self) -> None:
         if self.engine == "workbench":
-            # Colours are to be read: of Blender's lights the most even one, and no gloss.
+            # Colours have to be legible, so it uses the most even of Blender's lights, without gloss.
             self._shade("VERTEX", light="paint.sl", gloss=False)
         else:
             self._override(self._heat)
 
     def picture(self, view: View, path: Path) -> None:
-        """Renders what `view` sees to the PNG `path`."""
+        """Renders the region of `view` to the PNG `path`."""
         camera = self.scene.camera
         right, up = camera_axes(view.direction)
         matrix = np.identity(4)
@@ -150,7 +153,7 @@ class Studio:
 
 
 class OwnLook:
-    """Renders what the file's own camera sees, as the file says."""
+    """Renders with the file's own camera and settings."""
 
     def __init__(self, scene: bpy.types.Scene, path: Path) -> None:
         if scene.camera is None:
@@ -166,7 +169,7 @@ class OwnLook:
 
 
 def _render(scene: bpy.types.Scene, path: Path) -> None:
-    """Renders the current frame to the PNG `path`; raises SinewError where it can not be written."""
+    """Renders the current frame to the PNG `path`; raises SinewError where it cannot be written."""
     with scratch_folder() as folder:
         # Not to `path` itself: Blender replaces each # and {} in it.
         drawn = folder / "picture.png"
@@ -175,14 +178,14 @@ def _render(scene: bpy.types.Scene, path: Path) -> None:
             bpy.ops.render.render(write_still=True, scene=scene.name)
         except RuntimeError as error:
             raise SinewError(f"{path}: can not be drawn: {telling_line(error)}") from None
-        # Up to 5.2 it does not notice that a disk is full.
+        # Up to 5.2 Blender does not notice a full disk.
         if not drawn.exists() or not drawn.read_bytes().endswith(PNG_END):
             raise SinewError(f"{path}: can not be drawn: {folder.parent} did not take all of it; is it full?")
         write_whole(path, lambda unfinished: shutil.copyfile(drawn, unfinished))
 
 
 def _painted_copy(obj: bpy.types.Object, colours: np.ndarray) -> bpy.types.Object:
-    """An object in no scene: the evaluated mesh of `obj`, with the colour attribute HEAT."""
+    """Returns an object in no scene, with the evaluated mesh of `obj` and the colour attribute HEAT."""
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = bpy.data.meshes.new_from_object(evaluated)
     attribute = mesh.color_attributes.new(HEAT, "FLOAT_COLOR", "POINT")
@@ -225,14 +228,14 @@ def _prepare_workbench(scene: bpy.types.Scene, halved: bool) -> None:
     shading.type = "SOLID"
     shading.light = "STUDIO"
     shading.single_color = CLAY
-    # World space's is grainy in a single sample.
+    # World-space cavity is grainy with a single sample.
     shading.cavity_type = "SCREEN" if halved else "BOTH"
     shading.show_shadows = shading.show_xray = shading.show_object_outline = False
     shading.show_backface_culling = False
 
 
 def _prepare_cycles(scene: bpy.types.Scene, halved: bool) -> tuple[bpy.types.Material, bpy.types.Material]:
-    """Lights and noise; materials for clay and for heat."""
+    """Sets up lights and sampling; returns materials for clay and for heat."""
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     scene.cycles.samples = 4 if halved else 16

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figures 3.6 to 3.11: pictures of deformed meshes, and what can be measured of them.
 
-The files are opened one after the other, in the place of the open one.
+The files are opened one after the other, in place of the open one.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ BENT, TWISTED = 16, 40
 def figures(
     folder: Path, engine: str, size: int, scratch: Path, step: Callable[[str], None]
 ) -> tuple[Figure, ...]:
-    """All six.
+    """Returns all six figures.
 
     folder   with LINKS and MESH
     engine   "workbench" or "cycles"
     size     pixels of a picture
-    scratch  a folder for pictures on the way
-    step     called with what is about to be done
+    scratch  a folder for temporary pictures
+    step     called with a description before each step
 
-    Raises SinewError where a file can not be read.
+    Raises SinewError where a file cannot be read.
     """
     step("Drawing Figures 3.6 to 3.8")
     hierarchies = _hierarchies(folder / LINKS, engine, size, scratch)
@@ -54,7 +54,7 @@ def _open(path: Path) -> bpy.types.Object:
 
 def _studio(mesh: bpy.types.Object, engine: str, size: int) -> Studio:
     studio = Studio(bpy.context.scene, [mesh], engine, size)
-    # In its own colours where the engine shows them: they show twists.
+    # In its own colours, if the engine shows them: they make twists visible.
     studio.scene.display.shading.color_type = "MATERIAL"
     return studio
 
@@ -73,17 +73,17 @@ def _parents(armature: bpy.types.Object, bones: armature_io.Bones) -> np.ndarray
 
 
 def _pose(armature: bpy.types.Object, bones: armature_io.Bones, frame: int) -> np.ndarray:
-    """float64 [bones, 4, 4] at a frame, which the scene then has."""
+    """float64 [bones, 4, 4] at a frame, to which the scene is set."""
     evaluate.set_frame(bpy.context.scene, frame)
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return armature_io.read_pose(evaluated, bones).astype(np.float64)
 
 
 def read_chain(mesh: bpy.types.Object) -> meshes.Chain:
-    """The links of an open LINKS at its two keyframes. Mesh and armature lie in one place."""
+    """Reads the links of an open LINKS at its two keyframes. Mesh and armature have the same origin."""
     armature = attach.armature_of(mesh)
     bones = armature_io.read_bones(armature)
-    # One group to a vertex: that is what these figures are about.
+    # Each vertex has one group, which is what these figures are about.
     group_of = mesh_io.read_group_weights(mesh.data).groups
     return meshes.Chain(
         points=mesh_io.read_points(mesh.data).astype(np.float64),
@@ -109,7 +109,7 @@ def _hierarchies(path: Path, engine: str, size: int, scratch: Path) -> tuple[Fig
             mesh.data.vertices.foreach_set("co", shape.astype(np.float32).ravel())
             mesh.data.update()
             drawn.append(Picture(f"t = {t:g}", _draw(studio, view, scratch)))
-    # All at once, so that the three figures have one scale.
+    # All at once, so that the three figures have the same scale.
     drawn = iter(meshes.trimmed(drawn))
     pictures = {method: [next(drawn) for _ in row] for method, row in shapes.items()}
     return meshes.hierarchy_figures(chain, shapes, pictures)

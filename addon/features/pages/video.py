@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures into an mp4, by the FFmpeg that is built into Blender."""
+"""Encodes pictures into an mp4, with Blender's built-in FFmpeg."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ def check_can_encode() -> None:
 
 
 def encode(pictures: Sequence[Path], fps: int, fps_base: float, path: Path) -> None:
-    """Writes an mp4 (H.264) of the pictures in one folder, one a frame, all of one even width and height.
+    """Writes an mp4 (H.264) of pictures in one folder, one per frame, all with the same even width and
+    height.
 
-    fps, fps_base  as in a scene's render settings: fps / fps_base frames a second
+    fps, fps_base  as in a scene's render settings: fps / fps_base frames per second
     """
     first = bpy.data.images.load(str(pictures[0]))
     size = tuple(first.size)
@@ -53,7 +54,7 @@ def encode(pictures: Sequence[Path], fps: int, fps_base: float, path: Path) -> N
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether an mp4 is there with all its parts, of which the index comes last."""
+    """Whether an mp4 exists with all its parts, of which the index is the last."""
     if not path.exists():
         return False
     content, place, kinds = path.read_bytes(), 0, set()
@@ -70,12 +71,12 @@ def _is_whole(path: Path) -> bool:
 
 def _show_one_after_the_other(scene: bpy.types.Scene, pictures: Sequence[Path]) -> None:
     editor = scene.sequence_editor_create()
-    # Called sequences up to 4.3.
+    # Named sequences up to 4.3.
     strips = editor.strips if hasattr(editor, "strips") else editor.sequences
     strip = strips.new_image("Pictures", str(pictures[0]), channel=1, frame_start=1)
     for picture in pictures[1:]:
         strip.elements.append(picture.name)
-    # Elements that are appended do not make it longer; what does has another name since 5.1.
+    # Appended elements do not make it longer. The property that does was renamed in 5.1.
     duration = "duration" if hasattr(strip, "duration") else "frame_final_duration"
     setattr(strip, duration, len(pictures))
     scene.frame_start, scene.frame_end = 1, len(pictures)
@@ -86,7 +87,7 @@ def _prepare_output(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     render.resolution_x, render.resolution_y = size
     render.resolution_percentage = 100
     render.use_sequencer, render.use_compositing = True, False
-    # Up to 5.0 the ending is not taken from the path where frame numbers are added to it.
+    # Up to 5.0 the file extension is not taken from the path where frame numbers are added to it.
     render.use_file_extension = False
     scene.view_settings.view_transform = "Standard"
     if hasattr(render.image_settings, "media_type"):

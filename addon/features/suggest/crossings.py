@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a surface goes through itself, by Blender's own tree of triangles."""
+"""Finds where a surface intersects itself, with Blender's BVH tree."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from mathutils.bvhtree import BVHTree
 
 
 def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> set[tuple[int, int]]:
-    """Pairs of triangles that cross and have no vertex in common, the lower index first.
+    """Returns pairs of triangles that cross and share no vertex, the lower index first.
 
     points     [vertices, 3]
     triangles  int [triangles, 3]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender gets of it: a panel and its buttons. Nothing is stored in files."""
+"""Registers suggestions: a panel and its buttons. Nothing is stored in files."""
 
 from .suggest_panel import CLASSES as CLASSES
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Goes through frames, and measures what each method would make of them."""
+"""Goes through frames, and measures the shapes that each method would give."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from ..heat import live
 from ..heat.worst_frames import armatures_of, check_measurable, measure_at
 from .crossings import crossing_triangles
 
-# Crossings take longer than all else together: they are counted at as many frames, evenly spread.
+# Counting crossings takes longer than everything else together, so it is done only at this many frames,
+# evenly distributed.
 CROSSING_FRAMES = 8
 
-# By the session_uid of the scene: found anew whenever somebody wants to know, and no part of the file.
+# By the session_uid of the scene. Computed again when needed, so not stored in the file.
 suggestions: dict[int, Suggestion] = {}
 
 
 def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str) -> Iterator[float]:
-    """Yields the share that is done; then suggestions[scene.session_uid] has the result. The objects' own
-    methods stay as they are.
+    """Yields the progress; then suggestions[scene.session_uid] has the result. The objects' own methods do
+    not change.
 
-    Raises SinewError where an object can not be measured.
+    Raises SinewError where an object cannot be measured.
     """
     check_measurable(objects)
     armatures = armatures_of(objects)

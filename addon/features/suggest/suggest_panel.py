@@ -62,7 +62,7 @@ class SINEW_PT_suggest(Sidebar, operators.OfSkinned, bpy.types.Panel):
             for criterion in CRITERIA:
                 value = value_text(context.scene, criterion, suggestion.worst.get((name, criterion.name)))
                 texts[criterion.name] = f"{tr(criterion.label)} {value}"
-            # Two columns, where the sidebar has room for them beside their icons.
+            # Two columns, if the sidebar has room for them beside their icons.
             columns = 2 if max(map(len, texts.values())) <= characters(context) // 2 - 4 else 1
             values = column.grid_flow(row_major=True, columns=columns, even_columns=True, align=True)
             for criterion, text in texts.items():

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a Blender of a batch does with one file."""
+"""The tasks that a batch's Blender performs on one file."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a file needs Sinew, and what in it Sinew can not deform: for `sinew check`, ahead of a farm."""
+"""Finds out whether a file needs Sinew, and what in it Sinew cannot deform: for `sinew check`, before
+rendering on a farm."""
 
 from __future__ import annotations
 
@@ -18,19 +19,19 @@ from ...io import files
 
 
 def check(task: dict, report: Callable[..., None]) -> dict:
-    """What there is to know of the file "source" of a task.
+    """Checks the file "source" of a task.
 
-    "meshes": name and method of each that Sinew deforms; "inbetweens": armatures that Sinew poses;
-    "problems": a sentence for each thing that Sinew can not do, with what to do about it; "notes": what is no
-    fault.
-    Raises SinewError where the file can not be read. The open file is of no use afterwards.
+    "meshes": name and method of each mesh that Sinew deforms; "inbetweens": armatures that Sinew poses;
+    "problems": a sentence for each thing that Sinew cannot do, with what to do about it; "notes": remarks
+    that are no faults. Raises SinewError where the file cannot be read. The open file must not be used
+    afterwards.
     """
     report("opening it")
-    # As it is, before Sinew sees to what it finds.
+    # In its saved state, before Sinew reacts to what it finds.
     with updates_suspended():
         files.open_file(Path(task["source"]))
     report("trying it")
-    # What a library override stands for is there as well, linked, and of no concern.
+    # The originals of library overrides are in the file as well, linked, and do not matter.
     overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
     objects = [obj for obj in bpy.data.objects if obj not in overridden and not properties.is_copy(obj)]
     skinned = [obj for obj in objects if properties.has_sinew(obj)]
@@ -44,7 +45,7 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     off = [obj.name for obj in skinned if not properties.of(obj).enabled]
     problems = [problem for obj in objects if not properties.has_sinew(obj) for problem in _remains(obj)]
     problems += [reason for reason in map(inbetween_handlers.problem_of, armatures) if reason is not None]
-    problems += _undrivable(skinned)
+    problems += _not_deformable(skinned)
     notes = [f"{name} is switched off: its Armature modifier deforms it" for name in off]
     notes += [
         f"library {library.filepath} is missing: whether Sinew deforms what it links is not known"
@@ -59,9 +60,9 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     }
 
 
-def _undrivable(objects: list[bpy.types.Object]) -> Iterator[str]:
-    """A sentence for each object with settings of Sinew that it can not deform. Each is evaluated, in its
-    scene and shown: what is hidden is not, and would tell nothing."""
+def _not_deformable(objects: list[bpy.types.Object]) -> Iterator[str]:
+    """Yields a sentence for each object with settings of Sinew that it cannot deform. Each is evaluated,
+    visible in its scene, as Blender does not evaluate hidden objects."""
     left = []
     for obj in objects:
         problem = _obstacle(obj)
@@ -85,7 +86,7 @@ def _is_missing(library: bpy.types.Library) -> bool:
 
 
 def _obstacle(obj: bpy.types.Object) -> str | None:
-    """What is seen without an evaluation."""
+    """Returns a problem that is found without an evaluation."""
     gone = [replaced.name for replaced in properties.of(obj).replaced_modifiers if replaced.armature is None]
     if gone and attach.armature_of(obj) is None:
         return f"{obj.name}: the armature of {', '.join(gone)} is gone; choose another one, or Remove Sinew"
@@ -110,7 +111,7 @@ def _obstacle(obj: bpy.types.Object) -> str | None:
 
 
 def _remains(obj: bpy.types.Object) -> Iterator[str]:
-    """What there is of Sinew on an object without its settings, as older versions left it."""
+    """Yields remains of Sinew on an object without its settings, as older versions left them."""
     if obj.type != "MESH" or properties.is_helper(obj):
         return
     if stack.sinew_modifier(obj) is not None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a batch does to one file: Sinew on its meshes, or off them, and a copy saved; what came of it."""
+"""A batch's task for one file: puts Sinew on its meshes, or takes it off, saves a copy, and returns the
+outcome."""
 
 from __future__ import annotations
 
@@ -26,14 +27,14 @@ from ...features.compare import comparison
 from ...features.pages import render
 from ...io import files
 
-# Twice what the report shows them at.
+# Twice the size in the report.
 PICTURE_SIZE = 720
-# Frames that a comparison looks at where none are named.
+# The number of frames that are compared if none are given.
 SAMPLES = 9
 
 
 class _Clock:
-    """Tells what is being done, and keeps how long it took."""
+    """Reports what is being done, and records how long it took."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self.seconds: dict[str, float] = {}
@@ -48,13 +49,13 @@ class _Clock:
 
 
 def reskin(task: dict, report: Callable[[str], None]) -> dict:
-    """Saves a copy in which Sinew deforms the meshes that the settings mean, then compares the two.
+    """Saves a copy in which Sinew deforms the meshes selected by the settings, then compares both files.
 
-    task    "source", "target" and "unfinished" (where to save): paths; "settings" as of
-            batch.job_file.Settings; "frames" to compare at ("auto", "none", or as typed); "pictures": the
-            beginning of two pictures' paths, or None; "engine" to draw them, found out where it is missing
+    task  "source", "target" and "unfinished" (where to save): paths; "settings" as from
+          jobs.job_file.Settings; "frames" to compare at ("auto", "none", or as typed); "pictures": the
+          beginning of two pictures' paths, or None; "engine" to draw them, found out where it is missing
 
-    Raises SinewError, and saves nothing, where no mesh can be driven.
+    Raises SinewError, and saves nothing, where Sinew can deform no mesh.
     """
     source, settings = Path(task["source"]), task["settings"]
     clock = _Clock(report)
@@ -62,7 +63,7 @@ def reskin(task: dict, report: Callable[[str], None]) -> dict:
         files.open_file(source, load_ui=True)
     notes = _notes_on_file()
     with clock.doing("deforming"):
-        skinned, left_out = _drive(_meant(settings, source), settings)
+        skinned, left_out = _use_sinew(_meant(settings, source), settings)
     if not skinned:
         raise SinewError(f"{source}: {left_out.pop()}; nothing written")
     with clock.doing("saving"), updates_suspended():
@@ -92,7 +93,7 @@ def _bake(task: dict, names: set[str]) -> dict:
 
 
 def restore(task: dict, report: Callable[[str], None]) -> dict:
-    """Saves a copy without Sinew, its Armature modifiers as they were. Takes what reskin() takes.
+    """Saves a copy without Sinew, with its original Armature modifiers. Takes the same task as reskin().
 
     Raises SinewError, and saves nothing, where no mesh has Sinew.
     """
@@ -125,21 +126,21 @@ def restore(task: dict, report: Callable[[str], None]) -> dict:
     return {"meshes": meshes, "left_out": left_out, "notes": notes, "seconds": clock.seconds}
 
 
-def _drive(
+def _use_sinew(
     objects: list[bpy.types.Object], settings: dict
 ) -> tuple[list[tuple[bpy.types.Object, dict]], list[str]]:
-    """Puts Sinew on meshes: each with what is to be known of it; and why others stay as they were."""
+    """Puts Sinew on meshes. Returns each with its facts for the report, and why others were not changed."""
     before = [(_described(obj), properties.has_sinew(obj)) for obj in objects]
-    wanted = [(obj, _said_of(obj, settings, "method")) for obj in objects]
-    scales = {obj: _said_of(obj, settings, "scale") for obj in objects}
+    wanted = [(obj, _setting_of(obj, settings, "method")) for obj in objects]
+    scales = {obj: _setting_of(obj, settings, "scale") for obj in objects}
     values = {obj: _parameters_of(obj, settings) for obj in objects}
     skinned, left_out = [], []
-    for (obj, method), (way, was_driven), error in zip(
+    for (obj, method), (way, had_sinew), error in zip(
         wanted, before, evaluate.use_methods_for_file(wanted, scales, values), strict=True
     ):
         if error is not None:
             left_out.append(str(error))
-            if properties.has_sinew(obj) and not was_driven:
+            if properties.has_sinew(obj) and not had_sinew:
                 attach.remove(obj)
             continue
         state = session.state_of(obj)
@@ -156,8 +157,9 @@ def _drive(
 
 
 def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:
-    """The file's armature-deformed meshes that the settings mean. Raises SinewError where there are none."""
-    # What a library override stands for is there as well, linked, and of no concern.
+    """Returns the file's armature-deformed meshes that the settings select. Raises SinewError where there are
+    none."""
+    # The originals of library overrides are in the file as well, linked, and do not matter.
     overridden = {obj.override_library.reference for obj in bpy.data.objects if obj.override_library}
     deformed = attach.deformed_meshes([obj for obj in bpy.data.objects if obj not in overridden])
     if not deformed:
@@ -171,7 +173,8 @@ def _meant(settings: dict, source: Path) -> list[bpy.types.Object]:
 
 
 def _is_meant(obj: bpy.types.Object, settings: dict) -> bool:
-    """Included, or nothing is; and not excluded: by its own name, or that of a collection that it is in."""
+    """Whether it is included, or nothing is, and not excluded: by its own name, or that of a collection that
+    it is in."""
     include, exclude = settings["include"], settings["exclude"]
     if not include and not exclude:
         return True
@@ -183,21 +186,22 @@ def _is_meant(obj: bpy.types.Object, settings: dict) -> bool:
     return (not include or is_one_of(include)) and not is_one_of(exclude)
 
 
-def _said_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
-    """What the last rule for the object says, or the settings for all."""
+def _setting_of(obj: bpy.types.Object, settings: dict, key: str) -> str | None:
+    """Returns the value in the last rule for the object, or else in the settings for all."""
     rules = settings["objects"]
     said = [rule[key] for rule in rules if key in rule and fits(obj.name, rule["match"])]
     return said[-1] if said else settings[key]
 
 
 def _parameters_of(obj: bpy.types.Object, settings: dict) -> dict[str, parameters.Value]:
-    """Those for all, and those of each rule for the object; later ones win."""
+    """Returns the parameters for all, and those of each rule for the object; later ones override earlier
+    ones."""
     rules = [rule["set"] for rule in settings["objects"] if "set" in rule and fits(obj.name, rule["match"])]
     return parameters.parse(text for texts in (settings["set"], *rules) for text in texts)
 
 
 def _described(obj: bpy.types.Object) -> str:
-    """How a mesh was deformed before."""
+    """Returns how a mesh was deformed before."""
     if properties.has_sinew(obj):
         return f"Sinew, {properties.of(obj).method}"
     modifiers = stack.armature_modifiers(obj)
@@ -208,9 +212,9 @@ def _described(obj: bpy.types.Object) -> str:
 
 
 def _notes_on_file() -> list[str]:
-    """What whoever gets the copy should know of the file itself."""
+    """Returns notes about the file itself for the user of the copy."""
     notes = []
-    # The third number of a file's is one of its format, of no release.
+    # The third number of a file's version is that of its format, not of a release.
     written, running = tuple(bpy.data.version)[:2], bpy.app.version[:2]
     if written != running:
         age = "a newer" if written > running else "an older"
@@ -232,8 +236,8 @@ def _dotted(version: tuple[int, ...]) -> str:
 
 
 def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: dict, clock: _Clock) -> None:
-    """Adds to the outcome how far each mesh is from its Armature modifier at most, and a picture of both at
-    the worst frame. The open file is of no use afterwards: the copy is saved by now."""
+    """Adds to the outcome how far each mesh is from its Armature modifier's shape at most, and a picture of
+    both at the worst frame. The open file must not be used afterwards: the copy is saved by now."""
     scene = bpy.context.scene
     shown = [(obj, mesh) for obj, mesh in skinned if obj in scene.objects[:]]
     if not shown:
@@ -260,8 +264,8 @@ def _compare(task: dict, skinned: list[tuple[bpy.types.Object, dict]], outcome: 
 def _deviation(
     mesh: dict, frames: list[float], ours: list[np.ndarray], theirs: list[np.ndarray]
 ) -> tuple[float, float]:
-    """Adds to what is known of a mesh how far `ours` is from `theirs` at most, points frame by frame; returns
-    that as a part of the mesh's diagonal, and the frame."""
+    """Adds to a mesh's facts how far `ours` is from `theirs` at most, given as points for each frame. Returns
+    that as a share of the mesh's diagonal, and the frame."""
     if any(a.shape != b.shape for a, b in zip(ours, theirs, strict=True)):
         mesh["warnings"].append("a modifier behind changes the number of vertices: not compared")
         return 0.0, frames[0]
@@ -292,7 +296,7 @@ def _draw(
     engine: str,
     stem: Path,
 ) -> dict:
-    """Draws the meshes under their Armature modifiers, which are at work, and under Sinew."""
+    """Draws the meshes under their Armature modifiers, which deform now, and under Sinew."""
     objects = [obj for obj, _mesh in shown]
     evaluate.set_frame(scene, frame)
     before = evaluate.world_points(objects)

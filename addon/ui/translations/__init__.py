@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sinew's texts in other languages, by Blender's own mechanism (`bpy.app.translations`).
 
-Blender looks up every label, tooltip and choice itself, and what a layout is given as text. Only texts that
-are put together go through tr() and counted().
+Blender itself translates every label, tooltip and choice, and text given to a layout. Only composed texts go
+through tr() and counted().
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import bpy
 from ...core.phrases import Phrase
 from . import german
 
-# By the language alone, which Blender takes for all of its countries: de for de_DE.
+# By language alone, which Blender uses for all of its countries: de for de_DE.
 LANGUAGES = {"de": german.TEXTS}
-# Blender asks for an operator's label, and the text of its buttons, in a context of their own.
+# Blender translates an operator's label, and the text of its buttons, in a separate context.
 CONTEXTS = (bpy.app.translations.contexts.default, bpy.app.translations.contexts.operator_default)
 
 
 def tr(text: str, /, **values: object) -> str:
-    """A text of the interface in the user's language.
+    """Returns a text of the interface in the user's language.
 
     values  for its names in braces
     """
@@ -35,17 +35,17 @@ def tr(text: str, /, **values: object) -> str:
 
 
 def counted(count: int, one: str, many: str) -> str:
-    """The text for one, or for another number, which is {count} in both."""
+    """Returns the text for one, or for another number; both contain {count}."""
     return tr(one if count == 1 else many, count=f"{count:,}")
 
 
 def joined(texts: Iterable[str]) -> str:
-    """Translated texts as one: "A and B"."""
+    """Returns translated texts as one: "A and B"."""
     return f" {tr('and')} ".join(tr(text) for text in texts)
 
 
 def tip(text: str) -> str:
-    """A tooltip, which the user can have in English apart from the interface."""
+    """Returns a tooltip, which the user can have in English independently of the interface."""
     return bpy.app.translations.pgettext_tip(text)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Sinew deforms, while it is baked."""
+"""Checks and reads what Sinew deforms, for baking."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import bpy
 from ...attach import properties
 from ...core.errors import SinewError
 from ...deform import session
-from ...deform.plan import MODES_OF_THE_MODIFIER
+from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
 
 
@@ -19,16 +19,17 @@ def check_on(obj: bpy.types.Object) -> None:
 
 
 def state_of(obj: bpy.types.Object) -> SkinnedObject:
-    """At the current frame. Raises SinewError where Sinew does not give its modifier a shape."""
-    # As it was evaluated with the frame: what Sinew wrote since would be evaluated for nothing.
+    """Returns the object's state at the current frame. Raises SinewError where Sinew does not give its
+    modifier a shape."""
+    # The depsgraph as it was evaluated for the frame: evaluating what Sinew wrote since is not needed.
     pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
-    if not pairs or obj.mode in MODES_OF_THE_MODIFIER:
+    if not pairs or obj.mode in ARMATURE_MODIFIER_MODES:
         raise _off(obj)
     return pairs[0][1]
 
 
 def posed_state_of(obj: bpy.types.Object) -> SkinnedObject:
-    """The same where its first Armature modifier takes part; else raises SinewError."""
+    """Returns the same where its first Armature modifier takes part; otherwise raises SinewError."""
     state = state_of(obj)
     if state.shown.frames[0] is None:
         raise _off(obj)
