@@ -28,8 +28,8 @@ BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 LEFT_TO_OTHERS = {
     *("test_bake", "test_bake_apart", "test_bake_bones", "test_batch", "test_blend", "test_check"),
     "test_cluster",
-    *("test_command_line", "test_compare", "test_comparison", "test_export", "test_hostile", "test_output"),
-    *("test_report", "test_restore", "test_stages_in_features"),
+    *("test_command_line", "test_compare", "test_comparison", "test_export", "test_flamenco", "test_hostile"),
+    *("test_output", "test_report", "test_restore", "test_stages_in_features"),
 }
 # What Sinew makes of a character that Blender gave it, and its panels: left to the long-term releases by the
 # others. These run how Blender evaluates, stores, edits and renders.

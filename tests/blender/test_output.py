@@ -111,6 +111,7 @@ def test_every_command_that_writes_is_tested_here():
     }
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("writer", WRITERS)
 def test_no_folder_to_write_to(writer, inputs, tmp_path, capsys):
     name = WRITERS[writer][1]
@@ -130,6 +131,7 @@ def test_no_folder_to_write_to(writer, inputs, tmp_path, capsys):
     assert all_in(tmp_path) == ["nowhere", "taken.blend"]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("writer", WRITERS)
 def test_the_wrong_thing_has_the_name(writer, inputs, tmp_path, capsys):
     """A file where a folder is to be, and a folder where a file is."""
@@ -144,6 +146,7 @@ def test_the_wrong_thing_has_the_name(writer, inputs, tmp_path, capsys):
     assert all_in(tmp_path) == [place.name]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_read_only_disk(writer, inputs, tmp_path, capsys):
     with disk(tmp_path / "locked", "ro") as folder:
@@ -233,6 +236,7 @@ def test_standard_output_on_a_full_disk(arguments, inputs):
     assert "Exception ignored" not in errors
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     "arguments",
     [
