@@ -8,23 +8,24 @@
 
 namespace sinew {
 
-/// Columns of a factor that follow each other and are kept as if all of them had the same rows below: so few of its
-/// numbers have to say which row they are in, and vectors of the right side are read once for many of them.
+/// Consecutive columns of a factor that are stored as if all of them had the same rows below (a supernode). One
+/// row index serves all columns of a block, and the right side is read once for many columns.
 struct FactorBlock {
-    std::uint32_t first;      // column
-    std::uint32_t width;      // columns
-    std::uint32_t first_row;  // of BlockFactor::rows
-    std::uint32_t row_count;  // below all of the columns
-    std::size_t first_value;  // of BlockFactor::values
+    std::uint32_t first;      // the first column
+    std::uint32_t width;      // number of columns
+    std::uint32_t first_row;  // index into BlockFactor::rows
+    std::uint32_t row_count;  // number of rows below the block, common to all its columns
+    std::size_t first_value;  // index into BlockFactor::values
 };
 
-/// The factor L of a matrix L D L^T, L of unit diagonal.
+/// The factor L of a matrix L D L^T. L has unit diagonal.
 struct BlockFactor {
     std::vector<FactorBlock> blocks;
     std::vector<std::int32_t> rows;
-    // Of each block row by row: of its k-th column's row k numbers, then of each row below the columns `width`.
+    // For each block, row by row: first the triangle (row k has k numbers), then `width` numbers for each row
+    // below.
     std::vector<double> values;
-    std::vector<double> diagonal;  // of D
+    std::vector<double> diagonal;  // the diagonal of D
 
     [[nodiscard]] static constexpr std::size_t triangle(std::size_t width) { return width * (width - 1) / 2; }
 };
