@@ -27,11 +27,11 @@ inline constexpr std::size_t kMomentParts = 3;
 }
 
 /// The row of a block in which number `n` of a bone's Moments is stored.
-struct MomentPlace {
+struct MomentPosition {
     MomentPart part;
     std::size_t row;
 };
-[[nodiscard]] constexpr MomentPlace moment_place(std::size_t bone, std::size_t n) {
+[[nodiscard]] constexpr MomentPosition moment_position(std::size_t bone, std::size_t n) {
     if (n == 0) return {MomentPart::weight, 3 + bone};
     if (n < 4) return {MomentPart::first, 3 * bone + n - 1};
     return {MomentPart::second, 6 + 6 * bone + n - 4};
@@ -57,8 +57,8 @@ struct BoneMoments {
 };
 
 /// The index into BoneMoments::parts of a row of a block.
-[[nodiscard]] inline std::size_t row_of(const MomentBlock& block, const MomentPlace& place) {
-    return block.first_rows[static_cast<std::size_t>(place.part)] + place.row;
+[[nodiscard]] inline std::size_t row_of(const MomentBlock& block, const MomentPosition& position) {
+    return block.first_rows[static_cast<std::size_t>(position.part)] + position.row;
 }
 
 /// The bones of the rows [any number][kMomentFloats], in any order and possibly repeated. Rows that are all 0 are

@@ -49,15 +49,17 @@ struct LoneFans {
 
 /// Up to kLanes fans with the same number of edges. Lanes without a fan repeat the last one.
 struct FanBlock {
-    // of NormalMesh::fan_vertices: [2 + edges][kLanes] the fan's, then the end of its last edge, then those of
-    // all edges, each once; from the first on in the order of a walk
+    // into NormalMesh::fan_vertices: [2 + edges][kLanes] the fan's vertex, the end of its last edge, then the
+    // ends of all edges, each once, in the order in which the edges follow each other around the vertex
     std::size_t first_vertex;
     std::uint32_t edges;
     bool reads_last_point;        // if so, nothing may be read behind it
     Lanes<std::int32_t> normals;  // the normals that are tilted and rotated, as NormalMesh::corner_sources
-    // from that normal, as a part of the mean angle of edges, or of what is left of a turn
+    // the angle by which the normal is tilted, relative to the mean angle of the edges, or to 360 degrees minus
+    // that
     Lanes<float> tilt;
-    // about it, from the first edge on, as a part of the angle to the last, or of the rest
+    // the angle of the rotation about that normal from the first edge on, relative to the angle to the last edge,
+    // or to 360 degrees minus that
     Lanes<float> turn;
 };
 

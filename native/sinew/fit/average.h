@@ -123,8 +123,8 @@ struct Deviation {
     return {std::max(median(angles), rounding), std::max(median(distances), rounding * poses.longest)};
 }
 
-/// The pose from which the weighted sum of the others' deviations is least, each in the medians from it: of the
-/// first of at most 64, evenly apart. More than half of the poses are near it where that many are near each other.
+/// The pose with the smallest product of the median deviations of all poses from it. Tries at most 64 candidates,
+/// evenly spaced. If more than half of the poses are near each other, they are near the result.
 [[nodiscard]] inline DualQuat<double> medoid(const Poses& poses, double rounding) {
     const std::size_t step = (poses.size() + 63) / 64;
     DualQuat<double> best = poses.poses.front();
