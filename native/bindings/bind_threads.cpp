@@ -39,8 +39,10 @@ private:
 void bind_threads(pybind11::module_& m) {
     m.def(
         "keep_thread_state", [] { thread_local const KeptState kept; },
-        "Keeps Python's state of the calling thread until that ends: a thread that Python did not start, and "
-        "that calls it often, is 50 to 100 us a call faster. Safe to call again, and on any thread.");
+        "Keeps Python's state of the calling thread until the thread ends. This makes calls from a thread\n"
+        "that Python did not start, and that calls it often, 50 to 100 us faster. May be called again, and "
+        "on\n"
+        "any thread.");
 }
 
 }  // namespace sinew::bindings
