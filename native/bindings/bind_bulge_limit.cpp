@@ -13,7 +13,7 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 16'384;  // some 30 microseconds
+constexpr std::size_t kVerticesUnderLock = 16'384;  // about 30 microseconds
 
 const Parameter& parameter_of(std::string_view id) {
     for (const Parameter& parameter : BulgeLimitStage::kParameters) {
@@ -74,7 +74,7 @@ BulgeLimit make_from_weights(const py::object& rest_points, const py::object& in
 void set_rest_points(BulgeLimit& limit, const py::object& rest_points, const py::object& bones_from_model) {
     const auto points = checked_points(rest_points, "rest_points");
     const Affine<float> space = checked_space(bones_from_model);
-    // It may have to wait for another thread that applies it.
+    // May have to wait for another thread that applies it.
     without_gil([&] { limit.set_rest_points(as_points(points), space); });
 }
 
@@ -107,7 +107,7 @@ py::array_t<float> apply(const BulgeLimit& limit, const py::object& points, cons
     return result;
 }
 
-// --- Pickles: what was given, as the constructor takes it, with weights normalised.
+// --- Pickles: the constructor's arguments, with normalised weights.
 
 py::tuple state_of(const BulgeLimit& limit) {
     const BulgeLimit::Parts parts = limit.parts();

@@ -17,7 +17,7 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 32'768;  // some 30 microseconds
+constexpr std::size_t kVerticesUnderLock = 32'768;  // about 30 microseconds
 
 std::string names_of_methods() {
     std::string names;
@@ -39,7 +39,7 @@ MethodInfo checked_method(const py::object& method, const char* argument) {
 
 namespace {
 
-/// The arrays that BindData points at.
+/// The arrays that BindData refers to.
 struct BindArrays {
     py::array_t<float> points;
     py::array_t<std::int32_t> offsets;
@@ -55,7 +55,7 @@ struct BindArrays {
     }
 };
 
-/// From a dict of arrays by the names of methods.
+/// Adds the arrays of a dict with names of methods as keys.
 void add_vertex_data(const py::object& vertex_data, BindArrays& arrays) {
     if (!py::isinstance<py::dict>(vertex_data)) {
         fail("vertex_data", "None or a dict of arrays by names of methods", describe(vertex_data));
@@ -132,7 +132,7 @@ Deformer make_deformer_of(const Binding& binding, const py::object& method, cons
     return Deformer(binding, first, second.data());
 }
 
-// --- Pickles: what a Binding keeps, as arrays; of a Deformer, then its method and mix.
+// --- Pickles: the data that a Binding keeps, as arrays; for a Deformer also its method and mix.
 
 py::tuple state_of(const BoundMesh& mesh) {
     py::object rest_bones = py::none();
@@ -201,8 +201,8 @@ std::string text_of_deformer(const Deformer& deformer) {
     return text + ": " + counts_of(deformer);
 }
 
-// Read in place, as posed bones come by columns from Blender on every frame. Multiplied in double, as a bone
-// far from the origin would lose digits.
+// Read in place, because posed bones come from Blender by columns in every frame. Multiplied in double, because a
+// bone far from the origin would lose digits.
 std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
                                            const py::object& rest_inverses) {
     const char* const wanted = "float32 [n, 4, 4] or [n, 3, 4]";
@@ -243,14 +243,14 @@ std::vector<Affine<float>> posed_from_rest(const py::object& bone_transforms,
     return bones;
 }
 
-/// Values of the parameters of `method` in its order.
+/// The default values of the parameters of `method`, in its order.
 std::vector<double> default_parameters(const MethodInfo& method) {
     std::vector<double> values;
     for (const Parameter& parameter : method.parameters) values.push_back(parameter.initial);
     return values;
 }
 
-/// A parameter of some method, and its index.
+/// A parameter of some method, as an index.
 struct MethodParameter {
     MethodInfo method;
     std::size_t index;
@@ -269,7 +269,8 @@ MethodParameter checked_parameter_name(const py::handle& name) {
     fail("parameters", wanted, "'" + text + "'");
 }
 
-/// From a dict of values by the full names of parameters. Those of other methods are checked, and change nothing.
+/// The values of a dict with full names of parameters as keys. Those of other methods are checked, but have no
+/// effect.
 Parameters checked_parameters(const Deformer& deformer, const py::object& parameters) {
     if (parameters.is_none()) return {};
     if (!py::isinstance<py::dict>(parameters)) {
@@ -326,14 +327,14 @@ py::array_t<float> deform(const Deformer& deformer, const py::object& bone_trans
     const std::span<Vec3<float>> target(reinterpret_cast<Vec3<float>*>(points.mutable_data()),
                                         deformer.vertex_count());
     const auto run = [&] { deformer.deform(arguments.bones, arguments.options, target); };
-    // Where many threads want the lock, getting it back takes longer than to deform a small mesh.
+    // With many threads waiting for the GIL, acquiring it again takes longer than deforming a small mesh.
     deformer.vertex_count() > kVerticesUnderLock ? without_gil(run) : run();
     return points;
 }
 
 void set_rest_points(Deformer& deformer, const py::object& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
-    // It may have to wait for another thread's deformation.
+    // May have to wait for another thread's deformation.
     without_gil([&] { deformer.set_rest_points(as_points(points)); });
 }
 

@@ -14,16 +14,16 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kVerticesUnderLock = 1024;  // some 30 microseconds
+constexpr std::size_t kVerticesUnderLock = 1024;  // about 30 microseconds
 
-/// Settings, and the array that their weights point at.
+/// Settings, and the array that their weights refer to.
 struct SettingArguments {
     DeltaMushSettings settings;
     py::array_t<float> weights;
 };
 
 float checked_float(const py::object& value, const char* argument) {
-    // Those of numpy, too; of an array with one number numpy would make one with a warning.
+    // Accepts numpy's numbers, too, but not arrays of one number, which numpy would convert with a warning.
     if (py::isinstance<py::array>(value)) fail(argument, "a number", describe(value));
     const double number = PyFloat_AsDouble(value.ptr());
     if (PyErr_Occurred() != nullptr) {
@@ -100,7 +100,7 @@ void bind(DeltaMush& mush, const py::object& rest_points, const py::object& iter
     const auto points = checked_points(rest_points, "rest_points");
     const SettingArguments with =
         checked_settings(iterations, radius, factor, smooth_type, pin_boundary, weights);
-    // It may have to wait for another thread that applies it.
+    // May have to wait for another thread that applies it.
     without_gil([&] { mush.bind(as_points(points), with.settings); });
 }
 
@@ -123,7 +123,7 @@ py::array_t<float> apply(const DeltaMush& mush, const py::object& points, const 
     return result;
 }
 
-// --- Pickles: what was given, as the constructor takes it.
+// --- Pickles: the constructor's arguments.
 
 py::tuple state_of(const DeltaMush& mush) {
     const auto [topology, rest_points, settings] = mush.parts();

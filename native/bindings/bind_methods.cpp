@@ -12,7 +12,7 @@ namespace py = pybind11;
 
 std::string text(std::string_view view) { return std::string(view); }
 
-/// None where the kind has none.
+/// The default value; None for kinds that have none.
 py::object initial_value(const Parameter& parameter) {
     switch (parameter.kind) {
         case ParameterKind::number: return py::float_(parameter.initial);
@@ -50,14 +50,14 @@ py::tuple names_of(Needs needs) {
     return py::tuple(names);
 }
 
-/// A property that is the text of this field.
+/// A property with the text of this field.
 template <auto field, class Class>
 void def_text(Class& of, const char* name, const char* doc) {
     of.def_property_readonly(
         name, [](const typename Class::type& row) { return text(row.*field); }, doc);
 }
 
-/// What methods and stages have alike.
+/// The properties that methods and stages have in common.
 template <class Row>
 void def_facts(py::class_<Row>& of, const char* type) {
     def_text<&Row::name>(of, "name", "The name in programs.");

@@ -16,14 +16,12 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kCornersUnderLock = 4096;  // some 30 microseconds
+constexpr std::size_t kCornersUnderLock = 4096;  // about 30 microseconds
 
 // In the order of NormalDomain.
 constexpr std::string_view kDomains[] = {"vertex", "corner", "face"};
 
-/// None as an empty array.
-///
-/// Numbers other than 0 are set flags.
+/// Flags: all numbers except 0 are set. None gives an empty array.
 std::vector<std::uint8_t> checked_flags(const py::object& value, const char* argument,
                                         const std::string& wanted) {
     if (value.is_none()) return {};
@@ -34,7 +32,7 @@ std::vector<std::uint8_t> checked_flags(const py::object& value, const char* arg
     return result;
 }
 
-/// None as an empty array.
+/// Custom normals. None gives an empty array.
 std::vector<std::int16_t> checked_custom(const py::object& value) {
     if (value.is_none()) return {};
     const std::string wanted = "None or int16 [corners, 2]";
@@ -116,7 +114,7 @@ py::array_t<float> compute(const Normals& normals, const py::object& points, con
     return result;
 }
 
-// --- Pickles: what was given, as the constructor takes it.
+// --- Pickles: the constructor's arguments.
 
 py::object flags_of(std::span<const std::uint8_t> flags) {
     if (flags.empty()) return py::none();

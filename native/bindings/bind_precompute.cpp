@@ -17,7 +17,8 @@
 namespace sinew::bindings {
 namespace {
 
-/// Calls `run` with options that report to `progress`, a callable or None. The lock is given away but for these calls.
+/// Calls `run` with options that report to `progress`, a callable or None. Releases the GIL except during these
+/// calls.
 template <class Run>
 auto precompute(const py::object& progress, PrecomputeOptions options, const Run& run) {
     if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0) {
@@ -29,7 +30,7 @@ auto precompute(const py::object& progress, PrecomputeOptions options, const Run
             take_gil_back(state);
             const auto give_away = [&state] { state = PyEval_SaveThread(); };
             try {
-                // Whatever else it returns, or nothing, goes on.
+                // Anything but False continues the work, also None.
                 const bool goes_on = !progress(done).is(py::bool_(false));
                 give_away();
                 return goes_on;
@@ -61,7 +62,7 @@ std::size_t thread_count(const py::object& threads) {
     return overflow > 0 ? std::numeric_limits<std::size_t>::max() : static_cast<std::size_t>(count);
 }
 
-/// A mesh that a precomputation takes.
+/// The mesh argument of a precomputation.
 struct Mesh {
     py::array_t<float> points;
     py::array_t<std::int32_t> offsets;

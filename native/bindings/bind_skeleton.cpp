@@ -12,7 +12,7 @@ Skeleton make_skeleton(const py::object& parents) {
     return Skeleton({array.data(), static_cast<std::size_t>(array.size())});
 }
 
-// [bones, ..] of one representation, one for each bone.
+// Transforms [bones, ..] in one representation, one for each bone.
 template <class Transform, class T>
 std::vector<Transform> checked_bones(const Skeleton& skeleton, const py::object& value,
                                      const char* argument) {
@@ -33,7 +33,7 @@ py::object as_array(const std::vector<Transform>& bones) {
     return output.take();
 }
 
-// One transform; the identity where `value` is None.
+// One transform; the identity if `value` is None.
 template <class Transform, class T>
 Transform checked_root(const py::object& value) {
     if (value.is_none()) return {};
@@ -78,8 +78,8 @@ py::object branch_updated(const Skeleton& skeleton, const py::object& any_relati
     });
 }
 
-// (transforms, is_defined) of run(moment, bones) at every number of `at`: of one number [bones, ..] and a bool, of
-// [..] numbers [.., bones, ..] and [..].
+// (transforms, is_defined) from run(moment, bones) for each number in `at`: for one number [bones, ..] and a
+// bool, for numbers [..] the shapes [.., bones, ..] and [..].
 template <class Transform, class T, class Run>
 py::object at_all(const Skeleton& skeleton, const Input<T>& at, Run run) {
     Shape shape = at.lead;
@@ -117,7 +117,7 @@ py::object interpolate(const Skeleton& skeleton, const py::object& any_a, const 
     });
 }
 
-// run(keyframes, times, time, bones) on checked arrays.
+// Calls run(keyframes, times, time, bones) with checked arrays.
 template <class Transform, class T, class Run>
 py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
                         const py::object& time, Run run) {

@@ -10,9 +10,9 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr std::size_t kFramesUnderLock = 4096;  // some 30 microseconds
+constexpr std::size_t kFramesUnderLock = 4096;  // about 30 microseconds
 
-/// [n, 3]; none where `value` is None.
+/// Vectors [n, 3]; none if `value` is None.
 py::array_t<float> checked_vectors(const py::object& value, const char* argument) {
     if (value.is_none()) return checked_out(py::none(), 0);
     return checked_points(value, argument);

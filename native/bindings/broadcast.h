@@ -42,8 +42,8 @@ struct Input {
 /// anything else.
 bool is_double(const py::handle& value, const char* argument, const std::string& wanted);
 
-/// The arguments of one call with their arrays in one element type, float32 or float64: as numpy promotes them, so
-/// float64 where one is not of float32 or less. Numbers, and what is no array of numbers, stay as they are.
+/// The arguments of one call with their arrays in one element type, float32 or float64, as numpy promotes them:
+/// float64 if any is not float32 or smaller. Numbers, and anything that is no array of numbers, are not changed.
 void promote(std::span<py::object> values, std::span<const char* const> arguments);
 
 template <std::size_t N>
