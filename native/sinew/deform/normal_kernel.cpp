@@ -137,7 +137,7 @@ HWY_INLINE SineCosine<D> sine_cosine(D d, Vec<D> angle) {
 /// The angle for a stored number: `part` of `whole`, or if negative, backwards by that part of 360 degrees minus
 /// `whole`.
 template <class D>
-HWY_INLINE Vec<D> turned(D d, Vec<D> part, Vec<D> whole) {
+HWY_INLINE Vec<D> stored_angle(D d, Vec<D> part, Vec<D> whole) {
     const auto rest = hn::Sub(hn::Set(d, 6.28318530717959f), whole);
     return hn::Mul(part, hn::IfThenElse(hn::Gt(part, hn::Zero(d)), whole, rest));
 }
@@ -169,7 +169,7 @@ struct FanEdges {
 /// The normals `n`, tilted and then rotated.
 template <class D>
 HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& edges, Vec<D> tilt,
-                                    Vec<D> turn) {
+                                    Vec<D> spin) {
     const Points<D> x = perpendicular<D>(d, edges.first, n, edges.along_first);
     const Points<D> y = direction(d, rounded_cross<D>(n, x));
     const Points<D> to_last = perpendicular<D>(d, edges.last, n, edges.along_last);
@@ -180,10 +180,10 @@ HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& 
     const auto is_behind = hn::Lt(rounded_dot<D>(y, to_last), hn::Zero(d));
     const auto beta =
         hn::IfThenElse(hn::Lt(cosine, steep), hn::IfThenElse(is_behind, hn::Sub(whole, acute), acute), whole);
-    const SineCosine<D> of_tilt = sine_cosine(d, turned(d, tilt, edges.mean_angle));
-    const SineCosine<D> of_turn = sine_cosine(d, turned(d, turn, beta));
-    const auto on_x = hn::Mul(of_tilt.sine, of_turn.cosine);
-    const auto on_y = hn::Mul(of_tilt.sine, of_turn.sine);
+    const SineCosine<D> of_tilt = sine_cosine(d, stored_angle(d, tilt, edges.mean_angle));
+    const SineCosine<D> of_spin = sine_cosine(d, stored_angle(d, spin, beta));
+    const auto on_x = hn::Mul(of_tilt.sine, of_spin.cosine);
+    const auto on_y = hn::Mul(of_tilt.sine, of_spin.sine);
     const auto zero = hn::Zero(d);
     const auto stays = hn::Or(hn::Eq(tilt, zero), hn::Or(hn::Eq(edges.mean_angle, zero), hn::Eq(beta, zero)));
     const auto has_space =
@@ -259,7 +259,7 @@ HWY_INLINE void compute_lanes(D d, const NormalFrame& frame, const FaceBlock& bl
             const auto mean = hn::Div(angles, hn::Set(d, 2.0f));
             const Points<D> normals = custom_normals<D>(
                 d, normal, {edges[k], back, along_first, along_last, mean},
-                hn::Load(d, fans.tilt.lane.data() + lane), hn::Load(d, fans.turn.lane.data() + lane));
+                hn::Load(d, fans.tilt.lane.data() + lane), hn::Load(d, fans.spin.lane.data() + lane));
             store_interleaved(d, normals.x, normals.y, normals.z, zero,
                               numbers_of(frame.lone_normals + kLanes * (block.first_lone + k) + lane));
         }
@@ -397,7 +397,7 @@ HWY_INLINE Points<D> fan_normals(D d, const NormalFrame& frame, const FanBlock& 
     const auto mean = hn::Div(angles, hn::Set(d, static_cast<float>(block.edges)));
     return custom_normals<D>(d, n, {first, last, along_first, along_last, mean},
                              hn::Load(d, block.tilt.lane.data() + lane),
-                             hn::Load(d, block.turn.lane.data() + lane));
+                             hn::Load(d, block.spin.lane.data() + lane));
 }
 
 void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {

@@ -229,7 +229,7 @@ private:
             const std::size_t lane = source_of(fan) / 8 - mesh_.blocks[b].first_slot;
             const std::size_t row = mesh_.blocks[b].first_lone + source_of(fan) % 4;
             mesh_.lone_fans[row].tilt.lane[lane] = part(sharpness_.custom[2 * corner]);
-            mesh_.lone_fans[row].turn.lane[lane] = part(sharpness_.custom[2 * corner + 1]);
+            mesh_.lone_fans[row].spin.lane[lane] = part(sharpness_.custom[2 * corner + 1]);
             mesh_.corner_sources[corner] =
                 static_cast<std::int32_t>(mesh_.first_of_lone_fans() + kLanes * row + lane);
             return true;
@@ -267,15 +267,15 @@ private:
             vertices[kLanes] = preceding(corners.back());
             // In a fan that is not closed, the last edge is not the following edge of any corner.
             vertices[(1 + block.edges) * kLanes] = vertices[kLanes];
-            std::int64_t tilt = 0, turn = 0;
+            std::int64_t tilt = 0, spin = 0;
             for (std::size_t k = 0; k < corners.size(); ++k) {
                 vertices[(2 + k) * kLanes] = following(corners[k]);
                 tilt += sharpness_.custom[2 * index(corners[k])];
-                turn += sharpness_.custom[2 * index(corners[k]) + 1];
+                spin += sharpness_.custom[2 * index(corners[k]) + 1];
             }
             block.normals.lane[lane] = mesh_.corner_sources[index(corners.front())];
             block.tilt.lane[lane] = part(tilt / static_cast<std::int64_t>(corners.size()));
-            block.turn.lane[lane] = part(turn / static_cast<std::int64_t>(corners.size()));
+            block.spin.lane[lane] = part(spin / static_cast<std::int64_t>(corners.size()));
         }
         const auto vertices = std::span<const std::int32_t>(mesh_.fan_vertices).subspan(first_vertex);
         block.reads_last_point = std::ranges::find(vertices, last_vertex_) != vertices.end();

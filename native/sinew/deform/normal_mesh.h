@@ -44,7 +44,7 @@ struct CornerGroups {
 /// FanBlock; 0 for corners that belong to other fans.
 struct LoneFans {
     Lanes<float> tilt;
-    Lanes<float> turn;
+    Lanes<float> spin;
 };
 
 /// Up to kLanes fans with the same number of edges. Lanes without a fan repeat the last one.
@@ -60,7 +60,7 @@ struct FanBlock {
     Lanes<float> tilt;
     // the angle of the rotation about that normal from the first edge on, relative to the angle to the last edge,
     // or to 360 degrees minus that
-    Lanes<float> turn;
+    Lanes<float> spin;
 };
 
 /// A mesh in the form that the normal kernels read.

@@ -222,7 +222,7 @@ void IkSolver::State::start(const IkProblem& problem, std::span<const Quat<doubl
     update();
     if (tips.size() != 1 || !(tips[0].effector.position_weight > 0.0)) return;
     const bool was_moved = tips[0].effector.rotation_weight == 0.0 && move_goal_within_reach();
-    if (has_pole) turn_to_pole();
+    if (has_pole) rotate_to_pole();
     if (was_moved) stretch();
 }
 
@@ -275,12 +275,12 @@ void IkSolver::State::stretch() noexcept {
     update();
 }
 
-bool IkSolver::State::can_turn_to_goal() const noexcept {
+bool IkSolver::State::can_rotate_to_goal() const noexcept {
     return tips.size() == 1 && !has_pole && tips[0].effector.position_weight > 0.0 &&
            tips[0].chain.size() > 1;
 }
 
-void IkSolver::State::turn_to_goal() noexcept {
+void IkSolver::State::rotate_to_goal() noexcept {
     const IkTip& tip = tips[0];
     IkBone& root = bones[tip.root];
     const Vec3<double> now = tip.position - root.head;
@@ -290,7 +290,7 @@ void IkSolver::State::turn_to_goal() noexcept {
     update();
 }
 
-void IkSolver::State::turn_to_pole() noexcept {
+void IkSolver::State::rotate_to_pole() noexcept {
     const IkTip& tip = tips[0];
     IkBone& root = bones[tip.root];
     const auto frame = [](const Vec3<double>& along, const Vec3<double>& up, Mat3<double>& result) {
@@ -399,11 +399,11 @@ IkResult IkSolver::solve(const IkProblem& problem, std::span<Quat<double>> rotat
     state.start(problem, rotations);
     IkResult result;
     result.iterations = run();
-    if (!state.is_reached(options.tolerance) && state.can_turn_to_goal()) {
+    if (!state.is_reached(options.tolerance) && state.can_rotate_to_goal()) {
         const double error = state.cost();
         state.keep(state.first_rotations, state.first_coordinates);
         state.start(problem, rotations);
-        state.turn_to_goal();
+        state.rotate_to_goal();
         result.iterations += run();
         if (!(state.cost() < error)) state.restore(state.first_rotations, state.first_coordinates);
     }

@@ -109,14 +109,14 @@ struct IkSolver::State {
     int solve_by_least_squares(const IkOptions& options) noexcept;
     int solve_by_descent(const IkOptions& options) noexcept;
     /// For a second try, if a chain has folded onto itself on the way to a goal behind it.
-    [[nodiscard]] bool can_turn_to_goal() const noexcept;
-    void turn_to_goal() noexcept;
+    [[nodiscard]] bool can_rotate_to_goal() const noexcept;
+    void rotate_to_goal() noexcept;
     /// Bends straight chains a little, if no axis moves a tip nearer to its goal.
     void bend() noexcept;
 
 private:
     bool move_goal_within_reach() noexcept;
-    void turn_to_pole() noexcept;
+    void rotate_to_pole() noexcept;
     void stretch() noexcept;
 
     void update_axes() noexcept;
