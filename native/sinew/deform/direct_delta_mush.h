@@ -20,7 +20,7 @@ namespace sinew {
 ///     B = (M + t L)^-4 M^4 in the order of application, t = radius^2 / 8
 ///
 /// L is the cotangent Laplacian, with an edge's weight clamped to 0 where it is negative. M is the diagonal
-/// matrix with a third of the area of each vertex's triangles. B is thus the heat that a vertex receives from its
+/// matrix with a third of the area of each vertex's triangles. B is thus the heat that diffuses from a vertex to its
 /// neighbours, independently of their density; on a plane the radius is the standard deviation along each axis.
 /// The paper divides by L's diagonal instead, and has one number for the whole mesh.
 ///
